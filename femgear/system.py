@@ -104,6 +104,8 @@ class Modes:
         Such as ``"rigid"``, ``"rotational"``, ``"translational"``, ``"planet"``, ``"ring"``.
     nodal_diameter : (n_modes,) int array
         Dominant number of nodal diameters of the ring, -1 where there is no ring.
+    modal_load : (n_modes,) array, optional
+        ``shape^T load``: what the constant external load does on each mode; ``None`` means no load.
     """
 
     frequency: np.ndarray
@@ -116,11 +118,20 @@ class Modes:
     kind: tuple[str, ...]
     nodal_diameter: np.ndarray
     dofs: tuple[str, ...] = field(default=())
+    modal_load: np.ndarray | None = None
 
     def __post_init__(self):
         _freeze(
-            self, "frequency", "damping_ratio", "shape", "mesh_stiffness", "mesh_deflection", "residual",
-            "load_deflection", "nodal_diameter",
+            self,
+            "frequency",
+            "damping_ratio",
+            "shape",
+            "mesh_stiffness",
+            "mesh_deflection",
+            "residual",
+            "load_deflection",
+            "nodal_diameter",
+            "modal_load",
         )
 
 
@@ -128,12 +139,12 @@ class Modes:
 class Response:
     """Periodic response at one or many speeds, as complex harmonics of the mesh frequency.
 
-    ``x(t) = Re sum_{h=0..H} X_h exp(i h omega t)``.
+    ``x(t) = Re sum_{h=0..H} X_h exp(i h omega t)`` with ``omega = 2 pi mesh_frequency / periods``.
 
     Parameters
     ----------
     mesh_frequency : (n_speeds,) array
-        Fundamental frequency [Hz].
+        Mesh frequency [Hz].
     deflection : (n_speeds, n_meshes, H + 1) complex array
         Mesh spring deflection ``W^T q`` [m].
     force : (n_speeds, n_meshes, H + 1) complex array
@@ -152,6 +163,9 @@ class Response:
     method : tuple of str
         ``"fixed point"`` or ``"direct"``, one a speed.
     message : str
+    periods : int
+        Mesh periods in one period of the excitation record: harmonic ``h`` has the frequency
+        ``h mesh_frequency / periods``.
     """
 
     mesh_frequency: np.ndarray
@@ -165,9 +179,18 @@ class Response:
     tail: np.ndarray
     method: tuple[str, ...]
     message: str
+    periods: int = 1
 
     def __post_init__(self):
         _freeze(
-            self, "mesh_frequency", "deflection", "force", "modal", "converged", "residual", "iterations",
-            "spectral_radius", "tail",
+            self,
+            "mesh_frequency",
+            "deflection",
+            "force",
+            "modal",
+            "converged",
+            "residual",
+            "iterations",
+            "spectral_radius",
+            "tail",
         )

@@ -1,0 +1,49 @@
+# Everything a user or a maintainer does, by name. Needs git, python3 (3.11 or newer) and make.
+.DEFAULT_GOAL := help
+.PHONY: help environment demo test lint validate bench clean
+
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+
+# Relative paths, so that the place of the clone may hold blanks.
+PY := .venv/bin/python
+FEMGEAR := .venv/bin/femgear
+CASE := cases/planetary_27_40_108.toml
+OUT := out/demo
+# Further arguments for pytest: make test ARGS="tests/gears -k fillet"
+ARGS :=
+
+help:
+	@echo "make demo      run the reference planetary set ($(CASE)) and write its report"
+	@echo "make test      run the tests"
+	@echo "make lint      check style and formatting (ruff)"
+	@echo "make validate  recompute docs/validation.md and run the slow verification tests"
+	@echo "make bench     measure time and memory of every stage"
+	@echo "make clean     delete results, caches and generated grids (.venv stays)"
+
+# Checks the system libraries, then makes .venv and installs femgear once.
+environment:
+	@bash scripts/setup_environment.sh
+
+demo: environment
+	$(FEMGEAR) run $(CASE) -o $(OUT) --force
+	@echo "Report: $(OUT)/report.html"
+
+test: environment
+	$(PY) -m pytest -n 2 --dist loadfile --benchmark-disable $(ARGS)
+
+lint: environment
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+
+validate: environment
+	$(FEMGEAR) validate -o docs/validation.md
+	$(PY) -m pytest -m slow --benchmark-disable $(ARGS)
+
+bench: environment
+	$(PY) -m pytest benchmarks -o python_files="test_*.py bench_*.py" $(ARGS)
+
+clean:
+	rm -rf out dist .pytest_cache .ruff_cache .hypothesis .benchmarks
+	find . -name __pycache__ -type d -not -path "./.venv/*" -prune -exec rm -rf {} +
+	find meshes -type f \( -name "*.vtu" -o -name "*.msh" \) -not -name "reference_*" -delete

@@ -1,0 +1,301 @@
+"""The sections of a case file and what must hold between them."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr
+
+from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.casefile.units import (
+    ANGLE,
+    DENSITY,
+    FOUNDATION,
+    INERTIA,
+    LENGTH,
+    MASS,
+    MODULUS,
+    SPEED,
+    STIFFNESS,
+    TORQUE,
+    TORSION,
+)
+from femgear.errors import CaseError
+
+FORMAT = 1
+RPM = SPEED.scale
+_MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
+
+Member = Literal["sun", "ring", "carrier"]
+Radius = Quantity(LENGTH, 1e-4, 10.0)
+Mass = Quantity(MASS, 1e-6, 1e6)
+Inertia = Quantity(INERTIA, 1e-12, 1e8)
+Stiffness = Quantity(STIFFNESS, 1.0, 1e15)
+Shift = Number(-5.0, 5.0)
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class SetSection(_Section):
+    """What the gears share; without ``centre_distance`` the profile shifts give it."""
+
+    planets: Count(1, 1000)
+    centre_distance: Quantity(LENGTH, 1e-3, 10.0) | None = None
+    face_width: Quantity(LENGTH, 1e-4, 5.0)
+    planet_angles: tuple[Quantity(ANGLE, -2 * math.pi, 2 * math.pi), ...] | None = None
+    backlash: Quantity(LENGTH, 0.0, 0.01) = 0.0
+
+
+class RackSection(_Section):
+    """Basic rack, in modules; the default is ISO 53 profile C."""
+
+    addendum: Number(0.1, 3.0) = 1.0
+    dedendum: Number(0.1, 3.0) = 1.25
+    root_radius: Number(0.0, 1.0) = 0.25
+
+
+class MaterialSection(_Section):
+    """Isotropic elastic material of all gears."""
+
+    youngs_modulus: Quantity(MODULUS, 1e9, 1e12)
+    poisson_ratio: Number(
+        -1.0,
+        0.5,
+        open_low=True,
+        open_high=True,
+        note="0.5 is incompressible, beyond it no material is stable",
+    )
+    density: Quantity(DENSITY, 100.0, 25000.0)
+
+
+class SunSection(_Section):
+    """The sun, and with it the module and the pressure angle of the set."""
+
+    teeth: Count(5, 5000, note=_MANY_TEETH)
+    module: Quantity(LENGTH, 5e-5, 0.1)
+    pressure_angle: Quantity(ANGLE, math.radians(5), math.radians(45))
+    profile_shift: Shift | None = None
+    bore_radius: Radius
+    mass: Mass
+    inertia: Inertia
+    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
+    tip_diameter: Radius | None = None
+    root_diameter: Radius | None = None
+    rack: RackSection | None = None
+
+
+class PlanetSection(_Section):
+    """One of the equal planets."""
+
+    teeth: Count(5, 5000, note=_MANY_TEETH)
+    profile_shift: Shift = 0.0
+    bore_radius: Radius
+    mass: Mass
+    inertia: Inertia
+    bearing_stiffness: Stiffness
+    tip_diameter: Radius | None = None
+    root_diameter: Radius | None = None
+    rack: RackSection | None = None
+
+
+class RingSection(_Section):
+    """The internal gear; a positive profile shift moves its flanks outwards, to larger radii."""
+
+    teeth: Count(10, 5000, note=_MANY_TEETH, signed=True)
+    profile_shift: Shift | None = None
+    outer_radius: Radius
+    cutter_teeth: Count(5, 1000) | None = None
+    cutter_profile_shift: Shift = 0.0
+    foundation_radial: Quantity(FOUNDATION, 0.0, 1e20)
+    foundation_tangential: Quantity(FOUNDATION, 0.0, 1e20)
+    tip_diameter: Radius | None = None
+    root_diameter: Radius | None = None
+    rack: RackSection | None = None
+
+
+class CarrierSection(_Section):
+    """The rigid carrier, without its planets."""
+
+    mass: Mass
+    inertia: Inertia
+    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
+
+
+class MachineSection(_Section):
+    """A rotor behind a torsional coupling; without it the member turns freely under its torque."""
+
+    inertia: Inertia
+    coupling_stiffness: Quantity(TORSION, 1e-3, 1e15)
+
+
+def _speed_range(value: object) -> object:
+    """List of speeds of a table ``{from, to, count}``, equally spaced."""
+    if not isinstance(value, dict):
+        if not isinstance(value, list) or not value:
+            message = f"a list of speeds is needed, not {'an empty one' if value == [] else described(value)}"
+            raise refuse(message, code="E-TYPE", value=value, remedy='write ["250 rpm", "3100 rpm"]')
+        return value
+    ends = _SpeedRange.model_validate(value)
+    step = (ends.to - ends.start) / (ends.count - 1)
+    return [f"{ends.start + i * step!r} rad/s" for i in range(ends.count)]
+
+
+_Speed = Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)
+
+
+class _SpeedRange(_Section):
+    start: _Speed = Field(alias="from")
+    to: _Speed
+    count: Count(2, 100_000)
+
+
+class OperationSection(_Section):
+    """Torque and speeds of the input member; a negative torque loads the other flanks."""
+
+    input: Member
+    fixed: Member
+    torque: Quantity(TORQUE, -1e9, 1e9)
+    speeds: Annotated[tuple[_Speed, ...], BeforeValidator(_speed_range), Field(max_length=100_000)]
+
+
+class StaticSection(_Section):
+    """Positions over one mesh period, contact search and grid."""
+
+    positions: Count(8, 4096) = 64
+    contact: Literal["profile", "line_of_action"] = "profile"
+    flank_elements: Count(4, 200) = 24
+    depth: Quantity(LENGTH, 0.0, 0.1, open_low=True) | None = None
+
+
+class DynamicsSection(_Section):
+    """Modal damping, harmonics of the mesh frequency and tolerance of the periodic solution."""
+
+    damping_ratio: Number(0.0, 1.0, open_high=True) = 0.05
+    mesh_harmonics: Count(1, 200) = 6
+    response_harmonics: Count(1, 1000) | None = None
+    tolerance: Number(1e-14, 1e-2) = 1e-6
+
+
+class HousingSection(_Section):
+    """Points of the carrier-frame ring and the fixed sensor."""
+
+    points: Count(3, 100_000) = 54
+    sensor_angle: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = 0.0
+
+
+class Case(_Section):
+    """A planetary gear set, its operation and how to compute it, in SI units.
+
+    The sections carry the names of the case file. ``source`` is the text that gives this case,
+    ``notices`` what was read in a way that deserves to be said.
+    """
+
+    format: Count(1, 2**31) = FORMAT
+    title: Title
+    set: SetSection
+    rack: RackSection = RackSection()
+    material: MaterialSection
+    sun: SunSection
+    planet: PlanetSection
+    ring: RingSection
+    carrier: CarrierSection
+    motor: MachineSection | None = None
+    brake: MachineSection | None = None
+    operation: OperationSection
+    static: StaticSection = StaticSection()
+    dynamics: DynamicsSection = DynamicsSection()
+    housing: HousingSection = HousingSection()
+
+    _source: str = PrivateAttr(default="")
+    _name: str = PrivateAttr(default="")
+    _notices: tuple[str, ...] = PrivateAttr(default=())
+
+    @property
+    def source(self) -> str:
+        """TOML text that gives this case."""
+        return self._source
+
+    @property
+    def name(self) -> str:
+        """Name of the file, for messages."""
+        return self._name
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Remarks on how the file was read."""
+        return self._notices
+
+    @property
+    def response_harmonics(self) -> int:
+        """Harmonics of the response: as given, or twice those of the mesh."""
+        return self.dynamics.response_harmonics or 2 * self.dynamics.mesh_harmonics
+
+
+def cross_check(case: Case) -> list[CaseError]:
+    """What no entry shows alone."""
+    return [problem for check in (_check_operation, _check_set, _check_numbers) for problem in check(case)]
+
+
+def _check_operation(case: Case):
+    operation, ring = case.operation, case.ring
+    if operation.input == operation.fixed:
+        yield CaseError(
+            f"the {operation.input} cannot be both driven and held",
+            code="E-MECHANISM",
+            key="operation.fixed",
+            value=operation.fixed,
+            limit="one member driven, another held, the third is the output",
+        )
+    if len(set(operation.speeds)) < len(operation.speeds):
+        yield CaseError("a speed is given twice", code="E-DUPLICATE", key="operation.speeds")
+    if operation.fixed == "ring" and ring.foundation_tangential == 0.0:
+        yield CaseError(
+            "the ring is the fixed member but nothing keeps it from turning",
+            code="E-MECHANISM",
+            key="ring.foundation_tangential",
+            value="0 N/m^3",
+            limit="above 0 N/m^3",
+        )
+
+
+def _check_set(case: Case):
+    angles, count = case.set.planet_angles, case.set.planets
+    if angles is not None and len(angles) != count:
+        yield CaseError(
+            f"{len(angles)} angles for {count} planets",
+            code="E-COUNT",
+            key="set.planet_angles",
+            limit=f"{count} angles",
+        )
+    if case.set.centre_distance is None and (
+        case.sun.profile_shift is None or case.ring.profile_shift is None
+    ):
+        yield CaseError(
+            "neither the centre distance nor all profile shifts are given",
+            code="E-KEY-MISSING",
+            key="set.centre_distance",
+            remedy="give set.centre_distance, or both sun.profile_shift and ring.profile_shift",
+        )
+
+
+def _check_numbers(case: Case):
+    positions, dynamics = case.static.positions, case.dynamics
+    if positions <= 2 * dynamics.mesh_harmonics:
+        yield CaseError(
+            f"{positions} positions cannot carry {dynamics.mesh_harmonics} mesh harmonics",
+            code="E-RANGE",
+            key="static.positions",
+            value=positions,
+            limit=f"more than 2 x {dynamics.mesh_harmonics}",
+        )
+    if case.response_harmonics < dynamics.mesh_harmonics:
+        yield CaseError(
+            "fewer harmonics of the response than of the mesh",
+            code="E-RANGE",
+            key="dynamics.response_harmonics",
+            value=case.response_harmonics,
+            limit=f"{dynamics.mesh_harmonics} or more, {2 * dynamics.mesh_harmonics} advised",
+        )

@@ -1,0 +1,283 @@
+"""The contact problem of a planetary set at one position: cells, separations, compliance, motions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.contact.candidates import FlankPair, Windows, flank_pair, window_polynomials, windows
+from femgear.contact.flanks import LEFT, RIGHT, FlankCompliance, station_weights
+from femgear.contact.halfplane import hertz_line, surface_displacement
+
+if TYPE_CHECKING:
+    from femgear.fe.elasticity import Material
+    from femgear.gears.planetary import PlanetarySet
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Flank compliances of the three kinds of gears and their common material."""
+
+    sun: FlankCompliance
+    planet: FlankCompliance
+    ring: FlankCompliance
+    material: Material
+    face_width: float
+
+
+@dataclass(frozen=True)
+class MeshWindows:
+    """Contact windows of all meshes and positions; arrays lead with (2N, P, pairs).
+
+    Parameters
+    ----------
+    near : bool array
+        Candidate pairs.
+    smallest_gap : array
+        Smallest separation in the window [m].
+    gap : array (..., cells)
+        Separation at the cells [m].
+    roll : tuple of two arrays (..., 3)
+        Roll lengths of the window nodes on gear 1 and gear 2 [m].
+    edge : tuple of two bool arrays
+        Whether the low and the high end of the window are ends of a flank.
+    tooth : tuple of two integer arrays (2N, pairs)
+        Tooth numbers on gear 1 and gear 2.
+    local : (2, cells, cells) array
+        Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh.
+    cell_area : (2N,) array
+        Area of a pressure cell [m^2].
+    """
+
+    n_planets: int
+    positions: int
+    pairs: int
+    near: np.ndarray
+    smallest_gap: np.ndarray
+    gap: np.ndarray
+    roll: tuple[np.ndarray, np.ndarray]
+    edge: tuple[np.ndarray, np.ndarray]
+    tooth: tuple[np.ndarray, np.ndarray]
+    local: np.ndarray
+    cell_area: np.ndarray
+
+
+@dataclass(frozen=True)
+class ContactProblem:
+    """``gap + H p - G q >= 0, p >= 0``, with the place of every candidate."""
+
+    n_planets: int
+    H: np.ndarray
+    gap: np.ndarray
+    G: np.ndarray
+    mesh: np.ndarray
+    pair: np.ndarray
+    cell: np.ndarray
+    position: int
+
+    def warm_start(self, other: ContactProblem, active: np.ndarray) -> np.ndarray:
+        """Active candidates of another position, matched by mesh, pair and cell."""
+        key = (self.mesh * 1000 + self.pair) * 1000 + self.cell
+        other_key = (other.mesh * 1000 + other.pair) * 1000 + other.cell
+        return np.isin(key, other_key[active])
+
+    def touches_window_end(self, active: np.ndarray, setup: MeshWindows) -> bool:
+        """Whether a contact ends where its window ends, other than at an end of a flank."""
+        low, high = (edge[self.mesh, self.position, self.pair] for edge in setup.edge)
+        last = setup.gap.shape[-1] - 1
+        return bool(np.any(active & (((self.cell == 0) & ~low) | ((self.cell == last) & ~high))))
+
+
+def mesh_pairs(planetary_set: PlanetarySet) -> tuple[FlankPair, FlankPair]:
+    """The flank pairs sun-planet and planet-ring."""
+    s = planetary_set
+    return (
+        flank_pair(s.sun, s.planet, s.centre_distance, s.working_pressure_angle_sun_planet),
+        flank_pair(s.planet, s.ring, s.centre_distance, s.working_pressure_angle_planet_ring),
+    )
+
+
+def contact_half_width(pair: FlankPair, line_load: float, material: Material) -> float:
+    """Largest Hertzian half width on the path of contact [m] for one tooth pair carrying `line_load` [N/m]."""
+    begin, end = pair.path
+    zeta = np.linspace(begin, end, 51)[1:-1]
+    rho_1, rho_2 = pair.pitch_roll_1 + zeta, pair.pitch_roll_2 - pair.sign * zeta
+    radius = (rho_1 * rho_2 / (rho_2 + pair.sign * rho_1)).max()
+    modulus = material.youngs_modulus / (2 * (1 - material.poisson_ratio**2))
+    return hertz_line(line_load, radius, modulus).half_width
+
+
+def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tooth numbers on gear 1 and gear 2 of the pairs `index` (2N, pairs), counted in each body's frame.
+
+    A pair of mesh j with index i touches at the pitch point when the position is ``-(phase_j + i)``; the
+    tooth is then at the planet's angle, less its half thickness, which fixes its place on the body.
+    """
+    from femgear.gears.gear import half_thickness_angle
+
+    s, N = planetary_set, planetary_set.n_planets
+    psi = np.asarray(s.planet_angles) - s.planet_angles[0]
+    turns = np.asarray(s.mesh_phases)[:, None] + index
+    sun = psi[:, None] / s.sun.pitch_angle + turns[:N] - s.mesh_phases[0]
+    ring = psi[:, None] / s.ring.pitch_angle - (turns[N:] - s.mesh_phases[N])
+    radius_s = s.planet.base_radius / np.cos(s.working_pressure_angle_sun_planet)
+    radius_r = s.planet.base_radius / np.cos(s.working_pressure_angle_planet_ring)
+    thickness = half_thickness_angle(s.planet, radius_s) + half_thickness_angle(s.planet, radius_r)
+    first = np.asarray(s.mesh_phases)[:N, None]
+    planet_sun = -(turns[:N] - first)
+    planet_ring = (thickness - np.pi) / s.planet.pitch_angle - (turns[N:] - first)
+    exact = np.concatenate([sun, planet_ring]), np.concatenate([planet_sun, ring])
+    rounded = tuple(np.rint(e).astype(int) for e in exact)
+    if max(np.abs(e - r).max() for e, r in zip(exact, rounded)) > 1e-3:
+        raise AssertionError("mesh phases and tooth positions contradict one another")
+    return rounded
+
+
+def mesh_windows(
+    planetary_set: PlanetarySet, bodies: Bodies, *, share, positions, cells, nearest, contact
+) -> MeshWindows:
+    """Windows of every mesh at every position; `share` is the force [N] that sizes them."""
+    N = planetary_set.n_planets
+    pairs = mesh_pairs(planetary_set)
+    pitch = planetary_set.sun.base_pitch
+    phase = np.asarray(planetary_set.mesh_phases)
+    tau = np.arange(positions) / positions
+    begin = min(p.path[0] for p in pairs) / pitch
+    end = max(p.path[1] for p in pairs) / pitch
+    count = int(np.ceil(end - begin)) + 4
+    first = np.floor(begin - phase - 1.0).astype(int) - 1
+    index = first[:, None] + np.arange(count)
+    zeta = pitch * (tau[None, :, None] + phase[:, None, None] + index[:, None, :])
+    found, areas, local = [], [], []
+    for kind, pair in enumerate(pairs):
+        half_width = contact_half_width(pair, share / bodies.face_width, bodies.material)
+        found.append(
+            windows(
+                pair,
+                zeta[kind * N : (kind + 1) * N],
+                width=3.2 * half_width,
+                cells=cells,
+                nearest=nearest,
+                line_of_action=contact == "line_of_action",
+            )
+        )
+        areas += [found[-1].cell * bodies.face_width] * N
+        local.append(local_compliance(found[-1].cell, cells, bodies))
+    used = np.concatenate([w.near.any(axis=1) for w in found])
+    return _gather(found, used, tooth_numbers(planetary_set, index), N, positions, np.array(areas), local)
+
+
+def local_compliance(cell: float, cells: int, bodies: Bodies) -> np.ndarray:
+    """Half-plane compliance of both flanks between the cells of a window, shape (cells, cells) [m/N]."""
+    from scipy.linalg import toeplitz
+
+    material = bodies.material
+    one = surface_displacement(
+        np.arange(cells) * cell, 0.5 * cell, material.shear_modulus, material.poisson_ratio
+    )
+    return toeplitz(2.0 * one / bodies.face_width)
+
+
+def _gather(found: list[Windows], used, tooth, N, positions, areas, local) -> MeshWindows:
+    """Join both kinds of mesh and drop the leading and trailing pairs that never come near."""
+    # every mesh keeps the same number of pairs, starting at its own first candidate
+    first = used.argmax(axis=1)
+    count = int((used.shape[1] - used[:, ::-1].argmax(axis=1) - first).max())
+    first = np.minimum(first, used.shape[1] - count)
+    take = first[:, None] + np.arange(count)
+    row = np.arange(2 * N)[:, None]
+
+    def join(name):
+        joined = np.concatenate([getattr(w, name) for w in found])
+        return np.moveaxis(np.moveaxis(joined, 2, 1)[row, take], 1, 2)
+
+    gap = join("gap")
+    return MeshWindows(
+        n_planets=N,
+        positions=positions,
+        pairs=count,
+        near=join("near"),
+        smallest_gap=gap.min(axis=-1),
+        gap=gap,
+        roll=(join("roll_1"), join("roll_2")),
+        edge=(join("at_low_edge"), join("at_high_edge")),
+        tooth=(tooth[0][row, take], tooth[1][row, take]),
+        local=np.stack(local),
+        cell_area=areas,
+    )
+
+
+def assemble_contact(setup: MeshWindows, bodies: Bodies, position: int, gaps) -> ContactProblem:
+    """The complementarity problem of all meshes at one position.
+
+    The motions are those of the planets and, last, of the sun, as arcs on their base circles [m], positive
+    in the direction in which the sun drives.
+    """
+    N = setup.n_planets
+    mesh, pair = np.nonzero(setup.near[:, position])
+    cells = setup.gap.shape[-1]
+    H = _regular_part(setup, bodies, position, mesh, pair)
+    polynomials = window_polynomials(cells)
+    n = len(mesh)
+    H = np.einsum("ca,wavb,db->wcvd", polynomials, H, polynomials, optimize=True)
+    H[np.arange(n), :, np.arange(n), :] += setup.local[(mesh >= N).astype(int)]
+    shift = np.append(gaps, np.zeros(N))
+    gap = (setup.gap[mesh, position, pair] + shift[mesh, None]).ravel()
+    keep = np.isfinite(gap)
+    H = H.reshape(n * cells, n * cells)[np.ix_(keep, keep)]
+    of_cell = np.repeat(mesh, cells)[keep]
+    G = np.zeros((len(of_cell), N + 1))
+    sun_side = of_cell < N
+    G[np.arange(len(of_cell)), of_cell % N] = np.where(sun_side, -1.0, 1.0)
+    G[sun_side, N] = 1.0
+    return ContactProblem(
+        n_planets=N,
+        H=H,
+        gap=gap[keep],
+        G=G,
+        mesh=of_cell,
+        pair=np.repeat(pair, cells)[keep],
+        cell=np.tile(np.arange(cells), n)[keep],
+        position=position,
+    )
+
+
+def _regular_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair) -> np.ndarray:
+    """Regular compliance between the window nodes, shape (windows, 3, windows, 3) [m/N]."""
+    N = setup.n_planets
+    n = len(mesh)
+    S = np.zeros((n, 3, n, 3))
+    sun_side = mesh < N
+    everything = np.arange(n)
+    sun = everything[sun_side]
+    _add_body(S, bodies.sun, setup, position, mesh, pair, sun, np.zeros(len(sun), int), LEFT, None)
+    for planet in range(N):
+        members = everything[mesh % N == planet]
+        is_ring = mesh[members] >= N
+        # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
+        gear, side = np.where(is_ring, 0, 1), np.where(is_ring, RIGHT, LEFT)
+        _add_body(S, bodies.planet, setup, position, mesh, pair, members, gear, side, None)
+    ring = everything[~sun_side]
+    _add_body(S, bodies.ring, setup, position, mesh, pair, ring, np.ones(len(ring), int), LEFT, None)
+    return S
+
+
+def _add_body(S, body: FlankCompliance, setup, position, mesh, pair, members, gear, side, _):
+    """Add the compliance of one body between the windows `members` that lie on it."""
+    if not len(members):
+        return
+    j, i = mesh[members], pair[members]
+    roll = np.where(gear[:, None] == 0, setup.roll[0][j, position, i], setup.roll[1][j, position, i])
+    tooth = np.where(gear == 0, setup.tooth[0][j, i], setup.tooth[1][j, i])
+    index, weight = station_weights(roll, body.roll)
+    index = index + np.broadcast_to(side, len(members))[:, None, None] * len(body.roll)
+    lag = (tooth[:, None] - tooth[None, :]) % len(body.regular)
+    values = body.regular[
+        lag[:, None, None, :, None, None],
+        index[:, :, :, None, None, None],
+        index[None, None, None, :, :, :],
+    ]
+    block = np.einsum("wapvbq,wap,vbq->wavb", values, weight, weight, optimize=True)
+    S[np.ix_(members, range(3), members, range(3))] += block

@@ -1,0 +1,245 @@
+"""Where two flanks may touch: windows of pressure cells with their true separations.
+
+Both flanks are exact involutes. The separation of a point ``P`` of flank 1 from flank 2 is measured along
+the normal of flank 2 through ``P``, which is tangent to the base circle of gear 2: involutes of one base
+circle are parallel curves, so the distance is the base radius times the angle between their origins. The
+formula holds off the line of action and at tip corners as well.
+
+Gear 1 drives. Its flank is drawn as a left flank; roll lengths on gear 1 grow with the path coordinate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from femgear.gears.gear import Gear
+
+
+@dataclass(frozen=True)
+class FlankPair:
+    """Geometry of two mating flanks at a fixed centre distance.
+
+    Parameters
+    ----------
+    base_radius_1, base_radius_2 : float
+        [m].
+    centre_distance, pressure_angle : float
+        Working values [m], [rad].
+    sign : float
+        +1 for two external gears, -1 when gear 2 is internal.
+    limits_1, limits_2 : tuple of float
+        Smallest and largest roll length of the two flanks [m].
+    """
+
+    base_radius_1: float
+    base_radius_2: float
+    centre_distance: float
+    pressure_angle: float
+    sign: float
+    limits_1: tuple[float, float]
+    limits_2: tuple[float, float]
+
+    @property
+    def pitch_roll_1(self) -> float:
+        """Roll length of flank 1 at the pitch point [m]."""
+        return self.base_radius_1 * np.tan(self.pressure_angle)
+
+    @property
+    def pitch_roll_2(self) -> float:
+        """Roll length of flank 2 at the pitch point [m]."""
+        return self.base_radius_2 * np.tan(self.pressure_angle)
+
+    @property
+    def path(self) -> tuple[float, float]:
+        """Ends of the path of contact, measured from the pitch point in the direction of motion [m]."""
+        roll_2 = sorted(self.sign * (self.pitch_roll_2 - r) for r in self.limits_2)
+        start = max(self.limits_1[0] - self.pitch_roll_1, roll_2[0])
+        return start, min(self.limits_1[1] - self.pitch_roll_1, roll_2[1])
+
+
+def _roll(gear: Gear, radius: float) -> float:
+    return float(np.sqrt(max(radius**2 - gear.base_radius**2, 0.0)))
+
+
+def flank_pair(gear_1: Gear, gear_2: Gear, centre_distance: float, pressure_angle: float) -> FlankPair:
+    """Two mating flanks; gear 2 may be internal."""
+    ends_1 = sorted((_roll(gear_1, gear_1.form_radius), _roll(gear_1, gear_1.tip_radius)))
+    ends_2 = sorted((_roll(gear_2, gear_2.form_radius), _roll(gear_2, gear_2.tip_radius)))
+    return FlankPair(
+        base_radius_1=gear_1.base_radius,
+        base_radius_2=gear_2.base_radius,
+        centre_distance=centre_distance,
+        pressure_angle=pressure_angle,
+        sign=-1.0 if gear_2.internal else 1.0,
+        limits_1=(ends_1[0], ends_1[1]),
+        limits_2=(ends_2[0], ends_2[1]),
+    )
+
+
+def separation(pair: FlankPair, zeta, roll_1):
+    """Separation of flank 1 from flank 2 and the roll length of the foot point on flank 2.
+
+    Parameters
+    ----------
+    pair : FlankPair
+    zeta : array
+        Path coordinate of the tooth pair [m].
+    roll_1 : array, broadcast with `zeta`
+        Roll length of the point on flank 1 [m].
+
+    Returns
+    -------
+    gap, roll_2 : arrays
+        Separation along the normal of flank 2 [m] and roll length of the foot point [m].
+    """
+    rb1, rb2, sign = pair.base_radius_1, pair.base_radius_2, pair.sign
+    # polar angle of an involute point: origin angle less the involute function of its pressure angle
+    origin = (pair.pitch_roll_1 + zeta) / rb1 - pair.pressure_angle
+    angle = origin - (roll_1 / rb1 - np.arctan2(roll_1, rb1))
+    radius = np.hypot(rb1, roll_1)
+    x = sign * (sign * pair.centre_distance - radius * np.cos(angle))
+    y = -sign * radius * np.sin(angle)
+    length = np.sqrt(np.maximum(x**2 + y**2 - rb2**2, 0.0))
+    involute = length / rb2 - np.arctan2(length, rb2)
+    origin_2 = (pair.pitch_roll_2 - sign * zeta) / rb2 - pair.pressure_angle
+    gap = sign * rb2 * (np.arctan2(y, x) + involute - origin_2)
+    return gap, length - sign * gap
+
+
+def admissible_arcs(pair: FlankPair, zeta):
+    """Range of arc length on flank 1 whose points and foot points both lie on the flanks.
+
+    Parameters
+    ----------
+    pair : FlankPair
+    zeta : array
+
+    Returns
+    -------
+    low, high : arrays of the shape of `zeta`
+        Arc lengths measured from the base circle along flank 1 [m].
+    """
+    zeta = np.asarray(zeta, float)
+    rb1 = pair.base_radius_1
+    low = np.full(zeta.shape, pair.limits_1[0] ** 2 / (2 * rb1))
+    high = np.full(zeta.shape, pair.limits_1[1] ** 2 / (2 * rb1))
+    for bound in range(2):
+        arc = _arc_of_foot(pair, zeta, pair.limits_2[bound])
+        # along flank 1 the foot point moves down an external flank 2 and up an internal one
+        if (bound == 0) == (pair.sign > 0):
+            high = np.minimum(high, arc)
+        else:
+            low = np.maximum(low, arc)
+    return low, high
+
+
+def _arc_of_foot(pair: FlankPair, zeta, roll_2):
+    """Arc length on flank 1 of the point whose foot on flank 2 has the roll length `roll_2`, by the secant."""
+    rb1, rb2 = pair.base_radius_1, pair.base_radius_2
+    target = roll_2**2 / (2 * rb2)
+    contact_1 = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * rb1)
+    contact_2 = np.maximum(pair.pitch_roll_2 - pair.sign * zeta, 0.0) ** 2 / (2 * rb2)
+    arc = contact_1 + pair.sign * (contact_2 - target)
+    for _ in range(12):
+        roll_1 = np.sqrt(2 * rb1 * np.maximum(arc, 0.0))
+        foot = separation(pair, zeta, roll_1)[1]
+        error = foot * np.abs(foot) / (2 * rb2) - target
+        arc = arc + pair.sign * error
+        if np.abs(error).max(initial=0.0) < 1e-15:
+            break
+    return arc
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows of pressure cells for many positions of one mesh; leading shape (..., pairs).
+
+    Parameters
+    ----------
+    zeta : (...,) array
+        Path coordinate of the tooth pair [m].
+    near : (...,) bool array
+        Whether the pair comes near enough to be a candidate.
+    start : (...,) array
+        Arc length on flank 1 of the first cell edge [m].
+    cell : float
+        Width of a cell [m].
+    gap : (..., cells) array
+        Separation at the cell centres [m]; infinite outside the flanks.
+    roll_1, roll_2 : (..., nodes) arrays
+        Roll lengths at the window nodes on both flanks [m].
+    at_low_edge, at_high_edge : (...,) bool arrays
+        Whether that end of the window is an end of a flank (a tip corner or the start of the involute).
+    """
+
+    zeta: np.ndarray
+    near: np.ndarray
+    start: np.ndarray
+    cell: float
+    gap: np.ndarray
+    roll_1: np.ndarray
+    roll_2: np.ndarray
+    at_low_edge: np.ndarray
+    at_high_edge: np.ndarray
+
+
+WINDOW_NODES = np.array([0.0, 0.5, 1.0])
+
+
+def window_polynomials(cells: int) -> np.ndarray:
+    """Quadratic Lagrange polynomials of the window nodes at the cell centres, shape (cells, 3)."""
+    t = (np.arange(cells) + 0.5) / cells
+    return np.stack([(2 * t - 1) * (t - 1), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
+
+
+def windows(
+    pair: FlankPair, zeta, *, width: float, cells: int, nearest: float, line_of_action: bool
+) -> Windows:
+    """Cells around the point of smallest separation of every tooth pair.
+
+    Parameters
+    ----------
+    pair : FlankPair
+    zeta : array
+        Path coordinates [m].
+    width : float
+        Width of a window [m].
+    cells : int
+        Number of pressure cells in it.
+    nearest : float
+        Pairs whose smallest separation exceeds this [m] are no candidates.
+    line_of_action : bool
+        Only pairs on the theoretical path of contact, as for rigid gears.
+    """
+    zeta = np.asarray(zeta, float)
+    low, high = admissible_arcs(pair, zeta)
+    nominal = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * pair.base_radius_1)
+    tip_to_form = low < high
+    centre = np.clip(nominal, low, np.maximum(low, high))
+    start = np.clip(centre - 0.5 * width, low, np.maximum(low, high - width))
+    cell = width / cells
+    arc = start[..., None] + (np.arange(cells) + 0.5) * cell
+    gap, _ = separation(pair, zeta[..., None], np.sqrt(2 * pair.base_radius_1 * arc))
+    gap = np.where(arc < high[..., None], gap, np.inf)
+    node_arc = np.minimum(start[..., None] + WINDOW_NODES * width, np.maximum(high, low + width)[..., None])
+    roll_1 = np.sqrt(2 * pair.base_radius_1 * node_arc)
+    roll_2 = separation(pair, zeta[..., None], roll_1)[1]
+    begin, end = pair.path
+    on_path = (zeta >= begin) & (zeta <= end)
+    near = on_path if line_of_action else tip_to_form & (gap.min(axis=-1) < nearest)
+    tiny = 1e-9 * width
+    return Windows(
+        zeta=zeta,
+        near=near,
+        start=start,
+        cell=cell,
+        gap=gap,
+        roll_1=roll_1,
+        roll_2=roll_2,
+        at_low_edge=start <= low + tiny,
+        at_high_edge=start + width >= high - tiny,
+    )

@@ -1,0 +1,205 @@
+"""Compliance of the flanks of one gear: the finite-element body plus the half plane under the contact.
+
+A concentrated load on a finite-element surface has no converged displacement. What converges is the
+displacement at a depth ``d`` under the flank. The half-plane displacement at that depth, which has the
+same singularity, is subtracted; what remains is the regular part of the flank's compliance. It is smooth
+along the flank, so it may be interpolated, and it is extrapolated from the depths d and 2d to the surface.
+The contact solution adds the half-plane displacement at the surface under its pressure cells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.contact.halfplane import depth_displacement
+from femgear.errors import GridError
+
+if TYPE_CHECKING:
+    from femgear.fe.elasticity import Material
+    from femgear.fe.meshing import Grid
+    from femgear.gears.gear import Gear
+
+LEFT, RIGHT = 0, 1
+
+
+@dataclass(frozen=True)
+class FlankCompliance:
+    """Regular compliance between the flank stations of all teeth of one gear.
+
+    Parameters
+    ----------
+    roll : (n,) array
+        Roll lengths of the stations [m], equidistant and ascending.
+    base_radius : float
+        [m].
+    regular : (teeth, 2n, 2n) array
+        ``regular[k, a, b]``: displacement into the body [m] at station ``a`` of tooth ``i`` per unit inward
+        normal force [N] at station ``b`` of tooth ``i - k``, less the half-plane part where both lie on the
+        same flank. Stations of the left flank first, then those of the right flank.
+    depth : (n,) array
+        Depth under each station at which body and half plane are joined [m].
+    unknowns : int
+        Degrees of freedom of the whole body that the sector stands for.
+    """
+
+    roll: np.ndarray
+    base_radius: float
+    regular: np.ndarray
+    depth: np.ndarray
+    unknowns: int
+
+
+@dataclass(frozen=True)
+class FlankStations:
+    """Nodes of the left flank with their inward normals, ordered by roll length."""
+
+    nodes: np.ndarray
+    roll: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+
+
+def flank_stations(grid: Grid, gear: Gear) -> FlankStations:
+    """Vertices of the left flank, shape (n,), with inward unit normals, shape (n, 2)."""
+    nodes = np.unique(np.asarray(grid.boundaries["flank_left"])[:, :2])
+    points = np.asarray(grid.points)[nodes]
+    order = np.argsort(np.hypot(*points.T))
+    nodes, points = nodes[order], points[order]
+    radius = np.hypot(*points.T)
+    pressure_angle = np.arccos(np.minimum(gear.base_radius / radius, 1.0))
+    sign = -1.0 if gear.internal else 1.0
+    outward = np.arctan2(points[:, 1], points[:, 0]) + np.pi / 2 - sign * pressure_angle
+    normals = -np.column_stack([np.cos(outward), np.sin(outward)])
+    roll = gear.base_radius * np.tan(pressure_angle)
+    return FlankStations(nodes, roll, points, normals)
+
+
+def joining_depth(gear: Gear, radius, depth: float | None) -> np.ndarray:
+    """Joining depth under flank points [m]: a quarter of the module, less where the tooth is thin.
+
+    Parameters
+    ----------
+    gear : Gear
+    radius : (n,) array
+        [m].
+    depth : float, optional
+        Upper limit instead of a quarter of the module [m].
+
+    Returns
+    -------
+    (n,) array
+        At most 0.3 of the tooth thickness at each radius, so that twice the depth stays in the tooth.
+    """
+    from femgear.gears.gear import tooth_thickness
+
+    limit = 0.25 * gear.module if depth is None else depth
+    return np.minimum(limit, 0.3 * tooth_thickness(gear, radius))
+
+
+def flank_load_columns(grid: Grid, stations: FlankStations) -> np.ndarray:
+    """Unit inward normal nodal forces at the stations, shape (2 n_nodes, n)."""
+    loads = np.zeros((2 * len(grid.points), len(stations.nodes)))
+    column = np.arange(len(stations.nodes))
+    loads[2 * stations.nodes, column] = stations.normals[:, 0]
+    loads[2 * stations.nodes + 1, column] = stations.normals[:, 1]
+    return loads
+
+
+def flank_compliance(
+    grid: Grid, gear: Gear, material: Material, stiffness, *, held: str, depth: float | None = None
+) -> FlankCompliance:
+    """Regular flank compliance of a whole gear from the grid of one sector.
+
+    Parameters
+    ----------
+    grid : Grid
+        Mirror-symmetric sector with boundaries ``flank_left``, ``cut_left``, ``cut_right`` and `held`.
+    gear : Gear
+    material : Material
+    stiffness : (2n, 2n) sparse matrix
+        Stiffness of the sector [N/m].
+    held : str
+        Boundary that is held: ``"rim"`` is the bore of an external gear and the outer surface of a ring.
+    depth : float, optional
+        Largest joining depth [m]; see `joining_depth`.
+
+    Raises
+    ------
+    GridError
+        When the depth reaches out of the tooth or the sector can move freely.
+    """
+    from femgear.fe.compliance import condense_sector, directional, interpolation, tooth_compliance
+
+    stations = flank_stations(grid, gear)
+    if depth is not None and not depth > 0:
+        raise GridError(f"the joining depth is {depth} m", code="E-DEPTH", limit="above zero")
+    depths = joining_depth(gear, np.hypot(*stations.points.T), depth)[:, None]
+    observations = [
+        directional(interpolation(grid, stations.points + factor * depths * stations.normals), stations.normals)
+        for factor in (1.0, 2.0)
+    ]
+    schur = condense_sector(
+        grid,
+        stiffness,
+        count=gear.teeth,
+        held=held,
+        loads=flank_load_columns(grid, stations),
+        observations=np.hstack(observations),
+    )
+    n = len(stations.roll)
+    compliance = tooth_compliance(schur).reshape(gear.teeth, 2, 2, n, 2 * n)
+    arc = stations.roll**2 / (2 * gear.base_radius)
+    offset = arc[:, None] - arc[None, :]
+    regular = np.empty((gear.teeth, 2 * n, 2 * n))
+    parts = []
+    for level, factor in enumerate((1.0, 2.0)):
+        # columns of `observations` are mirrored as one block: (side, level, station)
+        at_depth = compliance[:, :, level].reshape(gear.teeth, 2 * n, 2 * n).copy()
+        local = depth_displacement(offset, factor * depths, material.shear_modulus, material.poisson_ratio)
+        for side in (LEFT, RIGHT):
+            block = slice(side * n, (side + 1) * n)
+            at_depth[0, block, block] -= local / gear.face_width
+        parts.append(at_depth)
+    regular = 2.0 * parts[0] - parts[1]
+    # reciprocity holds for the exact field; the two depths break it by the size of the discretisation error
+    regular = 0.5 * (regular + np.roll(regular[::-1], 1, axis=0).transpose(0, 2, 1))
+    return FlankCompliance(
+        roll=stations.roll,
+        base_radius=gear.base_radius,
+        regular=regular,
+        depth=depths[:, 0],
+        unknowns=gear.teeth * 2 * len(grid.points),
+    )
+
+
+def station_weights(roll, stations):
+    """Cubic Lagrange weights on equidistant stations.
+
+    Parameters
+    ----------
+    roll : array of any shape
+        Roll lengths [m]; values outside the stations are extrapolated by at most half a spacing.
+    stations : (n,) array
+
+    Returns
+    -------
+    index : integer array, shape (..., 4)
+    weight : array, shape (..., 4)
+    """
+    step = (stations[-1] - stations[0]) / (len(stations) - 1)
+    position = np.clip((np.asarray(roll) - stations[0]) / step, -0.5, len(stations) - 0.5)
+    first = np.clip(np.floor(position).astype(int) - 1, 0, len(stations) - 4)
+    t = position - first
+    weight = np.stack(
+        [
+            -(t - 1) * (t - 2) * (t - 3) / 6,
+            t * (t - 2) * (t - 3) / 2,
+            -t * (t - 1) * (t - 3) / 2,
+            t * (t - 1) * (t - 2) / 6,
+        ],
+        axis=-1,
+    )
+    return first[..., None] + np.arange(4), weight

@@ -1,0 +1,209 @@
+"""Pivoting steps of the contact solution: linear solutions of one active set, and how it changes.
+
+For a set ``A`` of touching candidates the conditions are linear: ``H_AA p_A - G_A q = -gap_A`` and
+``G_A^T p_A = load``, solved by one Cholesky factor of ``H_AA`` and the Schur complement
+``G_A^T H_AA^-1 G_A``. All candidates that pull or penetrate change sides at once; when their number does
+not fall, one at a time does, the one with the largest index (block principal pivoting with Murty's rule:
+J. J. Judice, F. M. Pires, Computers Oper. Res. 21, 1994). Motions that no touching candidate restrains are
+treated explicitly: they are moved until something touches if they carry load, and stay as close to zero as
+the gaps allow if they do not (least distance problem: C. L. Lawson, R. J. Hanson, Solving Least Squares
+Problems, 1974, chapter 23).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lapack
+
+from femgear.errors import ContactError
+
+PATIENCE = 3  # block steps without progress before single pivots
+ROUNDING = 1e-13  # gaps and loads below this share of their terms are rounding
+NULL = 1e-10  # relative eigenvalue below which a motion is not restrained
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Scaled to unit mean compliance and unit largest arm of every motion."""
+
+    H: np.ndarray
+    gap: np.ndarray
+    G: np.ndarray
+    load: np.ndarray
+    compliance: float
+    arm: np.ndarray
+
+
+@dataclass(frozen=True)
+class Step:
+    """Solution of the linear conditions of one active set, and what they violate."""
+
+    active: np.ndarray
+    loads: np.ndarray
+    motions: np.ndarray
+    gaps: np.ndarray
+    flips: np.ndarray
+    forced: np.ndarray
+    null: np.ndarray
+    residual: float
+    tolerance: float
+
+
+def factor(H):
+    """Lower Cholesky factor."""
+    lower, info = lapack.dpotrf(H, lower=1, clean=0)
+    if info:
+        lowest = np.linalg.eigvalsh(H)[0]
+        raise ContactError(
+            f"the contact compliance matrix is not positive definite: lowest eigenvalue {lowest:.3g}, "
+            f"largest diagonal entry {np.diag(H).max():.3g}",
+            code="E-CONTACT-COMPLIANCE",
+            value=float(lowest),
+            limit="above zero",
+            remedy="check that no candidate appears twice and that the local part is on the diagonal",
+        )
+    return lower
+
+
+def forward(lower, columns):
+    """``L^-1 columns``."""
+    return lapack.dtrtrs(lower, columns, lower=1)[0]
+
+
+def solve_step(problem: Problem, active: np.ndarray) -> Step:
+    """Solve the linear conditions of one active set and list the candidates that violate the others."""
+    index = np.flatnonzero(active)
+    n, m = problem.G.shape
+    half, offset = np.zeros((0, m)), np.zeros(0)
+    if len(index):
+        lower = factor(problem.H[np.ix_(index, index)])
+        both = forward(lower, np.column_stack([problem.G[index], problem.gap[index]]))
+        half, offset = both[:, :m], both[:, m]
+    values, vectors = np.linalg.eigh(half.T @ half)
+    free = values <= NULL * max(values.max(initial=0.0), np.finfo(float).tiny)
+    null, held = vectors[:, free], vectors[:, ~free]
+    motions = held @ ((held.T @ (problem.load + half.T @ offset)) / values[~free])
+    loads = np.zeros(n)
+    if len(index):
+        loads[index] = lapack.dtrtrs(lower, half @ motions - offset, lower=1, trans=1)[0]
+    elastic, approach = problem.H @ loads, problem.G @ motions
+    gaps = problem.gap + elastic - approach
+    scale = np.abs(elastic).max(initial=0.0)
+    blocked = forced = np.zeros(0, int)
+    if free.any():
+        shift, blocked, forced = _settle(problem, null, gaps, active)
+        motions = motions + null @ shift
+        approach = problem.G @ motions
+        gaps = problem.gap + elastic - approach
+    rounding = ROUNDING * (np.abs(problem.gap) + scale + np.abs(approach))
+    tolerance = 10 * ROUNDING * np.abs(loads).max(initial=0.0)
+    wrong = np.where(active, loads < -tolerance, gaps < -rounding)
+    wrong[blocked] = False
+    wrong[forced] = True
+    return Step(
+        active=active,
+        loads=loads,
+        motions=motions,
+        gaps=gaps,
+        flips=np.flatnonzero(wrong),
+        forced=forced,
+        null=null,
+        residual=_residual(problem, active, loads, gaps),
+        tolerance=tolerance,
+    )
+
+
+def _residual(problem: Problem, active, loads, gaps) -> float:
+    """Largest relative violation of the conditions; see `ContactState`."""
+    length = np.abs(problem.H @ loads).max(initial=0.0) or np.abs(problem.gap).max(initial=0.0) or 1.0
+    force = max(np.abs(loads).max(initial=0.0), np.abs(problem.load).max(initial=0.0)) or 1.0
+    imbalance = np.abs(problem.G.T @ loads - problem.load).max(initial=0.0)
+    touching = np.abs(gaps[active]).max(initial=0.0)
+    return float(max(touching / length, -gaps.min(initial=0.0) / length,
+                     -loads.min(initial=0.0) / force, imbalance / force))  # fmt: skip
+
+
+def _settle(problem: Problem, null, gaps, active):
+    """Motions that no touching candidate restrains: their shift, who cannot be judged, who must touch.
+
+    Returns
+    -------
+    shift : (k,) array
+        Amounts along the columns of `null`.
+    blocked : integer array
+        Candidates whose gaps mean nothing because no shift settles these motions.
+    forced : integer array
+        Candidates that must touch.
+    """
+    arms = problem.G @ null
+    moved = np.flatnonzero(~active & (np.abs(arms).max(axis=1) > 1e-9))
+    pull = null.T @ problem.load
+    if np.abs(pull).max() > 1e-9 * np.abs(problem.load).max(initial=0.0):
+        speed = arms[moved] @ pull
+        meets = speed > 1e-9 * np.abs(speed).max(initial=0.0)
+        if not meets.any():
+            raise ContactError(
+                "no candidate can balance the load: the contacts cannot push in its direction",
+                code="E-CONTACT-UNSUPPORTED",
+                value=(problem.load * problem.arm).tolist(),
+                remedy="check the sign of the load and that every mesh has candidates",
+            )
+        first = moved[meets][np.argmin(gaps[moved[meets]] / speed[meets])]
+        return np.zeros(len(pull)), moved, np.array([first])
+    shift, support = _least_motion(arms[moved], gaps[moved])
+    if shift is None:
+        return np.zeros(len(pull)), moved, moved[support]
+    return shift, moved[:0], moved[:0]
+
+
+def _least_motion(arms, gaps):
+    """Smallest ``z`` with ``arms z <= gaps``, or the constraints that contradict one another.
+
+    Least distance programming by non-negative least squares (Lawson and Hanson, chapter 23): when there
+    is no solution, the positive multipliers combine the constraints to ``0 <= negative``.
+    """
+    k = arms.shape[1]
+    deepest = -gaps.min(initial=0.0)
+    if deepest <= 0:
+        return np.zeros(k), None
+    from scipy.optimize import nnls
+
+    rows = np.column_stack([-arms, -gaps / deepest])
+    rows /= np.linalg.norm(rows, axis=1)[:, None]
+    target = np.append(np.zeros(k), 1.0)
+    multipliers, _ = nnls(rows.T, target)
+    rest = rows.T @ multipliers - target
+    if np.linalg.norm(rest) < 1e-8:
+        return None, np.flatnonzero(multipliers > 0)
+    return -rest[:k] / rest[k] * deepest, None
+
+
+def pivot(problem: Problem, active, max_steps) -> tuple[Step, int, bool]:
+    """Flip all violations while their number falls, otherwise one at a time.
+
+    Returns
+    -------
+    step : Step
+        The last one; solved when its `flips` are empty.
+    iterations : int
+    single : bool
+        Whether single pivots were needed.
+    """
+    fewest, patience, single = np.inf, PATIENCE, False
+    for iteration in range(1, max_steps + 1):
+        step = solve_step(problem, active)
+        flips = step.flips
+        if not len(flips) or iteration == max_steps:
+            break
+        if len(flips) < fewest:
+            fewest, patience = len(flips), PATIENCE
+        elif patience:
+            patience -= 1
+        else:
+            single = True
+            flips = step.forced if len(step.forced) else flips[-1:]
+        active = active.copy()
+        active[flips] ^= True
+    return step, iteration, single

@@ -1,0 +1,256 @@
+"""The contact waist: one complementarity problem for all meshes at one position.
+
+Find contact loads ``p`` (n candidates) and motions ``q`` (m bodies) with
+
+    w = gap + H p - G q >= 0,    p >= 0,    p_i w_i = 0,    G^T p = load.
+
+These are the optimality conditions of ``min p^T H p / 2 + gap^T p`` under ``p >= 0`` and ``G^T p = load``
+(the motions are its multipliers), so ``p`` is unique when ``H`` is positive definite.
+
+The steps are in `femgear.contact.pivoting`; daqp is the last resort.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.contact.pivoting import Problem, Step, factor, forward, pivot, solve_step
+from femgear.errors import ContactError
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """Solution of the contact problem at one position.
+
+    Parameters
+    ----------
+    loads : (n,) array
+        Contact loads ``p``, never negative, exactly zero where not `active`.
+    motions : (m,) array
+        Motions ``q``.
+    gaps : (n,) array
+        Remaining separations ``w``, never negative, exactly zero where `active`.
+    active : (n,) bool array
+        Candidates that carry load.
+    iterations : int
+        Number of linear solutions.
+    residual : float
+        Largest violation, before the clean-up of rounding errors: separation at touching candidates and
+        penetration relative to the largest elastic displacement, pull and imbalance relative to the
+        largest load.
+    method : str
+        ``"active set"``, ``"active set, single pivots"``, ``"daqp"`` or ``"no load"``.
+    open_motions : (m,) bool array
+        Motions that no loaded candidate restrains (such as that of a planet that carries nothing). They
+        have the smallest value at which nothing penetrates.
+    """
+
+    loads: np.ndarray
+    motions: np.ndarray
+    gaps: np.ndarray
+    active: np.ndarray
+    iterations: int
+    residual: float
+    method: str
+    open_motions: np.ndarray
+
+    def __post_init__(self):
+        for array in (self.loads, self.motions, self.gaps, self.active, self.open_motions):
+            array.setflags(write=False)
+
+
+def solve_contact(H, gap, G, load, *, start=None, max_steps=200) -> ContactState:
+    """Contact loads and motions of bodies that touch without pulling or penetrating.
+
+    Parameters
+    ----------
+    H : (n, n) array
+        Compliance between the candidates, symmetric positive definite [m/N].
+    gap : (n,) array
+        Separations without load and motion [m]; negative where the undeformed surfaces overlap.
+    G : (n, m) array
+        Approach at each candidate per unit motion [1, or m/rad].
+    load : (m,) array
+        External load that the contacts balance, ``G^T p = load`` [N, or N m].
+    start : (n,) bool array, optional
+        Candidates thought to touch, such as those of the neighbouring position; all when not given.
+    max_steps : int, optional
+        Number of steps after which the general solver daqp takes over.
+
+    Returns
+    -------
+    ContactState
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-INPUT for wrong shapes or values that are not finite, E-CONTACT-COMPLIANCE for a matrix
+        that is not symmetric positive definite, E-CONTACT-UNSUPPORTED when no contact can balance the
+        load, E-CONTACT-CONVERGENCE when no method solves the problem.
+    """
+    problem = _scaled(*_checked(H, gap, G, load))
+    n = len(problem.gap)
+    if not problem.load.any():
+        step = solve_step(problem, np.zeros(n, bool))
+        if not len(step.flips):
+            return _state(problem, step, 1, "no load")
+    active = np.ones(n, bool) if start is None else np.array(start, bool)
+    if active.shape != (n,):
+        raise ContactError(
+            f"the start has shape {active.shape}, the problem {n} candidates", code="E-CONTACT-INPUT"
+        )
+    step, iterations, single = pivot(problem, active, max_steps)
+    method = "active set, single pivots" if single else "active set"
+    if len(step.flips):
+        step, more = _by_daqp(problem)
+        iterations, method = iterations + more, "daqp"
+    return _state(problem, _without_idle(problem, step), iterations, method)
+
+
+def tangent_stiffness(H, active, mesh_of_candidate, n_meshes) -> np.ndarray:
+    """Tangent stiffness of every mesh at constant loads of the other meshes.
+
+    ``a_j = 1^T (H_jj,AA)^-1 1`` over the loaded candidates of mesh j: all of them approach by the same
+    small amount.
+
+    Parameters
+    ----------
+    H : (n, n) array
+        Compliance between the candidates [m/N].
+    active : (n,) bool array
+        Candidates that carry load.
+    mesh_of_candidate : (n,) integer array
+        Mesh, 0 to ``n_meshes - 1``, of every candidate.
+    n_meshes : int
+
+    Returns
+    -------
+    (n_meshes,) array
+        [N/m]; zero where no candidate of the mesh carries load.
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-COMPLIANCE when the compliance of the touching candidates is not positive definite.
+    """
+    H, active, mesh = np.asarray(H, float), np.asarray(active, bool), np.asarray(mesh_of_candidate)
+    stiffness = np.zeros(n_meshes)
+    for j in range(n_meshes):
+        index = np.flatnonzero(active & (mesh == j))
+        if len(index):
+            half = forward(factor(H[np.ix_(index, index)]), np.ones((len(index), 1)))
+            stiffness[j] = (half * half).sum()
+    return stiffness
+
+
+def mesh_tangent_matrix(H, active, mesh_of_candidate, n_meshes) -> np.ndarray:
+    """Tangent stiffness of all meshes together, with the coupling through their common bodies.
+
+    ``g^T (H_AA)^-1 g`` with one indicator column of ``g`` a mesh: the increments of the mesh forces per
+    unit approach of each mesh while the others hold theirs.
+
+    Parameters
+    ----------
+    H, active, mesh_of_candidate, n_meshes
+        As for `tangent_stiffness`.
+
+    Returns
+    -------
+    (n_meshes, n_meshes) array
+        [N/m], symmetric; rows and columns of meshes without load are zero.
+
+    Raises
+    ------
+    ContactError
+        As `tangent_stiffness`.
+    """
+    index = np.flatnonzero(active)
+    if not len(index):
+        return np.zeros((n_meshes, n_meshes))
+    columns = (np.asarray(mesh_of_candidate)[index, None] == np.arange(n_meshes)).astype(float)
+    half = forward(factor(np.asarray(H, float)[np.ix_(index, index)]), columns)
+    return half.T @ half
+
+
+def _checked(H, gap, G, load):
+    """The four arrays, refused when they cannot be a contact problem."""
+    H, gap, G, load = (np.asarray(a, float) for a in (H, gap, G, load))
+    n, m = G.shape if G.ndim == 2 else (-1, -1)
+    if H.shape != (n, n) or gap.shape != (n,) or load.shape != (m,):
+        raise ContactError(
+            f"shapes do not fit: H {H.shape}, gap {gap.shape}, G {G.shape}, load {load.shape}",
+            code="E-CONTACT-INPUT",
+            limit="(n, n), (n,), (n, m), (m,)",
+        )
+    for name, array in (("compliance H", H), ("gap", gap), ("arms G", G), ("load", load)):
+        if not np.isfinite(array).all():
+            bad = int(array.size - np.isfinite(array).sum())
+            raise ContactError(
+                f"{bad} of {array.size} values of the {name} are not finite", code="E-CONTACT-INPUT"
+            )
+    if n and (lack := np.abs(H - H.T).max()) > 1e-9 * np.abs(H).max():
+        raise ContactError(
+            f"the compliance is not symmetric: largest difference {lack:.3g} of {np.abs(H).max():.3g} m/N",
+            code="E-CONTACT-COMPLIANCE",
+            remedy="reciprocity is violated; check the loads and observations of the bodies",
+        )
+    if n:
+        factor(H)
+    return H, gap, G, load
+
+
+def _scaled(H, gap, G, load) -> Problem:
+    compliance = float(np.trace(H)) / len(gap) if len(gap) else 1.0
+    arm = np.abs(G).max(axis=0, initial=0.0)
+    arm[arm == 0] = 1.0
+    return Problem(H / compliance, gap / compliance, G / arm, load / arm, compliance, arm)
+
+
+def _by_daqp(problem: Problem) -> tuple[Step, int]:
+    """The general quadratic program gives the active set; the linear conditions then give the digits."""
+    import daqp
+
+    n, m = problem.G.shape
+    unit = np.abs(problem.load).max() or np.abs(problem.gap).max()
+    upper = np.concatenate([np.full(n, 1e30), problem.load / unit])
+    lower = np.concatenate([np.zeros(n), problem.load / unit])
+    sense = np.concatenate([np.zeros(n), np.full(m, 5)]).astype(np.int32)
+    cost, arms = np.ascontiguousarray(problem.H), np.ascontiguousarray(problem.G.T)
+    loads, _, flag, info = daqp.solve(cost, problem.gap / unit, arms, upper, lower, sense)
+    if flag == 1:
+        step, more, _ = pivot(problem, loads > 1e-10 * np.abs(loads).max(), 30)
+        if not len(step.flips):
+            return step, int(info["iterations"]) + more
+    raise ContactError(
+        f"no method solves the contact of {n} candidates and {m} motions (daqp ends with flag {flag})",
+        code="E-CONTACT-CONVERGENCE",
+        remedy="look for separations or compliances of very different size",
+    )
+
+
+def _without_idle(problem: Problem, step: Step) -> Step:
+    """Release touching candidates whose load is rounding, so that only loaded ones count as active."""
+    idle = step.active & (step.loads <= step.tolerance)
+    if not idle.any():
+        return step
+    released = solve_step(problem, step.active & ~idle)
+    return step if len(released.flips) else released
+
+
+def _state(problem: Problem, step: Step, iterations: int, method: str) -> ContactState:
+    """Back to the caller's units, with exact complementarity."""
+    loads = np.where(step.active & (step.loads > step.tolerance), step.loads, 0.0)
+    active = loads > 0
+    gaps = np.where(active, 0.0, np.maximum(step.gaps, 0.0)) * problem.compliance
+    return ContactState(
+        loads=loads,
+        motions=step.motions * problem.compliance / problem.arm,
+        gaps=gaps,
+        active=active,
+        iterations=iterations,
+        residual=step.residual,
+        method=method,
+        open_motions=np.abs(step.null).max(axis=1, initial=0.0) > 1e-8,
+    )

@@ -1,0 +1,308 @@
+"""Body compliance at flank points of a cyclic body: one tooth sector, one factorisation.
+
+The body is ``count`` copies of one mirror-symmetric sector. In the frame of each sector the cut
+displacements are tied by ``u_L(k) = Q u_R(k + 1)``, ``Q`` being the rotation by the sector angle
+``a``. A discrete Fourier transform over the sectors (Thomas, "Dynamics of rotationally periodic
+structures", Int. J. Numer. Meth. Eng. 14, 1979) decouples the body into one small problem for each
+harmonic ``n``; for static loads on the interior of the sector these are
+
+    A_n = S_RR + Q^T S_LL Q + e^{i n a} S_RL Q + e^{-i n a} Q^T S_LR
+    H_n = C + Pd_n^H A_n^{-1} Pf_n,      H(k - l) = (1/count) sum_n e^{i n a (k - l)} H_n
+
+with ``S`` the Schur complement of the sector on its two cuts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import GridError
+
+
+@dataclass(frozen=True)
+class SectorSchur:
+    """A sector condensed on its two cuts, with loads and observations on its interior.
+
+    Parameters
+    ----------
+    count : int
+        Number of sectors in the body.
+    S : (2, 2, nb, nb) array
+        Schur complement [N/m]; the leading indices are the cut (0 right, 1 left).
+    C : (n_observations, n_loads) array
+        Interior compliance with both cuts held [m/N].
+    load_cut, observation_cut : (2, nb, n) arrays
+        Forces on the held cuts per unit load and per unit adjoint load.
+    rotation : (nb, nb) array
+        Block rotation by the sector angle.
+    """
+
+    count: int
+    S: np.ndarray
+    C: np.ndarray
+    load_cut: np.ndarray
+    observation_cut: np.ndarray
+    rotation: np.ndarray
+
+
+def symmetric_factor(matrix):
+    """Sparse LU of a symmetric matrix in SuperLU's symmetric mode.
+
+    Raises
+    ------
+    GridError
+        When the matrix is singular: the body can move without straining.
+    """
+    from scipy.sparse.linalg import splu
+
+    try:
+        return splu(
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError as error:
+        raise GridError(
+            f"the stiffness matrix of a sector is singular ({error})",
+            code="E-SINGULAR",
+            remedy="hold the bore, the rim or a foundation so that the body cannot move freely",
+        ) from error
+
+
+def dof_pairs(nodes):
+    """Degrees of freedom (x then y, node by node) of an array of nodes."""
+    nodes = np.asarray(nodes)
+    return (2 * nodes[:, None] + np.array([0, 1])).ravel()
+
+
+def boundary_nodes(grid, name):
+    """Sorted unique node numbers of a named boundary."""
+    return np.unique(grid.boundaries[name])
+
+
+def mirror_nodes(grid):
+    """Permutation that maps every node to its mirror image in the x axis, shape (n,).
+
+    Raises
+    ------
+    GridError
+        When the grid is not mirror-symmetric.
+    """
+    from scipy.spatial import cKDTree
+
+    points = np.asarray(grid.points)
+    distance, image = cKDTree(points).query(points * np.array([1.0, -1.0]))
+    if distance.max() > 1e-9 * np.abs(points).max():
+        raise GridError(
+            f"the sector grid is not mirror-symmetric (largest offset {distance.max():.2e} m)",
+            code="E-GRID-MIRROR",
+            remedy="make the sector by mirroring the grid of half a sector",
+        )
+    return image
+
+
+def mirrored_columns(columns, image):
+    """Reflect displacement or load columns (2n, m) in the x axis."""
+    result = np.empty_like(columns)
+    result[2 * image] = columns[0::2]
+    result[2 * image + 1] = -columns[1::2]
+    return result
+
+
+def interpolation(grid, points):
+    """Quadratic interpolation from the grid nodes to interior points.
+
+    Parameters
+    ----------
+    grid : Grid
+    points : (m, 2) array
+        Points inside the grid [m].
+
+    Returns
+    -------
+    scipy.sparse.csr_array, shape (m, n)
+
+    Raises
+    ------
+    GridError
+        When a point lies outside the grid.
+    """
+    from scipy.sparse import csr_array
+
+    nodes, triangles = np.asarray(grid.points), np.asarray(grid.triangles)
+    corner = nodes[triangles[:, :3]]
+    d1, d2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    area = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
+    rel = points[:, None, :] - corner[None, :, 0]
+    b1 = (rel[..., 0] * d2[:, 1] - rel[..., 1] * d2[:, 0]) / area
+    b2 = (rel[..., 1] * d1[:, 0] - rel[..., 0] * d1[:, 1]) / area
+    inside = np.minimum(np.minimum(b1, b2), 1.0 - b1 - b2)
+    element = inside.argmax(axis=1)
+    row = np.arange(len(points))
+    if inside[row, element].min() < -1e-9:
+        worst = points[inside[row, element].argmin()]
+        raise GridError(
+            f"the point ({worst[0]:.6g}, {worst[1]:.6g}) m lies outside the grid",
+            code="E-GRID-POINT",
+            remedy="reduce static.depth: it must stay inside the tooth",
+        )
+    b1, b2 = _curved_coordinates(nodes[triangles[element]], points, b1[row, element], b2[row, element])
+    columns = triangles[element].T
+    shape = _shape_functions(b1, b2)[0]
+    return csr_array((shape.ravel(), (np.tile(row, 6), columns.ravel())), shape=(len(points), len(nodes)))
+
+
+def _shape_functions(b1, b2):
+    """Quadratic shape functions (6, m) and their derivatives with respect to both coordinates."""
+    b0 = 1.0 - b1 - b2
+    one, zero = np.ones_like(b0), np.zeros_like(b0)
+    value = np.stack(
+        [b0 * (2 * b0 - 1), b1 * (2 * b1 - 1), b2 * (2 * b2 - 1), 4 * b0 * b1, 4 * b1 * b2, 4 * b2 * b0]
+    )
+    first = np.stack([one - 4 * b0, 4 * b1 - 1, zero, 4 * (b0 - b1), 4 * b2, -4 * b2])
+    second = np.stack([one - 4 * b0, zero, 4 * b2 - 1, -4 * b1, 4 * b1, 4 * (b0 - b2)])
+    return value, first, second
+
+
+def _curved_coordinates(element_nodes, points, b1, b2):
+    """Reference coordinates of points in curved six-node triangles by Newton's method."""
+    for _ in range(20):
+        value, first, second = _shape_functions(b1, b2)
+        error = points - np.einsum("im,mic->mc", value, element_nodes)
+        t1 = np.einsum("im,mic->mc", first, element_nodes)
+        t2 = np.einsum("im,mic->mc", second, element_nodes)
+        det = t1[:, 0] * t2[:, 1] - t1[:, 1] * t2[:, 0]
+        step1 = (error[:, 0] * t2[:, 1] - error[:, 1] * t2[:, 0]) / det
+        step2 = (t1[:, 0] * error[:, 1] - t1[:, 1] * error[:, 0]) / det
+        b1, b2 = b1 + step1, b2 + step2
+        if max(np.abs(step1).max(), np.abs(step2).max()) < 1e-13:
+            break
+    if np.minimum(np.minimum(b1, b2), 1.0 - b1 - b2).min() < -0.05:
+        raise GridError("an observation point falls between curved elements", code="E-GRID-POINT")
+    return b1, b2
+
+
+def directional(weights, directions):
+    """Turn scalar interpolation rows (m, n) into displacement columns (2n, m) along unit directions (m, 2)."""
+    dense = weights.toarray() if hasattr(weights, "toarray") else np.asarray(weights)
+    columns = np.empty((2 * dense.shape[1], dense.shape[0]))
+    columns[0::2] = dense.T * directions[:, 0]
+    columns[1::2] = dense.T * directions[:, 1]
+    return columns
+
+
+def split_sector(grid, held):
+    """Free interior, right-cut and left-cut degrees of freedom of a sector, cuts ordered by radius."""
+    fixed = boundary_nodes(grid, held) if held else np.zeros(0, int)
+    cuts = []
+    for name in ("cut_right", "cut_left"):
+        nodes = np.setdiff1d(boundary_nodes(grid, name), fixed)
+        cuts.append(nodes[np.argsort(np.hypot(*grid.points[nodes].T))])
+    if len(cuts[0]) != len(cuts[1]):
+        raise GridError("the two cuts of a sector do not match", code="E-GRID-CUT")
+    interior = np.setdiff1d(np.arange(len(grid.points)), np.concatenate([fixed, *cuts]))
+    return dof_pairs(interior), dof_pairs(cuts[0]), dof_pairs(cuts[1])
+
+
+def cut_rotation(count, size):
+    """Block rotation (size, size) by the sector angle 2 pi / count."""
+    angle = 2 * np.pi / count
+    c, s = np.cos(angle), np.sin(angle)
+    return np.kron(np.eye(size // 2), np.array([[c, -s], [s, c]]))
+
+
+def condense_sector(grid, stiffness, *, count, held, loads, observations):
+    """Condense a mirror-symmetric sector on its cuts.
+
+    Loads and observations are given for the left half (y > 0) only; their mirror images are appended, so
+    that the result has twice the number of columns.
+
+    Parameters
+    ----------
+    grid : Grid
+        Sector with boundaries ``cut_left``, ``cut_right`` and `held`.
+    stiffness : (2n, 2n) sparse matrix
+        [N/m].
+    count : int
+        Number of sectors.
+    held : str or None
+        Boundary that cannot move; None when a foundation is part of `stiffness`.
+    loads : (2n, m) array
+        Nodal forces of the left loads.
+    observations : (2n, mo) array
+        Displacement functionals of the left observations.
+
+    Returns
+    -------
+    SectorSchur
+    """
+    interior, right, left = split_sector(grid, held)
+    image = mirror_nodes(grid)
+    both = np.hstack([loads, mirrored_columns(loads, image)])
+    adjoint = np.hstack([observations, mirrored_columns(observations, image)])
+    cut = np.concatenate([right, left])
+    _check_interior(both, cut)
+    stiffness = stiffness.tocsc()
+    K_ii, K_ib = stiffness[interior][:, interior], stiffness[interior][:, cut]
+    K_il = stiffness[interior][:, left].toarray()
+    rhs = np.hstack([K_il, loads[interior]])
+    solution = symmetric_factor(K_ii).solve(rhs)
+    _check_residual(K_ii, solution, rhs)
+
+    full = np.zeros((stiffness.shape[0], rhs.shape[1]))
+    full[interior] = solution
+    reflected = mirrored_columns(full, image)[interior]
+    nl = len(left)
+    # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
+    sign = np.tile([1.0, -1.0], nl // 2)
+    X_b = np.hstack([reflected[:, :nl] * sign, solution[:, :nl]])
+    X_f = np.hstack([solution[:, nl:], reflected[:, nl:]])
+    S = stiffness[cut][:, cut].toarray() - K_ib.T @ X_b
+    S = 0.5 * (S + S.T)
+    return SectorSchur(
+        count=count,
+        S=S.reshape(2, nl, 2, nl).transpose(0, 2, 1, 3),
+        C=adjoint[interior].T @ X_f,
+        load_cut=-(K_ib.T @ X_f).reshape(2, nl, -1),
+        observation_cut=-(X_b.T @ adjoint[interior]).reshape(2, nl, -1),
+        rotation=cut_rotation(count, nl),
+    )
+
+
+def _check_interior(loads, cut):
+    if np.abs(loads[cut]).max(initial=0.0) > 0.0:
+        raise GridError("a load acts on a cut of the sector", code="E-GRID-LOAD")
+
+
+def _check_residual(matrix, solution, rhs):
+    """Refuse a solution that is not finite or does not satisfy the equations."""
+    scale = np.abs(rhs).max()
+    residual = np.abs(matrix @ solution - rhs).max() / scale if scale else 0.0
+    if not np.isfinite(residual) or residual > 1e-8:
+        raise GridError(
+            f"the sector solution has a relative residual of {residual:.1e}",
+            code="E-RESIDUAL",
+            limit="1e-8",
+            remedy="the body is not held, or its grid is distorted",
+        )
+
+
+def cyclic_harmonics(schur, harmonics):
+    """Compliance ``H_n`` of each cyclic harmonic, shape (len(harmonics), n_observations, n_loads)."""
+    n = np.asarray(harmonics)
+    phase = np.exp(2j * np.pi * n / schur.count)[:, None, None]
+    Q, S = schur.rotation, schur.S
+    RL = S[0, 1] @ Q
+    A = S[0, 0] + Q.T @ S[1, 1] @ Q + phase * RL + np.conj(phase) * RL.T
+    P_f = schur.load_cut[0] + np.conj(phase) * (Q.T @ schur.load_cut[1])
+    P_d = schur.observation_cut[0] + np.conj(phase) * (Q.T @ schur.observation_cut[1])
+    return schur.C + np.conj(P_d.transpose(0, 2, 1)) @ np.linalg.solve(A, P_f)
+
+
+def tooth_compliance(schur):
+    """Compliance between any two teeth, shape (count, n_observations, n_loads) [m/N].
+
+    Entry ``[k]`` is the displacement on tooth ``i`` per unit load on tooth ``i - k``.
+    """
+    harmonics = cyclic_harmonics(schur, np.arange(schur.count // 2 + 1))
+    return np.fft.irfft(harmonics, n=schur.count, axis=0)

@@ -1,0 +1,387 @@
+"""Second-order triangle grids: the data, mirror images, rotated copies, checks and files."""
+
+from __future__ import annotations
+
+import os
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from femgear.errors import GridError, StorageError
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A plane grid of six-node triangles (isoparametric, P2).
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        Node coordinates [m].
+    triangles : (m, 6) int array
+        Corners counter-clockwise, then the nodes between corners 0-1, 1-2 and 2-0.
+    boundaries : dict of str to (k, 3) int array
+        Element edges (start, end, mid), in order, the body to the left of each edge.
+    regions : dict of str to (m_r,) int array
+        Element numbers of each region.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    boundaries: dict[str, np.ndarray] = field(default_factory=dict)
+    regions: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self):
+        object.__setattr__(self, "points", _read_only(self.points, float))
+        object.__setattr__(self, "triangles", _read_only(self.triangles, np.int64))
+        for name in ("boundaries", "regions"):
+            frozen = {key: _read_only(value, np.int64) for key, value in getattr(self, name).items()}
+            object.__setattr__(self, name, frozen)
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, corners and mid-side nodes together."""
+        return len(self.points)
+
+
+def _read_only(value, dtype):
+    array = np.array(value, dtype=dtype)
+    array.setflags(write=False)
+    return array
+
+
+def ordered_nodes(grid: Grid, name: str) -> np.ndarray:
+    """Nodes along a connected boundary: start, mid, end, mid, ... in the order of its edges.
+
+    Parameters
+    ----------
+    grid : Grid
+    name : str
+
+    Returns
+    -------
+    (2 k + 1,) int array
+        The last node repeats the first one where the boundary is a closed loop.
+
+    Raises
+    ------
+    GridError
+        When there is no such boundary or its edges do not form one chain.
+    """
+    edges = boundary_edges(grid, name)
+    if np.any(edges[1:, 0] != edges[:-1, 1]):
+        raise GridError(f"the boundary {name!r} is not one chain of edges", code="E-GRID-BOUNDARY", key=name)
+    return np.append(edges[:, [0, 2]].ravel(), edges[-1, 1])
+
+
+def boundary_edges(grid: Grid, name: str) -> np.ndarray:
+    """Edges (k, 3) of a named boundary; GridError when there is none of that name."""
+    if name not in grid.boundaries:
+        raise GridError(
+            f"the grid has no boundary {name!r}",
+            code="E-GRID-BOUNDARY",
+            key=name,
+            limit="one of " + ", ".join(sorted(grid.boundaries)),
+        )
+    return grid.boundaries[name]
+
+
+def mirror(
+    grid: Grid,
+    *,
+    mirrored: tuple[str, ...] | None = None,
+    joined: tuple[str, ...] = ("tip", "rim", "root"),
+    symmetry: str = "symmetry",
+) -> Grid:
+    """Reflect the upper half of a sector in the x axis and join both halves.
+
+    Parameters
+    ----------
+    grid : Grid
+        The half with y >= 0.
+    mirrored : tuple of str, optional
+        Boundaries to carry over, with the suffixes ``_left`` (y > 0) and ``_right`` (y < 0); all but
+        the symmetry line when omitted.
+    joined : tuple of str
+        Boundaries that also appear as one, without suffix.
+    symmetry : str
+        Boundary on the x axis along which the halves are joined; its name is dropped.
+
+    Returns
+    -------
+    Grid
+        The nodes of the given half keep their numbers.
+
+    Raises
+    ------
+    GridError
+        When the symmetry line is missing or not on the x axis.
+    """
+    line = np.unique(boundary_edges(grid, symmetry))
+    size = np.ptp(grid.points, axis=0).max()
+    offset = np.abs(grid.points[line, 1]).max()
+    if offset > 1e-9 * size:
+        raise GridError(
+            f"the boundary {symmetry!r} leaves the x axis by {offset:.3e} m",
+            code="E-GRID-MIRROR",
+            key=symmetry,
+        )
+    n = grid.n_nodes
+    image = np.full(n, -1)
+    image[line] = line
+    new = image < 0
+    image[new] = n + np.arange(np.count_nonzero(new))
+    upper = grid.points.copy()
+    upper[line, 1] = 0.0
+    points = np.vstack([upper, upper[new] * [1.0, -1.0]])
+    triangles = np.vstack([grid.triangles, image[grid.triangles][:, [0, 2, 1, 5, 4, 3]]])
+    boundaries = {}
+    names = [name for name in grid.boundaries if name != symmetry] if mirrored is None else mirrored
+    for name in names:
+        left = boundary_edges(grid, name)
+        right = image[left][::-1, [1, 0, 2]]
+        boundaries[f"{name}_left"], boundaries[f"{name}_right"] = left, right
+        if name in joined:
+            boundaries[name] = np.vstack([right, left] if right[-1, 1] == left[0, 0] else [left, right])
+    m = len(grid.triangles)
+    regions = {name: np.concatenate([e, e + m]) for name, e in grid.regions.items()}
+    return Grid(points, triangles, boundaries, regions)
+
+
+def copy_nodes(grid: Grid, count: int) -> np.ndarray:
+    """Node numbers of every sector in the whole body that `rotated_copies` makes.
+
+    Parameters
+    ----------
+    grid : Grid
+        One sector with the boundaries ``cut_right`` and ``cut_left``.
+    count : int
+        Number of sectors in the circle.
+
+    Returns
+    -------
+    (count, n) int array
+        Entry (k, i) is the node of the body that node i of sector k becomes.
+
+    Raises
+    ------
+    GridError
+        When the right cut, turned by one sector, is not the left cut.
+    """
+    left = ordered_nodes(grid, "cut_left")
+    right = ordered_nodes(grid, "cut_right")[::-1]
+    size = np.abs(grid.points).max()
+    gap = np.inf
+    if len(left) == len(right):
+        gap = np.abs(_turn(grid.points[right], 2 * np.pi / count) - grid.points[left]).max()
+    if not gap <= 1e-9 * size:
+        raise GridError(
+            f"the cuts of the sector do not meet when it is repeated {count} times (gap {gap:.3e} m)",
+            code="E-GRID-COPIES",
+        )
+    free = np.ones(grid.n_nodes, dtype=bool)
+    free[right] = False
+    own = np.full(grid.n_nodes, -1)
+    own[free] = np.arange(np.count_nonzero(free))
+    numbers = own + np.count_nonzero(free) * np.arange(count)[:, None]
+    # the right cut of sector k is the left cut of sector k - 1
+    numbers[:, right] = np.roll(numbers[:, left], 1, axis=0)
+    return numbers
+
+
+def rotated_copies(grid: Grid, count: int) -> Grid:
+    """Whole body from one sector; the nodes on the cuts are merged.
+
+    Parameters
+    ----------
+    grid : Grid
+        One sector with the boundaries ``cut_right`` and ``cut_left``, centred on the origin.
+    count : int
+        Number of sectors in the circle.
+
+    Returns
+    -------
+    Grid
+        Boundaries (without the cuts) and regions list sector 0 first, then counter-clockwise.
+
+    Raises
+    ------
+    GridError
+        When the cuts do not meet.
+    """
+    numbers = copy_nodes(grid, count)
+    points = np.empty((numbers.max() + 1, 2))
+    for k in range(count - 1, -1, -1):
+        points[numbers[k]] = _turn(grid.points, 2 * np.pi * k / count)
+    triangles = numbers[:, grid.triangles].reshape(-1, 6)
+    boundaries = {
+        name: numbers[:, edges].reshape(-1, 3)
+        for name, edges in grid.boundaries.items()
+        if name not in ("cut_left", "cut_right")
+    }
+    shift = len(grid.triangles) * np.arange(count)[:, None]
+    regions = {name: (elements + shift).ravel() for name, elements in grid.regions.items()}
+    return Grid(points, triangles, boundaries, regions)
+
+
+def _turn(points, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return points @ np.array([[c, s], [-s, c]])
+
+
+def jacobian_bounds(grid: Grid) -> np.ndarray:
+    """Lower and upper bound of the Jacobian determinant of every element, shape (m, 2) [m^2].
+
+    The determinant of a P2 triangle is a quadratic polynomial; its Bernstein coefficients bound it
+    (Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput.
+    Phys. 233, 2013).
+    """
+    # gradients of the six shape functions at the six nodes of the reference triangle
+    x, y = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]).T
+    zero = np.zeros(6)
+    dx = np.array([4 * x + 4 * y - 3, 4 * x - 1, zero, 4 - 8 * x - 4 * y, 4 * y, -4 * y])
+    dy = np.array([4 * x + 4 * y - 3, zero, 4 * y - 1, -4 * x, 4 * x, 4 - 4 * x - 8 * y])
+    nodes = grid.points[grid.triangles]
+    a, b = np.einsum("mic,ij->cmj", nodes, dx), np.einsum("mic,ij->cmj", nodes, dy)
+    value = a[0] * b[1] - a[1] * b[0]
+    corner, mid = value[:, :3], value[:, 3:]
+    control = np.hstack([corner, 2 * mid - 0.5 * (corner + corner[:, [1, 2, 0]])])
+    return np.stack([control.min(axis=1), control.max(axis=1)], axis=1)
+
+
+def quality(grid: Grid) -> np.ndarray:
+    """Shape quality of every element, 1 for an equilateral straight-sided triangle, shape (m,).
+
+    ``4 sqrt(3) A / sum l^2`` (Bank) times the ratio of the bounds of the Jacobian determinant; not
+    positive where the element may be folded.
+    """
+    corner = grid.points[grid.triangles[:, :3]]
+    side = np.roll(corner, -1, axis=1) - corner
+    area = 0.5 * (side[:, 0, 0] * side[:, 1, 1] - side[:, 0, 1] * side[:, 1, 0])
+    bound = jacobian_bounds(grid)
+    top = np.where(bound[:, 1] > 0, bound[:, 1], np.inf)
+    return 4 * np.sqrt(3) * area / (side**2).sum(axis=(1, 2)) * bound[:, 0] / top
+
+
+def check_grid(grid: Grid) -> None:
+    """Refuse numbers that are not finite, unused nodes, and inverted or folded elements.
+
+    Raises
+    ------
+    GridError
+        Naming the number of bad elements and the position of the worst.
+    """
+    if not np.isfinite(grid.points).all():
+        raise GridError("a node of the grid has a coordinate that is not a number", code="E-GRID-NAN")
+    used = np.zeros(grid.n_nodes, dtype=bool)
+    used[grid.triangles] = True
+    if not used.all():
+        raise GridError(
+            f"{np.count_nonzero(~used)} nodes of the grid belong to no element", code="E-GRID-LOOSE"
+        )
+    lowest = jacobian_bounds(grid)[:, 0]
+    bad = np.count_nonzero(lowest <= 0)
+    if bad:
+        worst = int(lowest.argmin())
+        x, y = grid.points[grid.triangles[worst, :3]].mean(axis=0)
+        raise GridError(
+            f"{bad} of {len(lowest)} elements are inverted or folded, the worst at ({x:.6g}, {y:.6g}) m",
+            code="E-GRID-INVERTED",
+            value=f"Jacobian determinant {lowest[worst]:.3e} m^2",
+            limit="positive everywhere in every element",
+            remedy="use more elements along the curved part of the outline near this point",
+        )
+
+
+def write_grid(path, grid: Grid, *, point_data: dict[str, np.ndarray] | None = None) -> None:
+    """Write a grid through meshio, under a temporary name first.
+
+    Parameters
+    ----------
+    path : path
+        ``.msh`` (Gmsh 2.2 binary; boundaries and regions as named physical groups, what `read_grid`
+        takes) or ``.vtu`` (ParaView; triangles with the number of their region).
+    grid : Grid
+    point_data : dict of str to (n,) or (n, 2) array, optional
+        Fields at the nodes; two components are padded to three for VTU.
+
+    Raises
+    ------
+    StorageError
+        When the file cannot be written or its ending is neither.
+    """
+    import meshio
+
+    path = Path(path)
+    names = list(grid.regions)
+    tag = np.zeros(len(grid.triangles), dtype=np.int32)
+    for number, name in enumerate(names, start=1):
+        tag[grid.regions[name]] = number
+    points = np.column_stack([grid.points, np.zeros(grid.n_nodes)])
+    cells, tags = [("triangle6", grid.triangles)], [tag]
+    fields = {name: _three_components(value) for name, value in (point_data or {}).items()}
+    if path.suffix == ".msh":
+        groups = {name: np.array([number, 2]) for number, name in enumerate(names, start=1)}
+        for number, (name, edges) in enumerate(grid.boundaries.items(), start=len(names) + 1):
+            groups[name] = np.array([number, 1])
+            cells.append(("line3", edges))
+            tags.append(np.full(len(edges), number, dtype=np.int32))
+        data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+        mesh, kind = meshio.Mesh(points, cells, fields, data, groups), "gmsh22"
+    elif path.suffix == ".vtu":
+        mesh, kind = meshio.Mesh(points, cells, fields, {"region": tags}), "vtu"
+    else:
+        raise StorageError(
+            f"a grid cannot be written as {path.name!r}", code="E-GRID-FORMAT", limit=".msh or .vtu"
+        )
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}-{threading.get_ident()}{path.suffix}")
+    try:
+        mesh.write(temporary, file_format=kind)
+        os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise StorageError(f"cannot write the grid {path}: {error}", code="E-GRID-WRITE") from error
+
+
+def _three_components(value):
+    value = np.asarray(value, dtype=float)
+    return np.column_stack([value, np.zeros(len(value))]) if value.shape[1:] == (2,) else value
+
+
+def read_grid(path) -> Grid:
+    """Read a grid that `write_grid` has written as ``.msh``.
+
+    Raises
+    ------
+    StorageError
+        When the file is missing, truncated or not such a grid.
+    """
+    import meshio
+
+    try:
+        mesh = meshio.read(path, file_format="gmsh")
+        tags = mesh.cell_data["gmsh:physical"]
+        blocks = [
+            (block.type, np.asarray(block.data), np.asarray(tag)) for block, tag in zip(mesh.cells, tags)
+        ]
+        triangles = np.vstack([data for kind, data, _ in blocks if kind == "triangle6"])
+        region = np.concatenate([tag for kind, _, tag in blocks if kind == "triangle6"])
+        edges = np.vstack([np.empty((0, 3), dtype=int)] + [d for kind, d, _ in blocks if kind == "line3"])
+        edge_tag = np.concatenate([np.empty(0, dtype=int)] + [t for kind, _, t in blocks if kind == "line3"])
+        groups = {str(name): (int(value[0]), int(value[1])) for name, value in mesh.field_data.items()}
+        boundaries = {name: edges[edge_tag == number] for name, (number, dim) in groups.items() if dim == 1}
+        regions = {
+            name: np.flatnonzero(region == number) for name, (number, dim) in groups.items() if dim == 2
+        }
+        grid = Grid(mesh.points[:, :2], triangles, boundaries, regions)
+        if grid.triangles.min() < 0 or grid.triangles.max() >= grid.n_nodes:
+            raise ValueError("a triangle refers to a node that is not there")
+    except (SystemExit, Exception) as error:  # meshio calls sys.exit on some unreadable files
+        raise StorageError(
+            f"{path} is not a readable grid: {type(error).__name__}: {error}",
+            code="E-GRID-READ",
+            remedy="delete the file; it is made again when needed",
+        ) from error
+    return grid

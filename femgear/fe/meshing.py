@@ -1,0 +1,260 @@
+"""From an outline to a second-order grid: Gmsh in a killable process, results cached by content."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+from femgear.errors import GridError, StorageError
+from femgear.fe.grid import (
+    Grid,
+    check_grid,
+    copy_nodes,
+    jacobian_bounds,
+    mirror,
+    ordered_nodes,
+    quality,
+    read_grid,
+    rotated_copies,
+    write_grid,
+)
+from femgear.fe.outline import Outline, check_outline, estimate_elements
+
+__all__ = [
+    "Grid",
+    "Outline",
+    "check_grid",
+    "check_outline",
+    "copy_nodes",
+    "estimate_elements",
+    "jacobian_bounds",
+    "mesh_outline",
+    "mesh_outlines",
+    "mirror",
+    "ordered_nodes",
+    "quality",
+    "read_grid",
+    "rotated_copies",
+    "write_grid",
+]
+
+FORMAT = "1"  # raise when the way grids are made changes, so that cached ones are not reused
+WORKER = Path(__file__).with_name("_gmsh_worker.py")
+PACKAGES = {
+    "libGLU": "libglu1-mesa",
+    "libGL": "libgl1",
+    "libXcursor": "libxcursor1",
+    "libXft": "libxft2",
+    "libXinerama": "libxinerama1",
+    "libXrender": "libxrender1",
+    "libgomp": "libgomp1",
+}
+
+
+def mesh_outline(
+    outline,
+    *,
+    cache: Path | None = None,
+    time_limit: float = 60.0,
+    max_elements: int = 200_000,
+    size_max: float | None = None,
+) -> Grid:
+    """Mesh an outline with six-node triangles whose edge nodes are exactly the points of the outline.
+
+    Gmsh triangulates the polygon of corners (one element edge for each pair of neighbouring corners,
+    sizes inside interpolated from the boundary); the mid-side nodes of boundary and interfaces are then
+    put on the given points. The same outline gives the same grid.
+
+    Parameters
+    ----------
+    outline : Outline
+        Or any object with ``curves`` and ``interfaces`` of the same form.
+    cache : path, optional
+        Folder in which grids are kept under the hash of their content; None to keep nothing.
+    time_limit : float
+        Seconds after which the mesh generator is killed.
+    max_elements : int
+        Refuse outlines whose estimated number of elements is larger.
+    size_max : float, optional
+        Largest element size inside [m].
+
+    Returns
+    -------
+    Grid
+        Boundaries and interfaces under the names of their curves, regions as `Outline` says.
+
+    Raises
+    ------
+    GridError
+        When the outline is not usable, too large, not meshed in time, when Gmsh or one of its system
+        libraries is missing, or when an element is inverted.
+    """
+    plan = check_outline(outline)
+    limit = np.inf if size_max is None else float(size_max)
+    if not limit > 0:
+        raise GridError(
+            "the element size must be positive", code="E-GRID-SIZE", value=size_max, limit="> 0 m"
+        )
+    expected = estimate_elements(plan, size_max=limit)
+    if expected > max_elements:
+        raise GridError(
+            f"the grid would have about {expected:.3g} elements",
+            code="E-GRID-COUNT",
+            value=f"{expected:.3g}",
+            limit=f"at most {max_elements}",
+            remedy="use fewer points along the outline or a larger element size",
+        )
+    if cache is None:
+        return _mesh_plan(plan, limit, time_limit)
+    path = Path(cache) / f"{_content_hash(plan, limit)}.msh"
+    if path.exists():
+        try:
+            return _check_cached(read_grid(path), plan)
+        except (StorageError, GridError):  # a damaged file in the cache is simply made again
+            path.unlink(missing_ok=True)
+    grid = _mesh_plan(plan, limit, time_limit)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"cannot make the folder {path.parent}: {error}", code="E-GRID-WRITE") from error
+    write_grid(path, grid)
+    return grid
+
+
+def _check_cached(grid, plan):
+    check_grid(grid)
+    same = set(grid.regions) == set(plan.faces) and np.array_equal(
+        grid.points[: len(plan.points)], plan.points
+    )
+    for name in dict.fromkeys(plan.names):
+        own = np.array(plan.names) == name
+        edges = grid.boundaries.get(name, np.empty((0, 3), dtype=int))
+        same = same and np.array_equal(edges[:, :2], plan.segments[own])
+        same = same and np.array_equal(grid.points[edges[:, 2]], plan.mids[own])
+    if not same:
+        raise GridError("the cached grid is not that of the outline", code="E-GRID-CACHE")
+    return grid
+
+
+def mesh_outlines(
+    outlines,
+    *,
+    cache: Path | None = None,
+    time_limit: float = 60.0,
+    max_elements: int = 200_000,
+    size_max: float | None = None,
+    processes: int | None = None,
+) -> tuple[Grid, ...]:
+    """Mesh several outlines at once, see `mesh_outline`; by default as many processes as cores.
+
+    Raises
+    ------
+    GridError
+        The first error of any outline, after all processes have ended.
+    """
+
+    def one(outline):
+        return mesh_outline(
+            outline, cache=cache, time_limit=time_limit, max_elements=max_elements, size_max=size_max
+        )
+
+    with ThreadPoolExecutor(max_workers=processes or os.cpu_count() or 1) as pool:
+        return tuple(pool.map(one, outlines))
+
+
+def _content_hash(plan, size_max):
+    try:
+        gmsh = metadata.version("gmsh")
+    except metadata.PackageNotFoundError as error:
+        raise _library_error("the package gmsh is not installed") from error
+    digest = hashlib.sha256(f"femgear grid {FORMAT} gmsh {gmsh} {size_max}".encode())
+    for array in (plan.points, plan.segments, plan.mids, *plan.loops):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    digest.update("\0".join((*plan.names, "", *plan.faces)).encode())
+    return digest.hexdigest()[:32]
+
+
+def _mesh_plan(plan, size_max, time_limit):
+    result = _run_gmsh(plan, size_max, time_limit)
+    points = np.vstack([plan.points, result["points"][len(plan.points) :]])
+    grid = _second_order(plan, points, result["triangles"], result["face"])
+    check_grid(grid)
+    return grid
+
+
+def _run_gmsh(plan, size_max, time_limit):
+    # Gmsh works with absolute tolerances: hand it an outline of unit size at the origin
+    centre, size = plan.points.mean(axis=0), plan.size
+    job = {
+        "points": (plan.points - centre) / size,
+        "segments": plan.segments,
+        "loops": np.concatenate(plan.loops),
+        "loop_ends": np.cumsum([len(loop) for loop in plan.loops]),
+        "size_max": min(size_max / size, 1e22),
+        "time_limit": time_limit,
+    }
+    with tempfile.TemporaryDirectory(prefix="femgear-") as folder:
+        source, target = Path(folder) / "outline.npz", Path(folder) / "grid.npz"
+        np.savez(source, **job)
+        command = [sys.executable, "-P", str(WORKER), str(source), str(target)]
+        try:
+            done = subprocess.run(
+                command, timeout=time_limit, capture_output=True, text=True, stdin=subprocess.DEVNULL
+            )
+        except subprocess.TimeoutExpired as error:
+            raise GridError(
+                f"Gmsh was stopped: no grid after {time_limit:g} s",
+                code="E-GRID-TIMEOUT",
+                remedy="use fewer points along the outline or a longer time limit",
+            ) from error
+        if done.returncode != 0 or not target.exists():
+            raise _worker_error(done)
+        with np.load(target) as file:
+            result = dict(file)
+    result["points"] = result["points"] * size + centre
+    return result
+
+
+def _worker_error(done):
+    text = " ".join(done.stderr.split())[-400:]
+    if done.returncode == 3:
+        return _library_error(text)
+    return GridError(f"Gmsh failed (exit code {done.returncode}): {text}", code="E-GRID-GMSH")
+
+
+def _library_error(text):
+    library = re.search(r"(lib[A-Za-z]+)[-.\d]*\.so", text)
+    remedy = "install it with: pip install gmsh"
+    if library:
+        package = PACKAGES.get(library.group(1), "libglu1-mesa libgl1")
+        remedy = f"install the system library, on Debian: apt-get install {package}"
+    return GridError(f"Gmsh cannot be loaded: {text}", code="E-GRID-LIBRARY", remedy=remedy)
+
+
+def _second_order(plan, points, corners, face):
+    """Add mid-side nodes: the given ones on boundary and interfaces, half-way ones inside."""
+    n = len(points)
+    pairs = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+    edges, where = np.unique(pairs[:, 0] * n + pairs[:, 1], return_inverse=True)
+    mids = 0.5 * (points[edges // n] + points[edges % n])
+    ends = np.sort(plan.segments, axis=1)
+    key = ends[:, 0] * n + ends[:, 1]
+    at = np.minimum(np.searchsorted(edges, key), len(edges) - 1)
+    if np.any(edges[at] != key):
+        raise GridError("Gmsh divided a segment of the outline", code="E-GRID-GMSH")
+    mids[at] = plan.mids
+    triangles = np.hstack([corners, n + where.reshape(-1, 3)])
+    edge_nodes = np.column_stack([plan.segments, n + at])
+    names = np.array(plan.names)
+    boundaries = {name: edge_nodes[names == name] for name in dict.fromkeys(plan.names)}
+    regions = {name: np.flatnonzero(face == k) for k, name in enumerate(plan.faces)}
+    return Grid(np.vstack([points, mids]), triangles, boundaries, regions)

@@ -1,0 +1,109 @@
+"""Files written so that they are either the old or the new one, whole; every failure a `StorageError`."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from femgear.errors import StorageError
+
+_NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
+_RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
+_MARGIN = 1_000_000
+
+
+@contextlib.contextmanager
+def storage_errors(path: str | os.PathLike) -> Iterator[None]:
+    """Turn an `OSError` of the block into a `StorageError` that names ``path``."""
+    try:
+        yield
+    except OSError as error:
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        raise StorageError(
+            f"{error.strerror or error}",
+            code="E-DISK-FULL" if full else "E-STORAGE",
+            file=os.fspath(path),
+            remedy="free some space or name another folder" if full else None,
+        ) from error
+
+
+def is_safe_path(name: str) -> bool:
+    """Whether a relative path stays in its folder and has plain names only."""
+    path = Path(name)
+    return (
+        bool(path.parts)
+        and not path.is_absolute()
+        and all(_NAME.fullmatch(p) and p != ".." for p in path.parts)
+    )
+
+
+def checked_name(name: str) -> str:
+    """``name`` if every file system takes it as one plain file name, else refused.
+
+    Raises
+    ------
+    StorageError
+        ``E-NAME``.
+    """
+    if not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.startswith(".") or name.endswith("."):
+        raise StorageError(
+            "not a safe file name",
+            code="E-NAME",
+            value=name,
+            limit="1 to 100 of A-Z a-z 0-9 . _ -, no dot at the ends, no reserved name",
+        )
+    return name
+
+
+def checksum(path: str | os.PathLike) -> str:
+    """SHA-256 of a file."""
+    with storage_errors(path), open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def write_text(text: str, path: str | os.PathLike) -> None:
+    """Write UTF-8 text so that the file is either the old or the new one, whole."""
+    data = text.encode()
+    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+
+
+def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
+    """Write a file under a temporary name, force it to the disk, then give it its name.
+
+    Parameters
+    ----------
+    path : path-like
+    write : callable
+        Is given the temporary path, in the same folder and with the same suffix.
+    size : int
+        Bytes to come; refused beforehand where the disk has not that much left.
+
+    Raises
+    ------
+    StorageError
+        ``E-DISK-FULL``, ``E-STORAGE``; the old file is untouched and no temporary one stays behind.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    with storage_errors(path):
+        free = shutil.disk_usage(path.parent).free
+        if free < size + _MARGIN:
+            raise StorageError(
+                f"{size / 1e6:.1f} MB to write, {free / 1e6:.1f} MB left on the disk",
+                code="E-DISK-FULL",
+                file=str(path),
+                remedy="free some space or name another folder",
+            )
+        try:
+            write(temporary)
+            with open(temporary, "rb+") as stream:
+                os.fsync(stream.fileno())
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)

@@ -1,0 +1,275 @@
+"""Exact outline of one half of one tooth sector, with labelled parts and graded points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import GeometryError
+from femgear.gears.fillet import fillet_point
+from femgear.gears.gear import Gear, flank_points, half_thickness_angle
+
+# point spacing in modules, before `refine`
+FILLET_SIZE = 0.05
+FINEST_SIZE = 0.02
+LARGEST_SIZE = 0.8
+GROWTH = 0.3  # increase of the spacing per unit length along a curve
+
+
+@dataclass(frozen=True)
+class HalfSector:
+    """Half (y >= 0) of one tooth sector, 0 <= angle <= pi/z, tooth centreline on the x axis.
+
+    Parameters
+    ----------
+    curves : tuple of (str, (2 k + 1, 2) array)
+        Closed boundary, counter-clockwise: vertices in even rows, mid-side points in odd rows, all on the true
+        curves [m]; consecutive curves share end points exactly. Names: "symmetry" (x axis), "tip" (arc),
+        "flank" (involute), "fillet" (generated), "root" (arc; absent when the fillets meet), "cut" (radial line
+        at pi/z) and "rim" (arc at the rim radius).
+    interfaces : tuple of (str, (2 k + 1, 2) array)
+        "tooth_base": arc from the symmetry line to the fillet that splits tooth and body. It ends at the fillet
+        vertex whose tangent is nearest to 45 deg from the arc, since an arc on the root circle itself would
+        touch the fillet at zero angle.
+    regions : tuple of (str, (float, float))
+        A point [m] inside each of "tooth" and "body".
+    flank_roll : (2 n + 1,) array
+        Roll lengths [m] of the rows of "flank", uniform (tip to fillet of an external, fillet to tip of an
+        internal gear).
+    """
+
+    curves: tuple[tuple[str, np.ndarray], ...]
+    interfaces: tuple[tuple[str, np.ndarray], ...]
+    regions: tuple[tuple[str, tuple[float, float]], ...]
+    flank_roll: np.ndarray
+
+    def curve(self, name: str) -> np.ndarray:
+        """Points of one boundary curve by name (KeyError when it is absent)."""
+        return dict(self.curves)[name]
+
+
+def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) -> HalfSector:
+    """Boundary of the half sector of a gear, graded from flank and fillet to the rim.
+
+    Parameters
+    ----------
+    gear : Gear
+    flank_elements : int
+        Element edges along the flank, uniform in roll angle, before `refine`.
+    refine : float
+        Divides every spacing, that of the flank included.
+
+    Returns
+    -------
+    HalfSector
+
+    Raises
+    ------
+    GeometryError
+        Less than 2 flank elements or a factor that is not positive (E-SIZE).
+    """
+    _check_sizes(flank_elements, refine)
+    count = max(2, round(flank_elements * refine))
+    unit = gear.module / refine
+    rolls = np.linspace(gear.tip_roll, flank_end_roll(gear, count), 2 * count + 1)
+    flank = flank_points(gear, rolls)
+    fillet = _fillet(gear, flank, rolls[-1], unit)
+    root = _root(gear, fillet, unit)
+    tip = _tip(gear, flank, unit)
+    base, split = _tooth_base(gear, fillet, unit)
+    last = _last_edge(root if root is not None else fillet)
+    cut = _cut(gear, unit, start=last)
+    rim = _rim(gear, unit)
+    symmetry = _symmetry(gear, base[0, 0], unit, tip=_last_edge(tip[::-1]), base=_last_edge(base[::-1]))
+    parts = [("symmetry", symmetry), ("tip", tip), ("flank", flank), ("fillet", fillet)]
+    parts += ([] if root is None else [("root", root)]) + [("cut", cut), ("rim", rim)]
+    if gear.internal:  # built from tip to rim with the tooth outwards; an internal gear runs the other way
+        parts = [(name, points[::-1]) for name, points in reversed(parts)]
+        rolls = rolls[::-1]
+    inside = _inside(gear, fillet[split])
+    arrays = tuple((name, _read_only(points)) for name, points in _joined(parts))
+    return HalfSector(arrays, (("tooth_base", _read_only(base)),), inside, _read_only(rolls))
+
+
+def _check_sizes(flank_elements: int, refine: float) -> None:
+    if not (flank_elements >= 2 and math.isfinite(refine) and 0.05 <= refine <= 100.0):
+        raise GeometryError(
+            f"{flank_elements} flank elements with refinement {refine:.6g} give no usable outline",
+            code="E-SIZE",
+            key="static.flank_elements",
+            value=flank_elements,
+            limit="at least 2 elements, refinement 0.05 .. 100",
+            remedy="24 elements and refinement 1 are the default",
+        )
+
+
+def _spacing(length: float, start: float, end: float, *, largest: float) -> np.ndarray:
+    """Positions (2 k + 1,) in 0 .. 1 of vertices and mid points; edges grow from both ends (sizes in m).
+
+    The number of edges is the integral of 1/size; the vertices divide that integral equally.
+    """
+    s = np.linspace(0.0, length, 2001)
+    size = np.minimum(np.minimum(start + GROWTH * s, end + GROWTH * (length - s)), largest)
+    density = 1.0 / size
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
+    count = max(1, math.ceil(integral[-1] - 0.2))
+    vertices = np.interp(np.linspace(0.0, integral[-1], count + 1), integral, s) / length
+    vertices[0], vertices[-1] = 0.0, 1.0
+    return _with_middles(vertices)
+
+
+def _with_middles(vertices: np.ndarray) -> np.ndarray:
+    out = np.empty(2 * len(vertices) - 1)
+    out[0::2] = vertices
+    out[1::2] = 0.5 * (vertices[1:] + vertices[:-1])
+    return out
+
+
+def _arc(radius: float, start: float, end: float, fractions: np.ndarray) -> np.ndarray:
+    angle = start + (end - start) * fractions
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def _last_edge(points: np.ndarray) -> float:
+    """Length [m] of the last element edge of a curve."""
+    return math.dist(points[-3], points[-1])
+
+
+def flank_end_roll(gear: Gear, flank_elements: int) -> float:
+    """Roll length [m] where the curve "flank" ends: the form radius, or one element from the base circle.
+
+    Steps uniform in roll angle shrink to nothing at the base circle (edge length roll^2 / (2 rb)) and their mid
+    points drift to the quarter point there; that last bit of involute, some micrometres, goes to "fillet".
+    """
+    return max(gear.form_roll, gear.tip_roll / (flank_elements + 1))
+
+
+def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, unit: float) -> np.ndarray:
+    """Fillet from the flank's end to the root circle, spaced by arc length."""
+
+    def point(p):
+        # p in -1 .. 0: rest of the involute, 0 .. 1: generated fillet
+        radius, angle = fillet_point(gear.tool, gear.fillet_end * (1.0 - np.maximum(p, 0.0)))
+        trochoid = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+        involute = flank_points(gear, gear.form_roll + (end_roll - gear.form_roll) * np.maximum(-p, 0.0))
+        return np.where(p[:, None] < 0.0, involute, trochoid)
+
+    p = np.linspace(0.0, 1.0, 2001)
+    if end_roll > gear.form_roll:
+        p = np.concatenate([np.linspace(-1.0, 0.0, 200, endpoint=False), p])
+    edges = np.linalg.norm(np.diff(point(p), axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(edges)])
+    size = FILLET_SIZE * unit
+    start = min(max(_last_edge(flank), FINEST_SIZE * unit), size)
+    fractions = _spacing(length[-1], start, size, largest=size)
+    stations = np.interp(fractions * length[-1], length, p)
+    stations[-1] = 1.0
+    points = point(stations)
+    points[0] = flank[-1]
+    return points
+
+
+def _root(gear: Gear, fillet: np.ndarray, unit: float) -> np.ndarray | None:
+    """Root arc from the fillet to the cut, absent when the fillet reaches it."""
+    start, end = math.atan2(fillet[-1, 1], fillet[-1, 0]), math.pi / gear.teeth
+    length = gear.root_radius * (end - start)
+    if length < 1e-6 * gear.module:
+        fillet[-1] = gear.root_radius * math.cos(end), gear.root_radius * math.sin(end)
+        return None
+    fractions = _spacing(length, _last_edge(fillet), 2.0 * _last_edge(fillet), largest=0.25 * unit)
+    points = _arc(gear.root_radius, start, end, fractions)
+    points[0] = fillet[-1]
+    return points
+
+
+def _tip(gear: Gear, flank: np.ndarray, unit: float) -> np.ndarray:
+    """Tip arc from the symmetry line to the flank."""
+    end = math.atan2(flank[0, 1], flank[0, 0])
+    edge = _last_edge(flank[::-1])
+    points = _arc(
+        gear.tip_radius, 0.0, end, _spacing(gear.tip_radius * end, 2.5 * edge, edge, largest=0.25 * unit)
+    )
+    points[0, 1] = 0.0
+    points[-1] = flank[0]
+    return points
+
+
+def _tooth_base(gear: Gear, fillet: np.ndarray, unit: float) -> tuple[np.ndarray, int]:
+    """Arc from the symmetry line to a fillet vertex, and the row of that vertex."""
+    tangent = fillet[2:] - fillet[:-2]
+    radial = fillet[1:-1] / np.linalg.norm(fillet[1:-1], axis=1)[:, None]
+    slope = np.abs(np.sum(tangent * radial, axis=1)) / np.linalg.norm(tangent, axis=1)
+    rows = np.arange(2, len(fillet) - 1, 2)
+    row = int(rows[np.argmin(np.abs(slope[rows - 1] - math.sqrt(0.5)))]) if len(rows) else 0
+    radius, end = math.hypot(*fillet[row]), math.atan2(fillet[row, 1], fillet[row, 0])
+    edge = FILLET_SIZE * unit
+    points = _arc(radius, 0.0, end, _spacing(radius * end, 4.0 * edge, edge, largest=0.3 * unit))
+    points[0, 1] = 0.0
+    points[-1] = fillet[row]
+    return points, row
+
+
+def _rim_size(gear: Gear, unit: float) -> float:
+    """Element size at the rim [m]: not wider than half of the half sector there."""
+    return min(LARGEST_SIZE * unit, 0.5 * math.pi / gear.teeth * gear.rim_radius)
+
+
+def _cut(gear: Gear, unit: float, *, start: float) -> np.ndarray:
+    """Radial line at pi/z from the root circle to the rim."""
+    length = abs(gear.root_radius - gear.rim_radius)
+    size = _rim_size(gear, unit)
+    fractions = _spacing(length, min(start, size), size, largest=LARGEST_SIZE * unit)
+    radius = gear.root_radius + (gear.rim_radius - gear.root_radius) * fractions
+    radius[-1] = gear.rim_radius
+    angle = math.pi / gear.teeth
+    return np.column_stack([radius * math.cos(angle), radius * math.sin(angle)])
+
+
+def _rim(gear: Gear, unit: float) -> np.ndarray:
+    """Rim arc from the cut to the symmetry line."""
+    angle = math.pi / gear.teeth
+    count = max(1, math.ceil(angle * gear.rim_radius / _rim_size(gear, unit) - 1e-9))
+    points = _arc(gear.rim_radius, angle, 0.0, np.linspace(0.0, 1.0, 2 * count + 1))
+    points[-1, 1] = 0.0
+    return points
+
+
+def _symmetry(gear: Gear, base_radius: float, unit: float, *, tip: float, base: float) -> np.ndarray:
+    """Line on the x axis from the rim to the tip with a vertex where the tooth base begins."""
+    rim, top = gear.rim_radius, gear.tip_radius
+    size = _rim_size(gear, unit)
+    inner = _spacing(abs(base_radius - rim), size, base, largest=LARGEST_SIZE * unit)
+    outer = _spacing(abs(top - base_radius), base, tip, largest=0.35 * unit)
+    x = np.concatenate([rim + (base_radius - rim) * inner, (base_radius + (top - base_radius) * outer)[1:]])
+    x[0], x[2 * (len(inner) // 2)], x[-1] = rim, base_radius, top
+    return np.column_stack([x, np.zeros_like(x)])
+
+
+def _inside(gear: Gear, split: np.ndarray) -> tuple[tuple[str, tuple[float, float]], ...]:
+    """A point of the tooth and one of the body, both near the symmetry line."""
+    base = math.hypot(*split)
+    middle, below = 0.5 * (gear.tip_radius + base), 0.5 * (gear.rim_radius + base)
+    angle = 0.5 * math.pi / gear.teeth
+    lateral = 0.25 * min(middle * angle, float(gear.tip_radius * half_thickness_angle(gear, gear.tip_radius)))
+    return (
+        ("tooth", (middle, lateral)),
+        ("body", (below * math.cos(angle), below * math.sin(angle))),
+    )
+
+
+def _joined(parts):
+    """Give consecutive curves the very same end points."""
+    joined = []
+    for i, (name, points) in enumerate(parts):
+        points = np.array(points)
+        points[0] = parts[i - 1][1][-1]
+        joined.append((name, points))
+    return joined
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    out = np.ascontiguousarray(array)
+    out.setflags(write=False)
+    return out

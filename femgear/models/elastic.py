@@ -1,0 +1,304 @@
+"""Planetary set with an elastic toothed ring: rigid sun, planets and carrier, FE ring on a foundation.
+
+All bodies move in the plane; coordinates are those of the carrier frame, in which the mean motion is
+removed. The gyroscopic and convective terms of that frame are left out, as in the modulation paper
+("Vibratory response of planetary gear sets housing by a spectral iterative approach"): they are of the
+order of the carrier speed over the natural frequencies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import CaseError, ContactError
+from femgear.system import MechanicalSystem, MeshExcitation
+
+if TYPE_CHECKING:
+    from femgear.contact.cycle import MeshCycle
+    from femgear.fe.reduction import CyclicModes
+    from femgear.gears.planetary import PlanetarySet
+
+
+@dataclass(frozen=True)
+class BodyData:
+    """A rigid body: mass [kg], polar inertia [kg m^2], isotropic radial support or bearing [N/m]."""
+
+    mass: float
+    inertia: float
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class ShaftData:
+    """A rotating inertia [kg m^2] behind a torsional spring [N m/rad]."""
+
+    inertia: float
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class ElasticSet:
+    """The system and the places of its parts.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    rigid_directions : (n, 2N) array
+        Mesh directions without the ring's own displacement: ``rigid_directions^T q`` is the dynamic
+        transmission error of the gears, ring deflection included.
+    ring_slice : slice
+        Place of the ring's coordinates.
+    ring_diameter, ring_phase : int arrays
+        Nodal diameter and kind (0 cosine, 1 sine) of every ring coordinate.
+    ring_mode : int array
+        Index into the ring's CyclicModes of every ring coordinate.
+    planet_angles : (N,) array
+    """
+
+    system: MechanicalSystem
+    rigid_directions: np.ndarray
+    ring_slice: slice
+    ring_diameter: np.ndarray
+    ring_phase: np.ndarray
+    ring_mode: np.ndarray
+    planet_angles: np.ndarray
+
+
+def rigid_dofs(n_planets: int, motor: bool, brake: bool) -> tuple[str, ...]:
+    """Names of the rigid-body degrees of freedom."""
+    bodies = ["sun", "carrier", *(f"planet {n + 1}" for n in range(n_planets))]
+    names = [f"{body}: {axis}" for body in bodies for axis in ("x", "y", "rotation")]
+    return tuple(names + ["motor: rotation"] * motor + ["brake: rotation"] * brake)
+
+
+def elastic_set(
+    planetary_set: PlanetarySet,
+    ring: CyclicModes,
+    *,
+    ring_load_angle: float,
+    sun: BodyData,
+    carrier: BodyData,
+    planet: BodyData,
+    motor: ShaftData | None,
+    brake: ShaftData | None,
+    sun_torque: float,
+) -> ElasticSet:
+    """Assemble the mechanical system.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    ring : CyclicModes
+        Ring modes with one load: displacement into the ring body at a left flank.
+    ring_load_angle : float
+        Angle from the planet to the centre of the ring tooth that it loads [rad].
+    sun, carrier, planet : BodyData
+        Stiffness is the support of sun and carrier, and the bearing between a planet and the carrier.
+    motor, brake : ShaftData, optional
+        Inertias behind springs at the sun and at the carrier.
+    sun_torque : float
+        Torque on the sun [N m]; its sign tells which flanks carry.
+    """
+    names = rigid_dofs(planetary_set.n_planets, motor is not None, brake is not None)
+    place = {name: i for i, name in enumerate(names)}
+    n_rigid = len(names)
+    paired = ring.paired
+    ring_mode = np.repeat(np.arange(len(paired)), np.where(paired, 2, 1))
+    ring_phase = np.concatenate([np.arange(2 if p else 1) for p in paired]).astype(int)
+    n = n_rigid + len(ring_mode)
+    M, K, W, load = np.zeros(n), np.zeros((n, n)), np.zeros((n, 2 * planetary_set.n_planets)), np.zeros(n)
+    M[n_rigid:] = 1.0
+    K[range(n_rigid, n), range(n_rigid, n)] = (2 * np.pi * ring.frequency[ring_mode]) ** 2
+    _place_bodies(M, K, place, planetary_set, sun, carrier, planet)
+    _place_shafts(M, K, load, place, planetary_set, motor, brake, sun_torque)
+    side = 1.0 if sun_torque >= 0 else -1.0
+    rigid = np.zeros_like(W)
+    _mesh_directions(rigid, place, planetary_set, side)
+    W[:] = rigid
+    angles = np.asarray(planetary_set.planet_angles) + side * ring_load_angle
+    n_p = planetary_set.n_planets
+    W[n_rigid:, n_p:] -= ring_displacement(ring, ring_mode, ring_phase, angles, side)
+    ring_names = tuple(
+        f"ring: n={ring.nodal_diameter[m]} mode {m} {'sine' if p else 'cosine'}"
+        for m, p in zip(ring_mode, ring_phase)
+    )
+    system = MechanicalSystem(
+        M=np.diag(M), C=np.zeros((n, n)), K=K, W=W, load=load, dofs=names + ring_names
+    )
+    return ElasticSet(
+        system=system,
+        rigid_directions=rigid,
+        ring_slice=slice(n_rigid, n),
+        ring_diameter=ring.nodal_diameter[ring_mode],
+        ring_phase=ring_phase,
+        ring_mode=ring_mode,
+        planet_angles=np.asarray(planetary_set.planet_angles),
+    )
+
+
+def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles, side) -> np.ndarray:
+    """Displacement into the ring at its loaded flanks per unit ring coordinate, shape (coordinates, N)."""
+    # the right flank is the mirror image of the left one: the mirrored field at the mirrored angle
+    factor = ring.load[ring_mode, :1] * np.exp(1j * ring.nodal_diameter[ring_mode, None] * (side * angles))
+    sine = ring_phase[:, None] == 1
+    value = ring.norm[ring_mode, None] * np.where(sine, factor.imag, factor.real)
+    return value
+
+
+def _place_bodies(M, K, place, planetary_set, sun, carrier, planet):
+    for name, body in (("sun", sun), ("carrier", carrier)):
+        for axis in ("x", "y"):
+            i = place[f"{name}: {axis}"]
+            M[i] = body.mass
+            K[i, i] += body.stiffness
+        M[place[f"{name}: rotation"]] = body.inertia
+    a = planetary_set.centre_distance
+    c = [place[f"carrier: {axis}"] for axis in ("x", "y", "rotation")]
+    for n, psi in enumerate(planetary_set.planet_angles):
+        p = [place[f"planet {n + 1}: {axis}"] for axis in ("x", "y", "rotation")]
+        M[p] = planet.mass, planet.mass, planet.inertia
+        # the pin moves with the carrier: translation plus rotation about its centre
+        for planet_dof, carrier_dof, arm in ((p[0], c[0], -a * np.sin(psi)), (p[1], c[1], a * np.cos(psi))):
+            column = np.zeros(len(K))
+            column[planet_dof], column[carrier_dof], column[c[2]] = 1.0, -1.0, -arm
+            K += planet.stiffness * np.outer(column, column)
+
+
+def _place_shafts(M, K, load, place, planetary_set, motor, brake, sun_torque):
+    ratio = 1.0 + planetary_set.ring.teeth / planetary_set.sun.teeth
+    for name, shaft, member, torque in (
+        ("motor", motor, "sun", sun_torque),
+        ("brake", brake, "carrier", -ratio * sun_torque),
+    ):
+        end = place[f"{member}: rotation"]
+        if shaft is not None:
+            i = place[f"{name}: rotation"]
+            M[i] = shaft.inertia
+            K[np.ix_([i, end], [i, end])] += shaft.stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
+            end = i
+        load[end] += torque
+
+
+def _mesh_directions(W, place, planetary_set, side):
+    """Columns whose product with the motions is the approach of the flanks, ring displacement excluded."""
+    s = planetary_set
+    N = s.n_planets
+    for n, psi in enumerate(s.planet_angles):
+        on_planet = psi + side * (np.pi / 2 - s.working_pressure_angle_sun_planet)
+        on_ring = psi - side * (np.pi / 2 - s.working_pressure_angle_planet_ring)
+        for j, angle, body, sign in (
+            (n, on_planet, "sun", 1.0),
+            (n, on_planet, f"planet {n + 1}", -1.0),
+            (N + n, on_ring, f"planet {n + 1}", 1.0),
+        ):
+            W[place[f"{body}: x"], j] = sign * np.cos(angle)
+            W[place[f"{body}: y"], j] = sign * np.sin(angle)
+        W[place["sun: rotation"], n] = side * s.sun.base_radius
+        W[place[f"planet {n + 1}: rotation"], n] = side * s.planet.base_radius
+        W[place[f"planet {n + 1}: rotation"], N + n] = -side * s.planet.base_radius
+
+
+def ring_mesh_compliance(harmonic_compliance, nodal_diameters, count, angles) -> np.ndarray:
+    """Static compliance between the ring's mesh points with the outer surface held, shape (N, N) [m/N].
+
+    Parameters
+    ----------
+    harmonic_compliance : (m,) array
+        ``H_n`` of the ring's load functional for each nodal diameter.
+    nodal_diameters : (m,) int array
+        The nodal diameters that the dynamic ring keeps, from zero.
+    count : int
+        Number of teeth.
+    angles : (N,) array
+        Planet angles [rad].
+    """
+    n = np.asarray(nodal_diameters)
+    weight = np.where((n == 0) | (2 * n == count), 1.0, 2.0) / count
+    offset = np.asarray(angles)[:, None] - np.asarray(angles)[None, :]
+    wave = np.exp(1j * n[:, None, None] * offset)
+    return np.einsum("n,n,nij->ij", weight, np.asarray(harmonic_compliance), wave.conj()).real
+
+
+def mesh_excitation(cycle: MeshCycle, ring_compliance: np.ndarray, *, backlash) -> MeshExcitation:
+    """Mesh springs of the dynamic model: the static meshes less what the ring model keeps elastic.
+
+    ``1/k_dyn = 1/k - c_jj`` for the tangent stiffness, and ``delta - C F`` for the deflection, with ``C`` the
+    compliance of the dynamic ring between its mesh points, outer surface held.
+
+    Raises
+    ------
+    CaseError
+        Without torque there is no mesh stiffness to linearise.
+    ContactError
+        When a mesh opens at some position, or the ring is softer than its mesh.
+    """
+    N = len(cycle.force) // 2
+    if not cycle.force.any():
+        raise CaseError(
+            "without torque no tooth carries load, so there is no mesh stiffness for the dynamic model",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero for modes, dynamics and housing",
+            remedy="give a torque, or run with --only static",
+        )
+    if cycle.open_planets.any():
+        planets = np.flatnonzero(cycle.open_planets.any(axis=1)) + 1
+        raise ContactError(
+            f"planet {', '.join(map(str, planets))} carries nothing at some positions: the linear dynamic "
+            "model cannot represent loss of contact",
+            code="E-CONTACT-OPEN",
+            remedy="raise operation.torque or reduce the errors",
+        )
+    own = np.zeros((2 * N, 1))
+    own[N:, 0] = np.diag(ring_compliance)
+    remaining = 1.0 / cycle.stiffness - own
+    if remaining.min() <= 0:
+        raise ContactError(
+            "the compliance of the ring model exceeds that of the loaded mesh", code="E-RING-COMPLIANCE"
+        )
+    deflection = np.array(cycle.deflection)
+    deflection[N:] -= ring_compliance @ cycle.force[N:]
+    return MeshExcitation(
+        stiffness=1.0 / remaining,
+        deflection=deflection,
+        force=cycle.force,
+        backlash=np.broadcast_to(np.asarray(backlash, float), (2 * N,)),
+    )
+
+
+def ring_field(model: ElasticSet, ring: CyclicModes, coordinates, output: int, max_diameter: int) -> np.ndarray:
+    """Circumferential components of a ring output from complex harmonics of the ring's coordinates.
+
+    ``u(phi, t) = Re sum_h sum_n U[h, n] e^{i n phi} e^{i h omega t}``.
+
+    Parameters
+    ----------
+    coordinates : (..., ring coordinates) complex array
+        Harmonics of the ring's coordinates.
+    output : int
+        Index of the output in ``ring.output``.
+    max_diameter : int
+        Largest nodal diameter of the result.
+
+    Returns
+    -------
+    (..., 2 max_diameter + 1) complex array
+        Components n = -max_diameter .. max_diameter.
+    """
+    mode, n = model.ring_mode, model.ring_diameter
+    value = (ring.norm * ring.output[:, output])[mode]
+    single = ~ring.paired[mode]
+    turn = np.where(model.ring_phase == 1, -1j, 1.0)
+    half = np.where(single, 1.0, 0.5)
+    columns = np.zeros((len(mode), 2 * max_diameter + 1), complex)
+    row = np.arange(len(mode))
+    inside = n <= max_diameter
+    np.add.at(columns, (row[inside], max_diameter + n[inside]), (half * turn * value)[inside])
+    mirrored = inside & ~single
+    np.add.at(
+        columns, (row[mirrored], max_diameter - n[mirrored]), (half * np.conj(turn * value))[mirrored]
+    )
+    return np.asarray(coordinates) @ columns

@@ -1,0 +1,160 @@
+"""Figures of static.nc: what the gears themselves do over one mesh period."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.plots.style import (
+    COLOURS,
+    distinct_lines,
+    family,
+    label,
+    legend_below,
+    line_style,
+    new_figure,
+    periodic,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+POSITION = "position in the mesh period [1]"
+
+
+def static_transmission_error(static: xr.Dataset) -> Figure:
+    """Static transmission error of every mesh, and of sun to ring over every planet.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        With ``ste`` (mesh, position) and ``ste_overall`` (planet, position) [m].
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (left, right) = new_figure(columns=2, width=9.5, sharex=True)
+    names = static["mesh"].values
+    _draw(left, names, static["position"], static["ste"] * 1e6)
+    label(left, POSITION, "transmission error [µm]", "each mesh, along its line of action")
+    planets = [f"sun to ring over planet {p}" for p in static["planet"].values]
+    position, overall = periodic(static["position"], static["ste_overall"] * 1e6)
+    equal = np.abs(overall - overall[0]).max() <= 1e-6 * np.abs(overall).max()
+    rows = [("sun to ring over every planet (identical)", 0)] if equal else list(zip(planets, range(len(planets))))
+    for i, (text, row) in enumerate(rows):
+        right.plot(position, overall[row], label=text, **line_style(i + 2))
+    label(right, POSITION, "sum of both meshes [µm]", "sun to ring")
+    right.set_xlim(0, 1)
+    legend_below(figure)
+    return figure
+
+
+def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Figure:
+    """Tangent and secant stiffness of every mesh.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        With ``mesh_stiffness`` and ``mesh_stiffness_secant`` (mesh, position) [N/m].
+    face_width : float, optional
+        [m]; adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = new_figure(height=4.8)
+    names = static["mesh"].values
+    lines = distinct_lines(names, static["mesh_stiffness"])
+    for i, (text, row) in enumerate(lines):
+        for name, dash, width in (("mesh_stiffness", "-", 2.0), ("mesh_stiffness_secant", ":", 1.4)):
+            position, value = periodic(static["position"], static[name][row] * 1e-6)
+            kind = "tangent" if name == "mesh_stiffness" else "secant"
+            colour = COLOURS[i % len(COLOURS)]
+            ax.plot(position, value, dash, color=colour, linewidth=width, label=f"{text}, {kind}")
+    ax.set_xlim(0, 1)
+    label(ax, POSITION, "mesh stiffness [N/µm]")
+    if face_width:
+        # N/m over m of width is 1e-9 N/(mm µm)
+        factor = 1e-3 / face_width
+        second = ax.secondary_yaxis("right", functions=(lambda k: k * factor, lambda c: c / factor))
+        second.set_ylabel("per face width [N/(mm µm)]", fontsize=11)
+        second.tick_params(labelsize=10)
+    legend_below(figure, ax, columns=2)
+    return figure
+
+
+def load_sharing(static: xr.Dataset) -> Figure:
+    """Share of every planet in the sun's torque over the mesh period.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        With ``load_share`` (planet, position) [1].
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = new_figure(height=3.8)
+    position, share = periodic(static["position"], static["load_share"] * 100)
+    for i, planet in enumerate(static["planet"].values):
+        # equal shares lie on top of each other: thinner and thinner lines keep all of them visible
+        width = 1.4 + 1.6 * (len(share) - 1 - i)
+        ax.plot(position, share[i], label=f"planet {planet}", linewidth=width, **line_style(i))
+    equal = 100.0 / len(share)
+    ax.axhline(equal, color="0.5", linewidth=0.8, linestyle=(0, (1, 3)), label=f"equal share {equal:.4g} %")
+    spread = np.abs(share - equal).max()
+    if spread < 0.05 * equal:
+        ax.set_ylim(0.94 * equal, 1.06 * equal)
+    ax.set_xlim(0, 1)
+    label(ax, POSITION, "share of the torque [%]", f"largest departure from equal shares: {spread:.3g} %")
+    legend_below(figure, columns=4)
+    return figure
+
+
+def tooth_loads(static: xr.Dataset) -> Figure:
+    """Load of every simultaneous tooth pair of one sun-planet and one planet-ring mesh.
+
+    The meshes shown are those of the first planet; the path coordinate of pair ``i`` is the position
+    plus ``i`` mesh periods, so that one curve follows one pair from its first to its last contact.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        With ``tooth_load`` (mesh, tooth, position) and ``mesh_force`` (mesh, position) [N].
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = new_figure(columns=2, width=9.5, sharex=True)
+    names = [str(name) for name in static["mesh"].values]
+    for ax, kind in zip(axes, ("sun-planet", "planet-ring")):
+        row = next(i for i, name in enumerate(names) if family(name) == kind)
+        load = static["tooth_load"].values[row]
+        force = static["mesh_force"].values[row]
+        position = static["position"].values
+        shown = [pair for pair in range(len(load)) if load[pair].max(initial=0.0) > 1e-9 * force.max(initial=0.0)]
+        for i, pair in enumerate(shown):
+            ax.plot(*periodic_gap(position, load[pair]), label=f"tooth pair {i + 1}", **line_style(i))
+        ax.plot(*periodic(position, force), color="0.45", linewidth=1.2, label="whole mesh")
+        ax.set_xlim(0, 1)
+        ax.set_ylim(bottom=0)
+        label(ax, POSITION, "load along the line of action [N]", names[row])
+    legend_below(figure, columns=5)
+    return figure
+
+
+def periodic_gap(position, values):
+    """A pair's load does not close at the end of the period: the next pair takes over."""
+    return np.asarray(position), np.asarray(values)
+
+
+def _draw(ax, names, position, values):
+    for i, (text, row) in enumerate(distinct_lines(names, values)):
+        ax.plot(*periodic(position, values[row]), label=text, **line_style(i))
+    ax.set_xlim(0, 1)

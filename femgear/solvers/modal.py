@@ -1,0 +1,307 @@
+"""Modal basis of a system with mean mesh stiffnesses, and what the modes left out leave behind."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.system import MechanicalSystem, Modes, Response
+
+# Eigenvalues of two modes closer than this (relative) are one multiple eigenvalue: never cut through it.
+_MULTIPLE = 1e-6
+# Strain of a mesh, or work of the load, on a rigid mode relative to the sum of the absolute terms.
+_RIGID_TOLERANCE = 1e-6
+
+
+def solve_modes(
+    system: MechanicalSystem,
+    mesh_stiffness,
+    *,
+    damping_ratio=None,
+    count: int | None = None,
+    max_frequency: float | None = None,
+) -> Modes:
+    """Modes of ``K + W diag(k) W^T`` and ``M`` with the static flexibility of the modes left out.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+        Without gyroscopic terms; its ``C`` must be zero unless ``damping_ratio`` is ``None``.
+    mesh_stiffness : (n_meshes,) array
+        Mean mesh stiffnesses [N/m], not negative.
+    damping_ratio : float or (n_modes,) array, optional
+        Fraction of critical damping. ``None`` takes ``phi^T C phi / (2 omega)``, which needs a ``C`` that
+        the modes make diagonal.
+    count : int, optional
+        Number of modes to keep, one or two more when the last belongs to a multiple eigenvalue.
+    max_frequency : float, optional
+        Keep the modes up to this frequency [Hz]. All modes when neither is given.
+
+    Returns
+    -------
+    Modes
+        ``kind`` is ``"rigid"`` or ``"elastic"`` and ``nodal_diameter`` -1: the model knows better names.
+
+    Raises
+    ------
+    CaseError
+        Matrices that do not fit, are not symmetric or not finite; a load that no support takes up.
+    ConvergenceError
+        A mass that is not positive definite, a stiffness that is negative, a rigid mode that strains a mesh.
+
+    Notes
+    -----
+    Residual flexibility ``W^T K^+ W - sum r r^T / omega^2``, ``r = W^T phi`` (Geradin and Rixen, Mechanical
+    Vibrations, 3rd ed., section 2.9); ``K^+`` is the inverse on the motions free of rigid modes.
+    """
+    stiffness = _total_stiffness(system, mesh_stiffness)
+    if count is not None and max_frequency is not None:
+        raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
+    scale, values, shape = _eigen(system.M, stiffness, count, max_frequency)
+    rigid = _rigid(values, scale, len(system.M))
+    if np.any(rigid):
+        shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid], scale)
+    rows = system.W.T @ shape
+    modal_load = shape.T @ system.load
+    _check_rigid(system, shape[:, rigid])
+    rows[:, rigid] = 0.0
+    modal_load[rigid] = 0.0
+    omega = np.sqrt(np.where(rigid, 0.0, values))
+    flexible = _pseudo_solve(system.M, stiffness, shape[:, rigid], np.column_stack([system.W, system.load]))
+    static = system.W.T @ flexible
+    residual = static[:, :-1] - _modal_flexibility(rows, rows, omega)
+    return Modes(
+        frequency=omega / (2.0 * np.pi),
+        damping_ratio=_damping(system, shape, omega, damping_ratio),
+        shape=shape,
+        mesh_stiffness=np.asarray(mesh_stiffness, dtype=float),
+        mesh_deflection=rows,
+        residual=0.5 * (residual + residual.T),
+        load_deflection=static[:, -1],
+        kind=tuple("rigid" if flag else "elastic" for flag in rigid),
+        nodal_diameter=np.full(len(omega), -1),
+        dofs=system.dofs,
+        modal_load=modal_load,
+    )
+
+
+def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
+    """Static flexibility of the modes left out, from the mesh forces to the outputs ``L q``.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    modes : Modes
+        Of that system.
+    outputs : (n_outputs, n) array
+        ``L``.
+
+    Returns
+    -------
+    (n_outputs, n_meshes) array
+        ``L K^+ W - sum (L phi) r^T / omega^2`` [m/N per unit of L].
+    """
+    outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
+    static = outputs @ _pseudo_solve(*_rigid_basis(system, modes), system.W)
+    omega = 2.0 * np.pi * modes.frequency
+    return static - _modal_flexibility(outputs @ modes.shape, modes.mesh_deflection, omega)
+
+
+def output_load(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
+    """Static outputs ``L K^+ load`` (n_outputs,) under the constant external load, all modes included."""
+    outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
+    return outputs @ _pseudo_solve(*_rigid_basis(system, modes), system.load[:, None])[:, 0]
+
+
+def output_response(modes: Modes, response: Response, rows, *, residual, load) -> np.ndarray:
+    """Harmonics of the outputs ``L q`` of a periodic response.
+
+    Parameters
+    ----------
+    modes, response
+        The response computed with those modes.
+    rows : (n_outputs, n_modes) array
+        ``L @ modes.shape``.
+    residual : (n_outputs, n_meshes) array
+        From :func:`residual_output`.
+    load : (n_outputs,) array
+        From :func:`output_load`.
+
+    Returns
+    -------
+    (n_speeds, n_outputs, H + 1) complex array
+    """
+    omega = 2.0 * np.pi * modes.frequency
+    forcing = response.force - modes.mesh_stiffness[:, None] * response.deflection
+    out = np.matmul(rows, response.modal) - np.matmul(residual, forcing)
+    modal_load = np.zeros(len(omega)) if modes.modal_load is None else modes.modal_load
+    out[..., 0] += load - _modal_flexibility(rows, modal_load[None, :], omega)[:, 0]
+    return out
+
+
+def _total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+    n, meshes = len(system.M), np.asarray(mesh_stiffness, dtype=float)
+    shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "W": (n, len(meshes)), "load": (n,)}
+    for name, shape in shapes.items():
+        array = getattr(system, name)
+        if array.shape != shape:
+            raise CaseError(f"{name} has shape {array.shape}, expected {shape}", code="E-SHAPE")
+        if not np.all(np.isfinite(array)):
+            raise CaseError(f"{name} holds numbers that are not finite", code="E-FINITE")
+    for name in ("M", "K"):
+        array = getattr(system, name)
+        error, size = np.abs(array - array.T).max(), np.abs(array).max()
+        if error > 1e-9 * size:
+            raise CaseError(f"{name} is not symmetric: {error:.3e} of {size:.3e}", code="E-SYMMETRY")
+    if not np.all(np.isfinite(meshes)) or np.any(meshes < 0.0):
+        raise CaseError(
+            "mesh stiffnesses must be finite and not negative",
+            code="E-MESH-STIFFNESS", value=meshes.tolist(), limit=">= 0 N/m",
+        )  # fmt: skip
+    if system.gyroscopic is not None and np.any(system.gyroscopic):
+        raise CaseError(
+            "real modes cannot carry gyroscopic terms", code="E-GYROSCOPIC", key="gyroscopic",
+            remedy="leave them out of the system that is reduced to modes",
+        )  # fmt: skip
+    return 0.5 * (system.K + system.K.T) + (system.W * meshes) @ system.W.T
+
+
+def _eigen(mass, stiffness, count, max_frequency):
+    """Largest eigenvalue scale, eigenvalues and mass-normalised shapes that are asked for."""
+    from scipy import linalg
+
+    n = len(mass)
+    try:
+        factor = np.linalg.cholesky(0.5 * (mass + mass.T))
+    except np.linalg.LinAlgError as error:
+        raise ConvergenceError(
+            "the mass matrix is not positive definite", code="E-MASS",
+            remedy="give every degree of freedom some mass or condense it",
+        ) from error  # fmt: skip
+    standard = linalg.solve_triangular(factor, stiffness, lower=True)
+    standard = linalg.solve_triangular(factor, standard.T, lower=True)
+    standard = 0.5 * (standard + standard.T)
+    scale = np.abs(standard).sum(axis=1).max()
+    subset = None
+    if count is not None:
+        if count < 1 or int(count) != count:
+            raise CaseError("at least one mode is needed", code="E-MODES", value=count)
+        if count < n:
+            subset = {"subset_by_index": (0, min(n, int(count) + 4) - 1)}
+    if max_frequency is not None:
+        if not max_frequency > 0.0:
+            raise CaseError("the highest frequency must be positive", code="E-MODES", value=max_frequency)
+        top = (2.0 * np.pi * max_frequency) ** 2 * (1.0 + 10.0 * _MULTIPLE)
+        subset = {"subset_by_value": (-np.inf, top)}
+    values, vectors = linalg.eigh(standard, **(subset or {"driver": "evd"}))
+    if not np.all(np.isfinite(values)) or not len(values):
+        raise ConvergenceError(
+            f"no natural frequency below {max_frequency} Hz", code="E-MODES",
+            remedy="raise the highest frequency",
+        )  # fmt: skip
+    if count is not None:
+        kept = min(int(count), len(values))
+        while kept < len(values) and values[kept] - values[kept - 1] < _MULTIPLE * abs(values[kept]):
+            kept += 1
+        values, vectors = values[:kept], vectors[:, :kept]
+    return scale, values, linalg.solve_triangular(factor, vectors, lower=True, trans="T")
+
+
+def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
+    """Which eigenvalues are zero up to rounding of the largest one; refuses negative ones."""
+    threshold = max(1e-12, 10.0 * n * np.finfo(float).eps) * scale
+    if values[0] < -threshold:
+        raise ConvergenceError(
+            f"the stiffness matrix is negative on some motion: smallest eigenvalue {values[0]:.3e} 1/s^2",
+            code="E-STIFFNESS", remedy="check the signs of supports, couplings and mesh directions",
+        )  # fmt: skip
+    return np.abs(values) <= threshold
+
+
+def _refined_rigid(mass, stiffness, shape, scale) -> np.ndarray:
+    """Rigid modes cleaned of elastic parts by two inverse iterations, mass-orthonormal again."""
+    from scipy import linalg
+
+    factor = linalg.cho_factor(stiffness + (1e-10 * scale) * mass)
+    for _ in range(2):
+        shape = linalg.cho_solve(factor, mass @ shape)
+        lower = np.linalg.cholesky(shape.T @ mass @ shape)
+        shape = linalg.solve_triangular(lower, shape.T, lower=True).T
+    return shape
+
+
+def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
+    """Refuse rigid modes that strain a mesh or on which the load does work."""
+    strain, size = np.abs(system.W.T @ rigid), np.abs(system.W).T @ np.abs(rigid)
+    if np.any(strain > _RIGID_TOLERANCE * size):
+        mesh = int(np.argmax((strain - _RIGID_TOLERANCE * size).max(axis=1)))
+        raise ConvergenceError(
+            f"a motion without stiffness strains mesh {mesh + 1}, whose mean stiffness is missing or far too small",
+            code="E-RIGID-MODE", remedy="give every mesh a mean stiffness",
+        )  # fmt: skip
+    work, size = np.abs(rigid.T @ system.load), np.abs(rigid).T @ np.abs(system.load)
+    if np.any(work > _RIGID_TOLERANCE * size):
+        mode = int(np.argmax(work - _RIGID_TOLERANCE * size))
+        dof = int(np.argmax(np.abs(rigid[:, mode])))
+        name = system.dofs[dof] if system.dofs else str(dof)
+        raise CaseError(
+            f"the constant load does work on a rigid-body motion (largest at {name}): "
+            f"{work[mode]:.3e} of {size[mode]:.3e}",
+            code="E-LOAD-BALANCE", limit="a load in equilibrium with itself",
+            remedy="add the reaction torque of the output, or hold that motion by a support",
+        )  # fmt: skip
+
+
+def _rigid_basis(system: MechanicalSystem, modes: Modes):
+    return system.M, _total_stiffness(system, modes.mesh_stiffness), modes.shape[:, modes.frequency == 0.0]
+
+
+def _pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
+    """``K^+ loads``: elastic displacement, mass-orthogonal to the rigid modes, of self-equilibrated loads.
+
+    ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.
+    """
+    from scipy import linalg
+
+    carried = mass @ rigid
+    loads = loads - carried @ (rigid.T @ loads)
+    # the mean diagonal of the pencil: no worse conditioned than the elastic part itself
+    weight = np.trace(stiffness) / np.trace(mass)
+    lower = linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
+    out = linalg.cho_solve(lower, loads)
+    return out - rigid @ (carried.T @ out)
+
+
+def _modal_flexibility(left: np.ndarray, right: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """``sum left right^T / omega^2`` over the modes that are not rigid."""
+    elastic = omega > 0.0
+    return (left[:, elastic] / omega[elastic] ** 2) @ right[:, elastic].T
+
+
+def _damping(system: MechanicalSystem, shape, omega, damping_ratio) -> np.ndarray:
+    if damping_ratio is None:
+        modal = shape.T @ system.C @ shape
+        off = np.abs(modal - np.diag(np.diag(modal))).max(initial=0.0)
+        if off > 1e-6 * np.abs(modal).max(initial=0.0):
+            raise CaseError(
+                "the viscous damping couples the modes", code="E-DAMPING", key="damping_ratio",
+                remedy="give a modal damping ratio, or a damping matrix proportional to mass and stiffness",
+            )  # fmt: skip
+        return np.where(omega > 0.0, np.diag(modal) / (2.0 * np.where(omega > 0.0, omega, 1.0)), 0.0)
+    if np.any(system.C):
+        raise CaseError(
+            "a damping ratio and a damping matrix are given", code="E-DAMPING", key="damping_ratio",
+            remedy="keep one of them",
+        )  # fmt: skip
+    ratio = np.asarray(damping_ratio, dtype=float)
+    if ratio.ndim > 1 or (ratio.ndim == 1 and len(ratio) != len(omega)):
+        raise CaseError(
+            f"{ratio.size} damping ratios for {len(omega)} modes", code="E-DAMPING", key="damping_ratio",
+            limit="one number, or one a mode",
+        )  # fmt: skip
+    if not np.all(np.isfinite(ratio)) or np.any(ratio < 0.0):
+        raise CaseError(
+            "damping ratios must be finite and not negative", code="E-DAMPING", key="damping_ratio",
+            value=ratio.tolist(), limit=">= 0",
+        )  # fmt: skip
+    return np.where(omega > 0.0, ratio, 0.0)
