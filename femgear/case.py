@@ -9,10 +9,19 @@ from pydantic import ValidationError
 
 from femgear.casefile import tomlfile
 from femgear.casefile.problems import combine, translate
-from femgear.casefile.sections import FORMAT, Case, cross_check
-from femgear.errors import CaseError
+from femgear.casefile.sections import FORMAT, Case, PlanetSection, RingSection, SunSection, cross_check
+from femgear.errors import CaseError, GeometryError
+from femgear.gears import (
+    BasicRack,
+    Gear,
+    PinionCutter,
+    PlanetarySet,
+    check_set,
+    close_set,
+    equal_planet_angles,
+)
 
-__all__ = ["Case", "case_schema", "parse_case", "read_case", "to_toml", "with_value"]
+__all__ = ["Case", "case_schema", "parse_case", "planetary_set", "read_case", "to_toml", "with_value"]
 
 
 def read_case(path: str | os.PathLike) -> Case:
@@ -89,6 +98,69 @@ def case_schema() -> dict[str, Any]:
     return Case.model_json_schema()
 
 
+def planetary_set(case: Case) -> PlanetarySet:
+    """Gears of a case, closed on their centre distance and checked.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    PlanetarySet
+        With the profile shifts, or the centre distance, that the case leaves to be found.
+
+    Raises
+    ------
+    GeometryError
+        What cannot be made, assembled or run (see `femgear.gears.checks.check_set`), with file and line.
+    """
+    ring = case.ring
+    cutter = None
+    if ring.cutter_teeth is not None:
+        cutter = PinionCutter(teeth=ring.cutter_teeth, profile_shift=ring.cutter_profile_shift)
+    left_open = (("sun", case.sun.profile_shift), ("ring", ring.profile_shift))
+    try:
+        closed = close_set(
+            _gear(case, case.sun, "sun", case.sun.bore_radius),
+            _gear(case, case.planet, "planet", case.planet.bore_radius),
+            _gear(case, ring, "ring", ring.outer_radius, cutter),
+            planet_angles=case.set.planet_angles or equal_planet_angles(case.set.planets),
+            centre_distance=case.set.centre_distance,
+            find=tuple(name for name, shift in left_open if shift is None),
+        )
+        check_set(closed)
+    except GeometryError as error:
+        error.file = case.location(error.key or "")
+        raise
+    return closed
+
+
+def _gear(
+    case: Case,
+    section: SunSection | PlanetSection | RingSection,
+    name: str,
+    rim: float,
+    cutter: PinionCutter | None = None,
+) -> Gear:
+    rack = section.rack or case.rack
+    return Gear(
+        teeth=section.teeth,
+        module=case.sun.module,
+        pressure_angle=case.sun.pressure_angle,
+        profile_shift=section.profile_shift or 0.0,
+        face_width=case.set.face_width,
+        rim_radius=rim,
+        internal=name == "ring",
+        rack=BasicRack(addendum=rack.addendum, dedendum=rack.dedendum, root_radius=rack.root_radius),
+        cutter=cutter,
+        tip_diameter=section.tip_diameter,
+        root_diameter=section.root_diameter,
+        thickness_allowance=0.5 * case.set.backlash,
+        name=name,
+    )
+
+
 def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
@@ -109,7 +181,7 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     problems = cross_check(case)
     if problems:
         raise combine(problems, lines, name)
-    case._source, case._name, case._notices = text, name, _notices(data)
+    case._source, case._lines, case._name, case._notices = text, lines, name, _notices(data)
     return case
 
 

@@ -112,7 +112,7 @@ def run(
     output
         Folder of the results.
     only
-        Stop after this stage.
+        Compute this stage and what it needs, no further.
     pictures
         Draw figures, fields and report.
     force

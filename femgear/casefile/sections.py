@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr
 
 from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.casefile.tomlfile import line_of
 from femgear.casefile.units import (
     ANGLE,
     DENSITY,
@@ -40,7 +41,12 @@ class _Section(BaseModel):
 
 
 class SetSection(_Section):
-    """What the gears share; without ``centre_distance`` the profile shifts give it."""
+    """What the gears share.
+
+    ``centre_distance`` may be left out (the profile shifts give it), and so may the profile shift of the sun,
+    of the ring or of both (they are found so that the meshes have no play). ``backlash`` is the play of each
+    mesh on the reference circles: half of it is taken from the tooth thickness of every gear.
+    """
 
     planets: Count(1, 1000)
     centre_distance: Quantity(LENGTH, 1e-3, 10.0) | None = None
@@ -210,8 +216,13 @@ class Case(_Section):
     housing: HousingSection = HousingSection()
 
     _source: str = PrivateAttr(default="")
+    _lines: str = PrivateAttr(default="")
     _name: str = PrivateAttr(default="")
     _notices: tuple[str, ...] = PrivateAttr(default=())
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the values agree, from whatever text they came."""
+        return isinstance(other, Case) and self.model_dump() == other.model_dump()
 
     @property
     def source(self) -> str:
@@ -222,6 +233,12 @@ class Case(_Section):
     def name(self) -> str:
         """Name of the file, for messages."""
         return self._name
+
+    def location(self, key: str) -> str | None:
+        """File, and line where the file gives it, of a dotted key; of ``rack.x`` for ``sun.rack.x``."""
+        found = (line_of(self._lines, name) for name in (key, key.partition(".")[2]) if name)
+        line = next((number for number in found if number), None)
+        return f"{self._name}:{line}" if self._name and line else self._name or None
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -270,14 +287,16 @@ def _check_set(case: Case):
             key="set.planet_angles",
             limit=f"{count} angles",
         )
-    if case.set.centre_distance is None and (
-        case.sun.profile_shift is None or case.ring.profile_shift is None
+    if (
+        case.set.centre_distance is None
+        and case.sun.profile_shift is None
+        and case.ring.profile_shift is None
     ):
         yield CaseError(
-            "neither the centre distance nor all profile shifts are given",
+            "neither the centre distance nor a profile shift of sun or ring is given",
             code="E-KEY-MISSING",
             key="set.centre_distance",
-            remedy="give set.centre_distance, or both sun.profile_shift and ring.profile_shift",
+            remedy="give set.centre_distance, sun.profile_shift or ring.profile_shift; the rest is found",
         )
 
 

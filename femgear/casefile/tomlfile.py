@@ -37,13 +37,15 @@ def read_text(path: str | os.PathLike) -> str:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise CaseError(f"cannot open the file: {reason}", code="E-FILE", file=name) from error
-    with open(descriptor, "rb") as stream:
+    try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             raise CaseError("not a regular file", code="E-FILE", file=name, remedy="name a TOML file")
-        try:
+        with open(descriptor, "rb", closefd=False) as stream:
             data = stream.read(MAX_BYTES + 1)
-        except OSError as error:
-            raise CaseError(f"cannot read the file: {error.strerror}", code="E-FILE", file=name) from error
+    except OSError as error:
+        raise CaseError(f"cannot read the file: {error.strerror}", code="E-FILE", file=name) from error
+    finally:
+        os.close(descriptor)
     if len(data) > MAX_BYTES:
         raise CaseError("the file is too long", code="E-FILE", file=name, limit=f"{MAX_BYTES} bytes")
     if not data.strip():

@@ -76,11 +76,12 @@ def to_si(text: str, dimension: Dimension) -> float:
     """
     example = f'write it as in "{dimension.show(dimension.scale)}"'
     match = _NUMBER.fullmatch(text)
+    if re.match(r"\s*[+-]?\d+,\d", text):
+        message = f"{dimension.name} has a comma in its number"
+        raise CaseError(message, code="E-UNIT", value=text, remedy="use a decimal point")
     if not match:
-        remedy = "use a decimal point" if re.match(r"\s*[+-]?\d+,\d", text) else example
-        raise CaseError(
-            f"{dimension.name} must start with a number", code="E-UNIT", value=text, remedy=remedy
-        )
+        message = f"{dimension.name} must start with a number"
+        raise CaseError(message, code="E-UNIT", value=text, remedy=example)
     number, unit = float(match[1]), " ".join(match[2].split())
     if not unit:
         raise CaseError(f"{dimension.name} needs its unit", code="E-UNIT", value=text, remedy=example)

@@ -74,27 +74,16 @@ def forward(lower, columns):
 
 def solve_step(problem: Problem, active: np.ndarray) -> Step:
     """Solve the linear conditions of one active set and list the candidates that violate the others."""
-    index = np.flatnonzero(active)
-    n, m = problem.G.shape
-    half, offset = np.zeros((0, m)), np.zeros(0)
-    if len(index):
-        lower = factor(problem.H[np.ix_(index, index)])
-        both = forward(lower, np.column_stack([problem.G[index], problem.gap[index]]))
-        half, offset = both[:, :m], both[:, m]
-    values, vectors = np.linalg.eigh(half.T @ half)
-    free = values <= NULL * max(values.max(initial=0.0), np.finfo(float).tiny)
-    null, held = vectors[:, free], vectors[:, ~free]
-    motions = held @ ((held.T @ (problem.load + half.T @ offset)) / values[~free])
-    loads = np.zeros(n)
-    if len(index):
-        loads[index] = lapack.dtrtrs(lower, half @ motions - offset, lower=1, trans=1)[0]
+    loads, motions, null = _solve_bordered(problem, np.flatnonzero(active))
     elastic, approach = problem.H @ loads, problem.G @ motions
     gaps = problem.gap + elastic - approach
     scale = np.abs(elastic).max(initial=0.0)
     blocked = forced = np.zeros(0, int)
-    if free.any():
+    if null.shape[1]:
         shift, blocked, forced = _settle(problem, null, gaps, active)
         motions = motions + null @ shift
+        # the multipliers of the least distance problem carry the rounding of its largest row
+        scale += 10 * np.abs(problem.G @ (null @ shift)).max()
         approach = problem.G @ motions
         gaps = problem.gap + elastic - approach
     rounding = ROUNDING * (np.abs(problem.gap) + scale + np.abs(approach))
@@ -113,6 +102,33 @@ def solve_step(problem: Problem, active: np.ndarray) -> Step:
         residual=_residual(problem, active, loads, gaps),
         tolerance=tolerance,
     )
+
+
+def _solve_bordered(problem: Problem, index: np.ndarray):
+    """Loads, motions and unrestrained motions when exactly the candidates `index` touch.
+
+    The second round removes what rounding leaves when the separations are large against the elastic
+    displacements.
+    """
+    n, m = problem.G.shape
+    loads, motions = np.zeros(n), np.zeros(m)
+    if not len(index):
+        return loads, motions, np.eye(m)
+    H, G, gap = problem.H[np.ix_(index, index)], problem.G[index], problem.gap[index]
+    lower = factor(H)
+    half = forward(lower, G)
+    values, vectors = np.linalg.eigh(half.T @ half)
+    free = values <= NULL * values[-1]
+    null, held = vectors[:, free], vectors[:, ~free]
+    touching = np.zeros(len(index))
+    for _ in range(2):
+        offset = forward(lower, gap + H @ touching - G @ motions)
+        balance = problem.load - G.T @ touching + half.T @ offset
+        change = held @ ((held.T @ balance) / values[~free])
+        touching += lapack.dtrtrs(lower, half @ change - offset, lower=1, trans=1)[0]
+        motions += change
+    loads[index] = touching
+    return loads, motions, null
 
 
 def _residual(problem: Problem, active, loads, gaps) -> float:
@@ -180,18 +196,25 @@ def _least_motion(arms, gaps):
     return -rest[:k] / rest[k] * deepest, None
 
 
-def pivot(problem: Problem, active, max_steps) -> tuple[Step, int, bool]:
-    """Flip all violations while their number falls, otherwise one at a time.
+def pivot(problem: Problem, active, *, max_steps, single) -> tuple[Step, int]:
+    """Flip all violations while their number falls; then, if `single`, one at a time until it falls again.
+
+    Parameters
+    ----------
+    problem : Problem
+    active : (n,) bool array
+        First active set.
+    max_steps : int
+    single : bool
+        Whether to go on with single pivots when blocks of pivots make no progress.
 
     Returns
     -------
     step : Step
         The last one; solved when its `flips` are empty.
     iterations : int
-    single : bool
-        Whether single pivots were needed.
     """
-    fewest, patience, single = np.inf, PATIENCE, False
+    fewest, patience = np.inf, PATIENCE
     for iteration in range(1, max_steps + 1):
         step = solve_step(problem, active)
         flips = step.flips
@@ -201,9 +224,10 @@ def pivot(problem: Problem, active, max_steps) -> tuple[Step, int, bool]:
             fewest, patience = len(flips), PATIENCE
         elif patience:
             patience -= 1
+        elif not single:
+            break
         else:
-            single = True
             flips = step.forced if len(step.forced) else flips[-1:]
         active = active.copy()
         active[flips] ^= True
-    return step, iteration, single
+    return step, iteration

@@ -77,7 +77,7 @@ def solve_contact(H, gap, G, load, *, start=None, max_steps=200) -> ContactState
     start : (n,) bool array, optional
         Candidates thought to touch, such as those of the neighbouring position; all when not given.
     max_steps : int, optional
-        Number of steps after which the general solver daqp takes over.
+        Bound on the steps of each stage, after the last of which the general solver daqp takes over.
 
     Returns
     -------
@@ -96,16 +96,7 @@ def solve_contact(H, gap, G, load, *, start=None, max_steps=200) -> ContactState
         step = solve_step(problem, np.zeros(n, bool))
         if not len(step.flips):
             return _state(problem, step, 1, "no load")
-    active = np.ones(n, bool) if start is None else np.array(start, bool)
-    if active.shape != (n,):
-        raise ContactError(
-            f"the start has shape {active.shape}, the problem {n} candidates", code="E-CONTACT-INPUT"
-        )
-    step, iterations, single = pivot(problem, active, max_steps)
-    method = "active set, single pivots" if single else "active set"
-    if len(step.flips):
-        step, more = _by_daqp(problem)
-        iterations, method = iterations + more, "daqp"
+    step, iterations, method = _search(problem, start, max_steps)
     return _state(problem, _without_idle(problem, step), iterations, method)
 
 
@@ -208,6 +199,32 @@ def _scaled(H, gap, G, load) -> Problem:
     return Problem(H / compliance, gap / compliance, G / arm, load / arm, compliance, arm)
 
 
+def _search(problem: Problem, start, max_steps) -> tuple[Step, int, str]:
+    """Block steps from the start, then from all candidates, then single pivots, then daqp."""
+    everything = np.ones(len(problem.gap), bool)
+    starts = [everything]
+    if start is not None:
+        start = np.array(start, bool)
+        if start.shape != everything.shape:
+            raise ContactError(
+                f"the start has shape {start.shape}, the problem {len(everything)} candidates",
+                code="E-CONTACT-INPUT",
+            )
+        starts = [start, everything] if start.any() else starts
+    iterations = 0
+    for first in starts:
+        step, more = pivot(problem, first, max_steps=max_steps, single=False)
+        iterations += more
+        if not len(step.flips):
+            return step, iterations, "active set"
+    step, more = pivot(problem, step.active, max_steps=max_steps, single=True)
+    iterations += more
+    if not len(step.flips):
+        return step, iterations, "active set, single pivots"
+    step, more = _by_daqp(problem)
+    return step, iterations + more, "daqp"
+
+
 def _by_daqp(problem: Problem) -> tuple[Step, int]:
     """The general quadratic program gives the active set; the linear conditions then give the digits."""
     import daqp
@@ -218,9 +235,11 @@ def _by_daqp(problem: Problem) -> tuple[Step, int]:
     lower = np.concatenate([np.zeros(n), problem.load / unit])
     sense = np.concatenate([np.zeros(n), np.full(m, 5)]).astype(np.int32)
     cost, arms = np.ascontiguousarray(problem.H), np.ascontiguousarray(problem.G.T)
-    loads, _, flag, info = daqp.solve(cost, problem.gap / unit, arms, upper, lower, sense)
+    loads, _, flag, info = daqp.solve(
+        cost, problem.gap / unit, arms, upper, lower, sense, primal_tol=1e-12, dual_tol=1e-12
+    )
     if flag == 1:
-        step, more, _ = pivot(problem, loads > 1e-10 * np.abs(loads).max(), 30)
+        step, more = pivot(problem, loads > 1e-10 * np.abs(loads).max(), max_steps=50, single=True)
         if not len(step.flips):
             return step, int(info["iterations"]) + more
     raise ContactError(
@@ -231,12 +250,19 @@ def _by_daqp(problem: Problem) -> tuple[Step, int]:
 
 
 def _without_idle(problem: Problem, step: Step) -> Step:
-    """Release touching candidates whose load is rounding, so that only loaded ones count as active."""
-    idle = step.active & (step.loads <= step.tolerance)
-    if not idle.any():
-        return step
-    released = solve_step(problem, step.active & ~idle)
-    return step if len(released.flips) else released
+    """Release touching candidates whose load is rounding, so that only loaded ones count as active.
+
+    A planet that carries nothing may touch on one side with a load of rounding size. Small loads that
+    something really presses on would penetrate when released, and stay.
+    """
+    largest = np.abs(step.loads).max(initial=0.0)
+    for share in (1e-9, 1e-10, 1e-11, 1e-12):
+        idle = step.active & (step.loads <= share * largest)
+        if idle.any():
+            released = solve_step(problem, step.active & ~idle)
+            if not len(released.flips):
+                return released
+    return step
 
 
 def _state(problem: Problem, step: Step, iterations: int, method: str) -> ContactState:

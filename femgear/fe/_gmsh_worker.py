@@ -23,7 +23,6 @@ def triangulate(gmsh, job):
         "Mesh.MeshSizeFromPoints": 0,
         "Mesh.MeshSizeFromCurvature": 0,
         "Mesh.MeshSizeExtendFromBoundary": 1,
-        "Mesh.MeshSizeMax": float(job["size_max"]),
     }
     for name, value in settings.items():
         gmsh.option.setNumber(name, value)

@@ -66,7 +66,6 @@ def mesh_outline(
     cache: Path | None = None,
     time_limit: float = 60.0,
     max_elements: int = 200_000,
-    size_max: float | None = None,
 ) -> Grid:
     """Mesh an outline with six-node triangles whose edge nodes are exactly the points of the outline.
 
@@ -84,8 +83,6 @@ def mesh_outline(
         Seconds after which the mesh generator is killed.
     max_elements : int
         Refuse outlines whose estimated number of elements is larger.
-    size_max : float, optional
-        Largest element size inside [m].
 
     Returns
     -------
@@ -99,29 +96,24 @@ def mesh_outline(
         libraries is missing, or when an element is inverted.
     """
     plan = check_outline(outline)
-    limit = np.inf if size_max is None else float(size_max)
-    if not limit > 0:
-        raise GridError(
-            "the element size must be positive", code="E-GRID-SIZE", value=size_max, limit="> 0 m"
-        )
-    expected = estimate_elements(plan, size_max=limit)
+    expected = estimate_elements(plan)
     if expected > max_elements:
         raise GridError(
             f"the grid would have about {expected:.3g} elements",
             code="E-GRID-COUNT",
             value=f"{expected:.3g}",
             limit=f"at most {max_elements}",
-            remedy="use fewer points along the outline or a larger element size",
+            remedy="use fewer points along the outline",
         )
     if cache is None:
-        return _mesh_plan(plan, limit, time_limit)
-    path = Path(cache) / f"{_content_hash(plan, limit)}.msh"
+        return _mesh_plan(plan, time_limit)
+    path = Path(cache) / f"{_content_hash(plan)}.msh"
     if path.exists():
         try:
             return _check_cached(read_grid(path), plan)
         except (StorageError, GridError):  # a damaged file in the cache is simply made again
             path.unlink(missing_ok=True)
-    grid = _mesh_plan(plan, limit, time_limit)
+    grid = _mesh_plan(plan, time_limit)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -151,7 +143,6 @@ def mesh_outlines(
     cache: Path | None = None,
     time_limit: float = 60.0,
     max_elements: int = 200_000,
-    size_max: float | None = None,
     processes: int | None = None,
 ) -> tuple[Grid, ...]:
     """Mesh several outlines at once, see `mesh_outline`; by default as many processes as cores.
@@ -163,43 +154,42 @@ def mesh_outlines(
     """
 
     def one(outline):
-        return mesh_outline(
-            outline, cache=cache, time_limit=time_limit, max_elements=max_elements, size_max=size_max
-        )
+        return mesh_outline(outline, cache=cache, time_limit=time_limit, max_elements=max_elements)
 
     with ThreadPoolExecutor(max_workers=processes or os.cpu_count() or 1) as pool:
         return tuple(pool.map(one, outlines))
 
 
-def _content_hash(plan, size_max):
+def _content_hash(plan):
     try:
         gmsh = metadata.version("gmsh")
     except metadata.PackageNotFoundError as error:
         raise _library_error("the package gmsh is not installed") from error
-    digest = hashlib.sha256(f"femgear grid {FORMAT} gmsh {gmsh} {size_max}".encode())
+    digest = hashlib.sha256(f"femgear grid {FORMAT} gmsh {gmsh}".encode())
     for array in (plan.points, plan.segments, plan.mids, *plan.loops):
         digest.update(np.ascontiguousarray(array).tobytes())
     digest.update("\0".join((*plan.names, "", *plan.faces)).encode())
     return digest.hexdigest()[:32]
 
 
-def _mesh_plan(plan, size_max, time_limit):
-    result = _run_gmsh(plan, size_max, time_limit)
+def _mesh_plan(plan, time_limit):
+    result = _run_gmsh(plan, time_limit)
     points = np.vstack([plan.points, result["points"][len(plan.points) :]])
     grid = _second_order(plan, points, result["triangles"], result["face"])
     check_grid(grid)
     return grid
 
 
-def _run_gmsh(plan, size_max, time_limit):
-    # Gmsh works with absolute tolerances: hand it an outline of unit size at the origin
+def _run_gmsh(plan, time_limit):
+    # Gmsh works with absolute tolerances: hand it an outline of unit size at the origin, with rounding
+    # errors removed so that they do not decide between equally good triangulations
     centre, size = plan.points.mean(axis=0), plan.size
+    unit = np.round((plan.points - centre) / size, 10)
     job = {
-        "points": (plan.points - centre) / size,
+        "points": unit,
         "segments": plan.segments,
         "loops": np.concatenate(plan.loops),
         "loop_ends": np.cumsum([len(loop) for loop in plan.loops]),
-        "size_max": min(size_max / size, 1e22),
         "time_limit": time_limit,
     }
     with tempfile.TemporaryDirectory(prefix="femgear-") as folder:

@@ -9,7 +9,7 @@ import numpy as np
 from femgear.errors import GridError
 
 CLOSE = 1e-9  # points nearer than this share of the size of the outline count as the same
-MAX_SEGMENTS = 20_000
+MAX_SEGMENTS = 5_000
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def check_outline(outline) -> Plan:
     _check_distinct(points, size)
     _check_crossing(points, segments, names, size)
     area = _area(points[segments[:n_boundary, 0]])
-    if abs(area) < 1e-9 * size**2:
+    if abs(area) < 1e-6 * size**2:
         raise GridError(
             f"the outline encloses an area of {area:.3e} m^2 in a box {size:.3e} m wide: a slit",
             code="E-GRID-AREA",
@@ -302,21 +302,11 @@ def _contains(points, segments, samples):
     return np.count_nonzero(spans & beyond, axis=1) % 2 == 1
 
 
-def estimate_elements(plan: Plan, *, size_max: float = np.inf) -> float:
+def estimate_elements(plan: Plan) -> float:
     """Rough number of triangles of a checked outline, before it is meshed.
 
     The area divided by that of an equilateral triangle of the local size, which is the mean length of
     the segments weighted with their length over their squared distance.
-
-    Parameters
-    ----------
-    plan : Plan
-    size_max : float
-        Largest element size inside [m].
-
-    Returns
-    -------
-    float
     """
     a, b = plan.points[plan.segments[:, 0]], plan.points[plan.segments[:, 1]]
     middle, length = 0.5 * (a + b), np.hypot(*(b - a).T)
@@ -328,6 +318,6 @@ def estimate_elements(plan: Plan, *, size_max: float = np.inf) -> float:
     for block in np.array_split(samples, 1 + len(samples) * len(length) // 2_000_000):
         block = block[_contains(plan.points, plan.segments[: plan.n_boundary], block)]
         weight = length / (((block[:, None] - middle) ** 2).sum(axis=2) + 0.25 * length**2)
-        size = np.minimum((weight * length).sum(axis=1) / weight.sum(axis=1), size_max)
+        size = (weight * length).sum(axis=1) / weight.sum(axis=1)
         count += float(np.sum(np.prod(step) / (0.25 * np.sqrt(3) * size**2)))
     return count + len(length)

@@ -1,5 +1,6 @@
 """Gears: involute relations, exact teeth, planetary sets (pure NumPy)."""
 
+from femgear.gears.checks import GeometryWarning, check_set
 from femgear.gears.gear import (
     BasicRack,
     Gear,
@@ -8,26 +9,21 @@ from femgear.gears.gear import (
     roll_length,
     tooth_thickness,
 )
-from femgear.gears.planetary import (
-    PlanetarySet,
-    Speeds,
-    Torques,
-    close_set,
-    equal_planet_angles,
-    orientations,
-    speeds,
-    torques,
-)
+from femgear.gears.motion import Orientations, Speeds, Torques, orientations, speeds, torques
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.tooth import HalfSector, half_sector
 
 __all__ = [
     "BasicRack",
     "Gear",
+    "GeometryWarning",
     "HalfSector",
+    "Orientations",
     "PinionCutter",
     "PlanetarySet",
     "Speeds",
     "Torques",
+    "check_set",
     "close_set",
     "equal_planet_angles",
     "half_sector",

@@ -38,6 +38,9 @@ class BasicRack:
     root_radius: float = 0.25
 
 
+ISO_53_C = BasicRack()
+
+
 @dataclass(frozen=True)
 class PinionCutter:
     """Pinion cutter that generates the gaps of an internal gear.

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from femgear.gears.fillet import (
+    ISO_53_C,
     BasicRack,
     CutterTip,
     PinionCutter,
@@ -29,6 +30,7 @@ __all__ = [
     "half_thickness_angle",
     "roll_length",
     "tooth_thickness",
+    "working_half_angles",
 ]
 
 
@@ -74,7 +76,7 @@ class Gear:
     face_width: float
     rim_radius: float
     internal: bool = False
-    rack: BasicRack = BasicRack()
+    rack: BasicRack = ISO_53_C
     cutter: PinionCutter | None = None
     tip_diameter: float | None = None
     root_diameter: float | None = None
@@ -190,6 +192,15 @@ def tooth_thickness(gear: Gear, radius):
 def roll_length(gear: Gear, radius):
     """Roll length ``sqrt(r^2 - r_b^2)`` [m] of flank points at a radius [m] (float or array)."""
     return roll(radius, gear.base_radius)
+
+
+def working_half_angles(one: Gear, two: Gear, angle: float) -> tuple[float, float]:
+    """Half-thickness angles [rad] of two gears on their working pitch circles, ``r_w = r_b / cos(angle)``."""
+    cosine = math.cos(angle)
+    return (
+        float(half_thickness_angle(one, one.base_radius / cosine)),
+        float(half_thickness_angle(two, two.base_radius / cosine)),
+    )
 
 
 def flank_points(gear: Gear, roll_lengths) -> np.ndarray:

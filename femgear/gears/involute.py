@@ -137,14 +137,12 @@ def angle_at_centre_distance(
     base = reference_centre_distance(teeth_1, teeth_2, module, internal=internal) * math.cos(pressure_angle)
     if not centre_distance >= base:
         raise GeometryError(
-            f"a centre distance of {centre_distance:.6g} is smaller than {base:.6g}, where the base circles of "
-            f"{teeth_1} and {teeth_2} teeth give cos(alpha_w) = {base / centre_distance:.6g} > 1"
-            if centre_distance > 0
-            else f"the centre distance {centre_distance:.6g} is not positive",
+            f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {teeth_1} and "
+            f"{teeth_2} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
             code="E-CENTRE-DISTANCE",
             key="set.centre_distance",
             value=centre_distance,
-            limit=f">= {base:.6g} m",
+            limit=f">= {base * 1e3:.6g} mm",
             remedy="increase the centre distance or reduce the tooth numbers or the module",
         )
     return pressure_angle_at(centre_distance, base)

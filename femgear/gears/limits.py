@@ -30,14 +30,19 @@ def check_gear(gear: Gear) -> None:
 
 
 def _refuse(gear: Gear, entry: str, message: str, *, code: str, value, limit: str, remedy: str):
+    key = entry if entry.startswith("rack.") else f"{gear.name}.{entry}"
     raise GeometryError(
-        message, code=code, key=f"{gear.name}.{entry}", value=value, limit=limit, remedy=remedy
+        f"{gear.name}: {message}", code=code, key=key, value=value, limit=limit, remedy=remedy
     )
+
+
+def _is_whole(value) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool | np.bool_)
 
 
 def _check_numbers(gear: Gear) -> None:
     """Types and ranges of the plain entries."""
-    if isinstance(gear.teeth, bool) or not isinstance(gear.teeth, int | np.integer):
+    if not _is_whole(gear.teeth):
         _refuse(
             gear,
             "teeth",
@@ -48,40 +53,59 @@ def _check_numbers(gear: Gear) -> None:
             remedy="give a whole number of teeth",
         )
     object.__setattr__(gear, "teeth", operator.index(gear.teeth))
+    unit_hint = "lengths are in m and angles in rad here: check the unit of the value"
     limits = (
-        ("teeth", "E-TEETH", *TEETH_RANGE, ""),
-        ("module", "E-MODULE", *MODULE_RANGE, " m"),
-        ("pressure_angle", "E-PRESSURE-ANGLE", *PRESSURE_ANGLE_RANGE, " rad"),
-        ("profile_shift", "E-SHIFT", -5.0, 5.0, " modules"),
-        ("face_width", "E-FACE-WIDTH", 1e-6, 10.0, " m"),
-        ("rim_radius", "E-RIM", 1e-6, 1000.0, " m"),
-        ("thickness_allowance", "E-ALLOWANCE", 0.0, gear.module, " m"),
+        ("teeth", "E-TEETH", *TEETH_RANGE, "", "larger gears would take hours: use fewer teeth"),
+        ("module", "E-MODULE", *MODULE_RANGE, " m", unit_hint),
+        ("pressure_angle", "E-PRESSURE-ANGLE", *PRESSURE_ANGLE_RANGE, " rad", unit_hint),
+        ("profile_shift", "E-SHIFT", -5.0, 5.0, " modules", "profile shifts are in modules, not in mm"),
+        ("face_width", "E-FACE-WIDTH", 1e-6, 10.0, " m", unit_hint),
+        ("rim_radius", "E-RIM", 1e-6, 1000.0, " m", unit_hint),
+        ("thickness_allowance", "E-ALLOWANCE", 0.0, gear.module, " m", "an allowance thins the tooth"),
     )
-    for entry, code, low, high, unit in limits:
+    for entry, code, low, high, unit, remedy in limits:
         value = getattr(gear, entry)
-        if not (math.isfinite(value) and low <= value <= high):
+        if not _within(value, low, high):
+            name = {"rim_radius": "outer_radius" if gear.internal else "bore_radius"}.get(entry, entry)
             _refuse(
                 gear,
-                entry,
-                f"{entry.replace('_', ' ')} {value:.6g}{unit} is outside {low:.6g} .. {high:.6g}{unit}",
+                name,
+                f"{name.replace('_', ' ')} {value}{unit} is outside {low:.6g} .. {high:.6g}{unit}",
                 code=code,
                 value=value,
                 limit=f"{low:.6g} .. {high:.6g}{unit}",
-                remedy="inside femgear lengths are in m and angles in rad: check the unit of the value",
+                remedy=remedy,
             )
-    for entry in ("addendum", "dedendum", "root_radius"):
+
+
+def _within(value, low: float, high: float) -> bool:
+    return isinstance(value, float | int | np.floating) and low <= value <= high
+
+
+def _check_rack(gear: Gear) -> None:
+    for entry, low in (("addendum", 0.05), ("dedendum", 0.05), ("root_radius", 0.0)):
         value = getattr(gear.rack, entry)
-        if not (
-            math.isfinite(value) and (0.0 <= value if entry == "root_radius" else 0.0 < value) and value <= 3
-        ):
+        if not _within(value, low, 3.0):
             _refuse(
                 gear,
                 f"rack.{entry}",
-                f"basic rack {entry.replace('_', ' ')} {value:.6g} modules",
+                f"basic rack with {entry.replace('_', ' ')} {value} modules",
                 code="E-RACK",
                 value=value,
-                limit="0 .. 3 modules",
-                remedy="ISO 53 profile C has 1.0, 1.25 and 0.25 modules",
+                limit=f"{low:g} .. 3 modules",
+                remedy="ISO 53 profile C has addendum 1, dedendum 1.25 and root_radius 0.25",
+            )
+    for entry in ("tip_diameter", "root_diameter"):
+        value = getattr(gear, entry)
+        if value is not None and not _within(value, 1e-6, 2000.0):
+            _refuse(
+                gear,
+                entry,
+                f"{entry.replace('_', ' ')} {value} m",
+                code="E-TIP",
+                value=value,
+                limit="a positive length",
+                remedy="leave it out to take that of the basic rack",
             )
 
 
@@ -89,11 +113,11 @@ def _check_circles(gear: Gear) -> None:
     """Order of the circles from the rim to the tip."""
     tip, root, rim = gear.tip_radius, gear.root_radius, gear.rim_radius
     sign = -1.0 if gear.internal else 1.0
-    if not sign * (tip - root) > 0.0 or not tip > 0.0:
+    if not (sign * (tip - root) > 0.0 and tip > 0.0):
         _refuse(
             gear,
             "tip_diameter",
-            f"the tip radius {tip * 1e3:.4f} mm and the root radius {root * 1e3:.4f} mm leave no tooth",
+            f"tip radius {tip * 1e3:.4f} mm and root radius {root * 1e3:.4f} mm leave no tooth",
             code="E-TIP",
             value=2.0 * tip,
             limit=f"tip diameter {'<' if gear.internal else '>'} {2e3 * root:.4f} mm",
@@ -110,7 +134,7 @@ def _check_circles(gear: Gear) -> None:
             limit=f"{'>' if gear.internal else '<'} {root * 1e3:.4f} mm",
             remedy="enlarge the outer radius" if gear.internal else "reduce the bore radius",
         )
-    if gear.internal and not tip > gear.base_radius:
+    if not tip > gear.base_radius:
         _refuse(
             gear,
             "tip_diameter",
@@ -127,26 +151,41 @@ def _check_tool(gear: Gear) -> None:
     """Room for the tool's rounding."""
     if gear.internal:
         _check_cutter(gear)
-    tool = gear.tool
-    offset = tool.centre_angle if gear.internal else tool.centre_offset / gear.module
-    if offset < -1e-12:
-        largest = _largest_rounding(gear)
+    room = _room(gear, None)
+    if room < -1e-12:
+        largest, rounding = _largest_rounding(gear), round(gear.tool.rounding / gear.module, 9)
         _refuse(
             gear,
             "rack.root_radius",
-            f"a tool tip rounding of {tool.rounding / gear.module:.4f} modules does not fit between the flanks of "
-            f"the tool; the largest is {largest:.4f}",
+            f"a tool tip rounding of {rounding:.4f} modules does not fit between the flanks of the tool"
+            + (f"; the largest is {largest:.4f}" if largest > 0.0 else ", nor does any other"),
             code="E-ROOT-RADIUS",
-            value=tool.rounding / gear.module,
+            value=rounding,
             limit=f"<= {largest:.4f} modules",
-            remedy="reduce root_radius (or the dedendum)",
+            remedy="reduce root_radius" if largest > 0.0 else "reduce the dedendum",
         )
+
+
+def _room(gear: Gear, rounding: float | None) -> float:
+    """Space left between the two rounded corners of the tool's tip, relative (negative: none)."""
+    tool = generating_tool(gear, rounding=rounding)
+    if not gear.internal:
+        return tool.centre_offset / gear.module
+    return tool.centre_angle if tool.centre_radius > tool.cutter_base_radius else -1.0
+
+
+def _largest_rounding(gear: Gear) -> float:
+    """Largest tool tip rounding [modules] that fits with the same root circle, by bisection."""
+    low, high = 0.0, 3.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _room(gear, middle) >= 0.0 else (low, middle)
+    return low
 
 
 def _check_cutter(gear: Gear) -> None:
     cutter = cutter_of(gear)
-    whole = isinstance(cutter.teeth, int | np.integer) and not isinstance(cutter.teeth, bool)
-    if not whole or not 5 <= cutter.teeth <= gear.teeth - 5:
+    if not (_is_whole(cutter.teeth) and 5 <= cutter.teeth <= gear.teeth - 5):
         _refuse(
             gear,
             "cutter_teeth",
@@ -161,58 +200,45 @@ def _check_cutter(gear: Gear) -> None:
         _refuse(
             gear,
             "cutter_teeth",
-            f"the rounding of the cutter's tip begins at {tool.centre_radius * 1e3:.4f} mm, inside the cutter's "
-            f"base circle of {tool.cutter_base_radius * 1e3:.4f} mm",
+            f"the rounding of the cutter's tip is centred at {tool.centre_radius * 1e3:.4f} mm, inside the "
+            f"cutter's base circle of {tool.cutter_base_radius * 1e3:.4f} mm",
             code="E-CUTTER",
             value=cutter.teeth,
             limit="tip radius - rounding > base radius of the cutter",
             remedy="choose a cutter with more teeth, or a smaller root_radius",
         )
-
-
-def _largest_rounding(gear: Gear) -> float:
-    """Largest tool tip rounding [modules] with the same root circle, by bisection."""
-    cutter = cutter_of(gear) if gear.internal else None
-
-    def room(value):
-        common = {
-            "teeth": gear.teeth,
-            "module": gear.module,
-            "pressure_angle": gear.pressure_angle,
-            "profile_shift": gear.profile_shift,
-            "root_radius": gear.root_radius,
-            "allowance": gear.thickness_allowance,
-            "rounding": value * gear.module,
-        }
-        if cutter is None:
-            return rack_tip(**common).centre_offset
-        tool = cutter_tip(cutter_teeth=cutter.teeth, cutter_shift=cutter.profile_shift, **common)
-        return tool.centre_angle if tool.centre_radius > tool.cutter_base_radius else -1.0
-
-    low, high = 0.0, 3.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if room(middle) >= 0.0 else (low, middle)
-    return low
+    start = tool.centre_distance * math.cos(tool.end_angle)  # gear roll at the cutter's base tangent point
+    if gear.tip_roll < start:
+        least = math.hypot(gear.base_radius, start)
+        _refuse(
+            gear,
+            "cutter_teeth",
+            f"a cutter of {cutter.teeth} teeth has no involute for the flank below {least * 1e3:.4f} mm; the "
+            f"tip circle is at {gear.tip_radius * 1e3:.4f} mm",
+            code="E-CUTTER",
+            value=cutter.teeth,
+            limit=f"tip radius >= {least * 1e3:.4f} mm",
+            remedy="choose a cutter with more teeth or enlarge the tip diameter",
+        )
 
 
 def _check_flank(gear: Gear) -> None:
-    """A tooth with a flank and a top land."""
-    if gear.tip_radius > gear.base_radius:
-        half = float(half_thickness_angle(gear, gear.tip_radius))
-        if half <= 0.0:
-            _refuse(
-                gear,
-                "profile_shift",
-                f"the tooth is pointed below its tip circle: thickness {2e3 * half * gear.tip_radius:.4f} mm at the "
-                f"tip radius {gear.tip_radius * 1e3:.4f} mm",
-                code="E-POINTED",
-                value=gear.profile_shift,
-                limit="tip thickness > 0",
-                remedy="reduce the profile shift or give a smaller tip_diameter",
-            )
+    """A tooth with a top land and a flank."""
+    involute = inv(pressure_angle_at(gear.tip_radius, gear.base_radius))
+    half = gear.base_half_angle + (involute if gear.internal else -involute)
+    if half <= 0.0:
+        _refuse(
+            gear,
+            "profile_shift",
+            f"the tooth is pointed below its tip circle: thickness {2e3 * half * gear.tip_radius:.4f} mm at "
+            f"the tip radius {gear.tip_radius * 1e3:.4f} mm",
+            code="E-POINTED",
+            value=gear.profile_shift,
+            limit="tip thickness > 0",
+            remedy="change the profile shift or give a tip_diameter that cuts the point off",
+        )
     sign = -1.0 if gear.internal else 1.0
-    if not (gear.tip_radius > gear.base_radius and sign * (gear.tip_roll - gear.form_roll) > 0.0):
+    if not sign * (gear.tip_roll - gear.form_roll) > 0.0:
         _refuse(
             gear,
             "tip_diameter",

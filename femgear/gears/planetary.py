@@ -1,8 +1,8 @@
-"""A planetary set: closure at one centre distance, meshes, phases, speeds and torques.
+"""A planetary set: closure at one centre distance, its meshes and their phases.
 
-Frame: the carrier's, planets at angles psi_n counter-clockwise from the x axis. Positive torque on the sun turns
-it counter-clockwise; relative to the carrier the planets and the ring then turn clockwise. Loaded flanks:
-left (counter-clockwise) of the sun on left of the planet, right of the planet on left of the ring.
+Frame: the carrier's, planets at angles psi_n counter-clockwise from the x axis. Positive torque on the sun
+turns it counter-clockwise; relative to the carrier the planets and the ring then turn clockwise. Loaded
+flanks: left (counter-clockwise) of the sun on left of the planet, right of the planet on left of the ring.
 Meshes j: "sun-planet 1" .. "sun-planet N", "planet 1-ring" .. "planet N-ring".
 """
 
@@ -10,16 +10,30 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears import involute
-from femgear.gears.gear import Gear, half_thickness_angle
+from femgear.gears.checks import BACKLASH_TOLERANCE, GeometryWarning, check_set
+from femgear.gears.gear import Gear, working_half_angles
+from femgear.gears.motion import Orientations, Speeds, Torques, orientations, speeds, torques
 
-MEMBERS = ("sun", "carrier", "ring")
-BACKLASH_TOLERANCE = 1e-5
-"""Normal backlash, in modules, that counts as none: what five decimals of a profile shift leave open."""
+__all__ = [
+    "GeometryWarning",
+    "Orientations",
+    "PlanetarySet",
+    "Speeds",
+    "Torques",
+    "check_set",
+    "close_set",
+    "equal_planet_angles",
+    "free_centre_distances",
+    "orientations",
+    "speeds",
+    "torques",
+]
 
 
 @dataclass(frozen=True)
@@ -37,8 +51,8 @@ class PlanetarySet:
     Raises
     ------
     GeometryError
-        Numbers that describe no set (E-PLANETS, E-ANGLES, E-ROLE, E-MODULE, E-CENTRE-DISTANCE); what can be made
-        and run is checked by `checks.check_set`.
+        Numbers that describe no set (E-PLANETS, E-ANGLES, E-ROLE, E-MODULE, E-CENTRE-DISTANCE); whether it
+        can be assembled and run is told by `checks.check_set`.
     """
 
     sun: Gear
@@ -80,13 +94,13 @@ class PlanetarySet:
 
     @property
     def contact_ratio_sun_planet(self) -> float:
-        """Transverse contact ratio from the tip circles."""
+        """Transverse contact ratio from the tip circles (and from what undercut leaves)."""
         start, end = self.path_sun_planet
         return (end - start) / self.base_pitch
 
     @property
     def contact_ratio_planet_ring(self) -> float:
-        """Transverse contact ratio from the tip circles."""
+        """Transverse contact ratio from the tip circles (and from what undercut leaves)."""
         start, end = self.path_planet_ring
         return (end - start) / self.base_pitch
 
@@ -97,17 +111,25 @@ class PlanetarySet:
 
     @property
     def path_sun_planet(self) -> tuple[float, float]:
-        """Path coordinates [m] of first (planet tip) and last (sun tip) contact, 0 at the pitch point."""
+        """Path coordinates [m] of first (planet tip) and last (sun tip) contact, 0 at the pitch point.
+
+        Undercut shortens the path to what is left of the involute.
+        """
         tangent = math.tan(self.working_pressure_angle_sun_planet)
-        start = self.planet.base_radius * tangent - self.planet.tip_roll
-        return start, self.sun.tip_roll - self.sun.base_radius * tangent
+        sun, planet = self.sun.base_radius * tangent, self.planet.base_radius * tangent
+        start = max(planet - self.planet.tip_roll, _undercut_roll(self.sun) - sun)
+        return start, min(self.sun.tip_roll - sun, planet - _undercut_roll(self.planet))
 
     @property
     def path_planet_ring(self) -> tuple[float, float]:
-        """Path coordinates [m] of first (ring tip) and last (planet tip) contact, 0 at the pitch point."""
+        """Path coordinates [m] of first (ring tip) and last (planet tip) contact, 0 at the pitch point.
+
+        Undercut shortens the path to what is left of the involute.
+        """
         tangent = math.tan(self.working_pressure_angle_planet_ring)
-        start = self.ring.tip_roll - self.ring.base_radius * tangent
-        return start, self.planet.tip_roll - self.planet.base_radius * tangent
+        planet, ring = self.planet.base_radius * tangent, self.ring.base_radius * tangent
+        start = max(self.ring.tip_roll - ring, _undercut_roll(self.planet) - planet)
+        return start, self.planet.tip_roll - planet
 
     @property
     def circumferential_backlash_sun_planet(self) -> float:
@@ -144,35 +166,6 @@ class PlanetarySet:
         sun_planet = -(psi - psi[0]) * self.sun.teeth / (2.0 * math.pi)
         planet_ring = sun_planet - _planet_lag(self)
         return _fraction(np.concatenate([sun_planet, planet_ring]))
-
-
-@dataclass(frozen=True)
-class Orientations:
-    """Angle [rad] of one tooth centreline of every body, about its own centre, in the carrier frame."""
-
-    sun: float
-    planets: tuple[float, ...]
-    ring: float
-
-
-@dataclass(frozen=True)
-class Speeds:
-    """Absolute speeds [rad/s] (planet: its own axis too) and mesh frequency [Hz]."""
-
-    sun: float
-    planet: float
-    ring: float
-    carrier: float
-    mesh_frequency: float
-
-
-@dataclass(frozen=True)
-class Torques:
-    """External torques [N m] on the three members; they add up to zero (no losses)."""
-
-    sun: float
-    ring: float
-    carrier: float
 
 
 def equal_planet_angles(planets: int) -> tuple[float, ...]:
@@ -215,9 +208,9 @@ def close_set(
     centre_distance : float, optional
         [m]; None takes the distance at which the given shifts run without play.
     find : tuple of str
-        Gears whose profile shift is to be found so that the mesh has no play before thickness allowances: one of
+        Gears whose profile shift is to be found so that the mesh has no play before thickness allowances:
         ("sun",), ("ring",), ("sun", "ring"), ("sun", "planet"), ("planet", "ring"), or () for none. Without a
-        centre distance one gear may be found; the mesh without it sets the distance.
+        centre distance one of sun and ring may be found; the mesh without it sets the distance.
 
     Returns
     -------
@@ -232,7 +225,6 @@ def close_set(
     _check_find(find, centre_distance)
     if centre_distance is None:
         centre_distance = _free_distance(sun, planet, ring, find)
-    alpha = sun.pressure_angle
     total = _required_shift(sun, planet, centre_distance)  # x_sun + x_planet
     difference = _required_shift(planet, ring, centre_distance)  # x_ring - x_planet
     x_sun, x_planet, x_ring = sun.profile_shift, planet.profile_shift, ring.profile_shift
@@ -252,7 +244,7 @@ def close_set(
 
 
 def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, float]:
-    """Centre distances [m] without play of sun-planet and planet-ring, from the shifts, without allowances."""
+    """Centre distances [m] without play of sun-planet and planet-ring, allowances left aside."""
     alpha = sun.pressure_angle
     out = []
     for one, two in ((sun, planet), (planet, ring)):
@@ -266,103 +258,15 @@ def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, f
     return out[0], out[1]
 
 
-def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations:
-    """Rotations of all bodies at a position, loaded flanks touching.
-
-    Parameters
-    ----------
-    planetary : PlanetarySet
-    position : float
-        tau, fraction of one mesh period (may exceed 1): the sun turns by ``+2 pi tau / z_s``, a planet by
-        ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``.
-
-    Returns
-    -------
-    Orientations
-    """
-    s = planetary
-    psi, phase = s.planet_angles, s.mesh_phases
-    eta_s, eta_p = _half_angles(s.sun, s.planet, s.working_pressure_angle_sun_planet)
-    _, eta_r = _half_angles(s.planet, s.ring, s.working_pressure_angle_planet_ring)
-    planets = tuple(
-        psi[n] + math.pi - eta_p - (position + phase[n]) * s.planet.pitch_angle for n in range(s.n_planets)
-    )
-    return Orientations(
-        sun=psi[0] - eta_s + position * s.sun.pitch_angle,
-        planets=planets,
-        ring=psi[0] - eta_r - (position + phase[s.n_planets]) * s.ring.pitch_angle,
-    )
-
-
-def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> Speeds:
-    """Speeds of every body from one driven and one held member (Willis).
-
-    Parameters
-    ----------
-    planetary : PlanetarySet
-    input, fixed : {"sun", "carrier", "ring"}
-        Driven and held member; they differ.
-    speed : float
-        Absolute speed of the driven member [rad/s].
-
-    Returns
-    -------
-    Speeds
-        ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)``; the mesh frequency is
-        ``|w_s - w_c| z_s / (2 pi)``.
-
-    Raises
-    ------
-    GeometryError
-        Not one input and one fixed member (E-MECHANISM), or a speed that is not finite.
-    """
-    _check_mechanism(input, fixed)
-    if not math.isfinite(speed):
-        raise GeometryError(
-            f"a speed of {speed} rad/s", code="E-VALUE", key="operation.speeds", value=speed, limit="finite"
-        )
-    zs, zp, zr = planetary.sun.teeth, planetary.planet.teeth, planetary.ring.teeth
-    known = {input: speed, fixed: 0.0}
-    # z_s w_s + z_r w_r - (z_s + z_r) w_c = 0
-    weight = {"sun": zs, "ring": zr, "carrier": -(zs + zr)}
-    (free,) = (member for member in MEMBERS if member not in known)
-    known[free] = -sum(weight[member] * value for member, value in known.items()) / weight[free]
-    relative = known["sun"] - known["carrier"]
-    return Speeds(
-        sun=known["sun"],
-        planet=known["carrier"] - relative * zs / zp,
-        ring=known["ring"],
-        carrier=known["carrier"],
-        mesh_frequency=abs(relative) * zs / (2.0 * math.pi),
-    )
-
-
-def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
-    """External torques [N m] on sun, ring and carrier from that on one of them, without losses.
-
-    ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``.
-
-    Raises
-    ------
-    GeometryError
-        Unknown member (E-MECHANISM) or a torque that is not finite (E-VALUE).
-    """
-    if member not in MEMBERS:
-        _mechanism_error(f"the torque acts on {member!r}", member)
-    if not math.isfinite(torque):
-        raise GeometryError(
-            f"a torque of {torque} N m", code="E-VALUE", key="operation.torque", value=torque, limit="finite"
-        )
-    ratio = planetary.ring.teeth / planetary.sun.teeth
-    share = {"sun": 1.0, "ring": ratio, "carrier": -(1.0 + ratio)}
-    sun = torque / share[member]
-    return Torques(sun=sun, ring=sun * share["ring"], carrier=sun * share["carrier"])
-
-
 def _fraction(value: np.ndarray) -> np.ndarray:
     """Part after the decimal point, with values a rounding error under one taken as zero."""
     part = np.mod(value, 1.0)
     return np.where(part > 1.0 - 1e-9, 0.0, np.where(part < 1e-9, 0.0, part))
+
+
+def _undercut_roll(gear: Gear) -> float:
+    """Roll length [m] where an undercut flank ends, minus infinity without undercut."""
+    return gear.form_roll if gear.undercut else -math.inf
 
 
 def _working_angle(one: Gear, two: Gear, distance: float) -> float:
@@ -371,17 +275,8 @@ def _working_angle(one: Gear, two: Gear, distance: float) -> float:
     )
 
 
-def _half_angles(one: Gear, two: Gear, angle: float) -> tuple[float, float]:
-    """Half-thickness angles [rad] of both gears at their working pitch circles."""
-    cosine = math.cos(angle)
-    return (
-        float(half_thickness_angle(one, one.base_radius / cosine)),
-        float(half_thickness_angle(two, two.base_radius / cosine)),
-    )
-
-
 def _backlash(one: Gear, two: Gear, angle: float) -> float:
-    eta_1, eta_2 = _half_angles(one, two, angle)
+    eta_1, eta_2 = working_half_angles(one, two, angle)
     r_1, r_2 = one.base_radius / math.cos(angle), two.base_radius / math.cos(angle)
     return one.pitch_angle * r_1 - 2.0 * (r_1 * eta_1 + r_2 * eta_2)
 
@@ -392,8 +287,12 @@ def _planet_lag(planetary: PlanetarySet) -> float:
     The planet tooth that touches the sun is centred at psi + pi - eta_ps, the one that touches the ring at
     psi + eta_pr; the planet turns by one pitch a period.
     """
-    _, eta_ps = _half_angles(planetary.sun, planetary.planet, planetary.working_pressure_angle_sun_planet)
-    eta_pr, _ = _half_angles(planetary.planet, planetary.ring, planetary.working_pressure_angle_planet_ring)
+    _, eta_ps = working_half_angles(
+        planetary.sun, planetary.planet, planetary.working_pressure_angle_sun_planet
+    )
+    eta_pr, _ = working_half_angles(
+        planetary.planet, planetary.ring, planetary.working_pressure_angle_planet_ring
+    )
     return (math.pi - eta_ps - eta_pr) / planetary.planet.pitch_angle
 
 
@@ -430,14 +329,15 @@ def _check_find(find: tuple[str, ...], centre_distance: float | None) -> None:
     allowed = {frozenset(), frozenset(("sun",)), frozenset(("ring",))}
     if centre_distance is not None:
         allowed |= {frozenset(p) for p in (("sun", "ring"), ("sun", "planet"), ("planet", "ring"))}
+    free = centre_distance is None
     if frozenset(find) not in allowed or len(set(find)) != len(find):
         raise GeometryError(
-            f"the profile shifts of {', '.join(find)} cannot be found "
-            f"{'without' if centre_distance is None else 'from'} a centre distance: two meshes give two conditions",
+            f"the profile shifts of {', '.join(find)} cannot be found {'without' if free else 'from'} a "
+            "centre distance: two meshes give two conditions",
             code="E-FIND",
             key="set.centre_distance",
             value=find,
-            limit="sun, ring" + ("" if centre_distance is None else ", or two of sun, planet, ring"),
+            limit="sun, ring" + ("" if free else ", or two of sun, planet, ring"),
             remedy="fix the other profile shifts",
         )
 
@@ -457,7 +357,7 @@ def _check_roles(planetary: PlanetarySet) -> None:
             mine, suns = getattr(gear, entry), getattr(sun, entry)
             if abs(mine - suns) > 1e-12 * suns:
                 raise GeometryError(
-                    f"{entry.replace('_', ' ')} {mine:.6g} of the {gear.name} differs from {suns:.6g} of the sun",
+                    f"{entry.replace('_', ' ')} of the {gear.name} is {mine:.6g}, of the sun {suns:.6g}",
                     code="E-MODULE",
                     key=f"{gear.name}.{entry}",
                     value=mine,
@@ -473,7 +373,7 @@ def _check_angles(angles: tuple[float, ...]) -> None:
     problem = None
     if not all(math.isfinite(a) for a in angles):
         problem = "contain a value that is not finite"
-    elif any(b - a < 1e-9 for a, b in zip(angles, angles[1:])):
+    elif any(b - a < 1e-9 for a, b in pairwise(angles)):
         problem = "are not in ascending order, or two of them are equal"
     elif angles[-1] - angles[0] > 2.0 * math.pi - 1e-9:
         problem = f"span {angles[-1] - angles[0]:.6g} rad, more than one turn (degrees taken for radians?)"
@@ -487,22 +387,3 @@ def _check_angles(angles: tuple[float, ...]) -> None:
             limit="ascending, different, within one turn",
             remedy="sort the angles; the case file takes them with a unit, such as '120 deg'",
         )
-
-
-def _check_mechanism(input: str, fixed: str) -> None:
-    for member in (input, fixed):
-        if member not in MEMBERS:
-            _mechanism_error(f"{member!r} is no member that can be driven or held", member)
-    if input == fixed:
-        _mechanism_error(f"the {input} is both driven and held, which leaves two members free", input)
-
-
-def _mechanism_error(message: str, value):
-    raise GeometryError(
-        message,
-        code="E-MECHANISM",
-        key="operation.fixed",
-        value=value,
-        limit="one driven, one held and one output member out of sun, carrier and ring",
-        remedy='for example input = "sun", fixed = "ring"',
-    )

@@ -25,14 +25,14 @@ class HalfSector:
     Parameters
     ----------
     curves : tuple of (str, (2 k + 1, 2) array)
-        Closed boundary, counter-clockwise: vertices in even rows, mid-side points in odd rows, all on the true
-        curves [m]; consecutive curves share end points exactly. Names: "symmetry" (x axis), "tip" (arc),
-        "flank" (involute), "fillet" (generated), "root" (arc; absent when the fillets meet), "cut" (radial line
-        at pi/z) and "rim" (arc at the rim radius).
+        Closed boundary, counter-clockwise: vertices in even rows, mid-side points in odd rows, all on the
+        true curves [m]; consecutive curves share end points exactly. Names: "symmetry" (x axis), "tip" (arc),
+        "flank" (involute), "fillet" (generated), "root" (arc; absent when the fillets meet), "cut" (radial
+        line at pi/z) and "rim" (arc at the rim radius).
     interfaces : tuple of (str, (2 k + 1, 2) array)
-        "tooth_base": arc from the symmetry line to the fillet that splits tooth and body. It ends at the fillet
-        vertex whose tangent is nearest to 45 deg from the arc, since an arc on the root circle itself would
-        touch the fillet at zero angle.
+        "tooth_base": arc from the symmetry line to the fillet that splits tooth and body. It ends at the
+        fillet vertex whose tangent is nearest to 45 deg from the arc, since an arc on the root circle itself
+        would touch the fillet at zero angle.
     regions : tuple of (str, (float, float))
         A point [m] inside each of "tooth" and "body".
     flank_roll : (2 n + 1,) array
@@ -140,8 +140,8 @@ def _last_edge(points: np.ndarray) -> float:
 def flank_end_roll(gear: Gear, flank_elements: int) -> float:
     """Roll length [m] where the curve "flank" ends: the form radius, or one element from the base circle.
 
-    Steps uniform in roll angle shrink to nothing at the base circle (edge length roll^2 / (2 rb)) and their mid
-    points drift to the quarter point there; that last bit of involute, some micrometres, goes to "fillet".
+    Steps uniform in roll angle shrink to nothing at the base circle (edge length roll^2 / (2 rb)) and their
+    mid points drift to the quarter point there; that bit of involute, some micrometres, goes to "fillet".
     """
     return max(gear.form_roll, gear.tip_roll / (flank_elements + 1))
 

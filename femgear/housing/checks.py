@@ -104,7 +104,7 @@ def motion_of(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> 
         )
     if not standing and not np.allclose(given, expected, rtol=1e-6, atol=0):
         raise CaseError(
-            "the mesh frequency is not that of a fixed ring: a sensor on the housing does not ride on a turning ring",
+            "the mesh frequency is not that of a fixed ring, and a housing sensor does not ride on another",
             code="E-SPEED",
             value=mesh_frequency,
             limit="z_ring |carrier_speed| / (2 pi)",

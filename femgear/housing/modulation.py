@@ -8,7 +8,15 @@ and the sensor stands still at the housing angle phi_s, so that it sees phi = ph
 the ring fixed omega_m = z_ring |Omega_c|: component (h, n) is heard at the carrier order
 h z_ring - sign(Omega_c) n. Two forms: exact (one line a component) and the Heaviside/linear form over P
 points of "Vibratory response of planetary gear sets housing by a spectral iterative approach -
-Modulation effects induced by carrier rotation", Eqs. (13)-(16).
+Modulation effects induced by carrier rotation", Eqs. (13)-(16), written out in time in `points`.
+
+Linear interpolation of exp(i n phi) between points first_point + 2 pi j / P is the sum over all
+integers q of sinc^2(m/P) exp(i m phi) exp(-i q P first_point) with m = n + q P and
+sinc(x) = sin(pi x)/(pi x): samples repeat a component with period P, the hat function weighs every
+copy with its transform. So n itself is attenuated by sinc^2(n/P) and has images at m weaker by (n/m)^2.
+The interpolated displacement has a kink whenever the sensor passes a point: its lines fall like
+1/order^2 and those of its second derivative do not fall at all. Where z_ring is a multiple of P the
+images of the static deformation (h = 0) fall on the mesh orders h z_ring - n themselves.
 """
 
 from __future__ import annotations
@@ -143,9 +151,7 @@ def fixed_sensor_lines(
     motion = motion_of(field, z_ring, carrier_speed, mesh_frequency)
     top = top_order(field, z_ring, max_order)
     heard = field * np.exp(1j * n * checked_angle(sensor_angle))
-    two_sided = np.zeros((*field.shape[:-2], 2 * top + 1), dtype=complex)
-    for h in range(field.shape[-2]):
-        _add(two_sided, heard[..., h, :], h * z_ring - motion.direction * n, motion.direction)
+    two_sided = _heard_orders(heard, z_ring, motion.direction, top)
     return SensorLines(
         np.arange(top + 1), _folded(two_sided), motion.base_speed, float(sensor_angle), int(z_ring), "exact"
     )
@@ -164,17 +170,9 @@ def heaviside_linear_lines(
 ) -> SensorLines:
     """Lines of the Heaviside/linear form over P points of the ring (paper Eqs. (13)-(16)), in closed form.
 
-    Linear interpolation of exp(i n phi) between points first_point + 2 pi j / P is the sum over all
-    integers q of sinc^2(m/P) exp(i m phi) exp(-i q P first_point) with m = n + q P and
-    sinc(x) = sin(pi x)/(pi x): samples repeat a component with period P, the hat function weighs every
-    copy with its transform. So n itself is attenuated by sinc^2(n/P), and has images at m = n + q P
-    weaker by (n/m)^2. Same lines as the Fourier series of `heaviside_linear`.
-
-    The interpolated displacement has a kink whenever the sensor passes a point: its lines fall like
-    1/order^2 and those of the acceleration do not fall at all, so the order range must be limited;
-    default (H + 1) z_ring, as in `fixed_sensor_lines`. P should be a multiple of the number of
-    planets (or the points break the symmetry of the set) and more than twice the largest n that matters
-    (see `unresolved_share`).
+    The acceleration has no natural end, see the head of this module: the order range is limited,
+    default (H + 1) z_ring. P should be a multiple of the number of planets (or the points break the
+    symmetry of the set) and more than twice the largest n that matters (`unresolved_share`).
 
     Parameters
     ----------
@@ -200,15 +198,11 @@ def heaviside_linear_lines(
     top = top_order(field, z_ring, max_order)
     away = checked_angle(sensor_angle) - checked_angle(first_point)
     sampled = _sampled_components(field, n, points, first_point)
-    two_sided = np.zeros((*field.shape[:-2], 2 * top + 1), dtype=complex)
-    order = np.arange(-top, top + 1)
-    for h in range(field.shape[-2]):
-        if motion.direction == 0:
-            standing = _between_points(sampled[..., h, :], points, away)
-            _add(two_sided, standing[..., None], np.array([h * z_ring]), 0)
-            continue
-        m = motion.direction * (h * z_ring - order)
-        two_sided += sampled[..., h, m % points] * (np.sinc(m / points) ** 2 * np.exp(1j * m * away))
+    if motion.direction == 0:
+        standing = _between_points(sampled, points, away)
+        two_sided = _heard_orders(standing[..., None], z_ring, 0, top)
+    else:
+        two_sided = _interpolated_orders(sampled, z_ring, motion.direction, top, away)
     method = f"linear, {points} points"
     lines = _folded(two_sided)
     return SensorLines(np.arange(top + 1), lines, motion.base_speed, float(sensor_angle), int(z_ring), method)
@@ -274,6 +268,19 @@ def _sampled_components(field: np.ndarray, n: np.ndarray, points: int, first_poi
     return sampled
 
 
+def _interpolated_orders(
+    sampled: np.ndarray, z_ring: int, direction: int, top: int, away: float
+) -> np.ndarray:
+    """Two-sided lines -top..top of the linear interpolation: components and all their images."""
+    points = sampled.shape[-1]
+    order = np.arange(-top, top + 1)
+    two_sided = np.zeros((*sampled.shape[:-2], order.size), dtype=complex)
+    for h in range(sampled.shape[-2]):
+        m = direction * (h * z_ring - order)
+        two_sided += sampled[..., h, m % points] * (np.sinc(m / points) ** 2 * np.exp(1j * m * away))
+    return two_sided
+
+
 def _between_points(sampled: np.ndarray, points: int, away: float) -> np.ndarray:
     """Value of the linear interpolation at the angle `away` from point 0."""
     at_points = np.fft.ifft(sampled, axis=-1) * points
@@ -282,14 +289,20 @@ def _between_points(sampled: np.ndarray, points: int, away: float) -> np.ndarray
     return (1 - (place - i)) * at_points[..., i % points] + (place - i) * at_points[..., (i + 1) % points]
 
 
-def _add(two_sided: np.ndarray, values: np.ndarray, order: np.ndarray, direction: int) -> None:
-    """Add values at their orders, in place; orders run over consecutive integers unless direction is 0."""
-    top = two_sided.shape[-1] // 2
-    inside = np.abs(order) <= top
+def _heard_orders(heard: np.ndarray, z_ring: int, direction: int, top: int) -> np.ndarray:
+    """Two-sided lines -top..top: every component added at order h z_ring - direction n."""
+    n_max = heard.shape[-1] // 2
+    two_sided = np.zeros((*heard.shape[:-2], 2 * top + 1), dtype=complex)
     if direction == 0:
-        two_sided[..., top + order[0]] += values.sum(axis=-1) if inside[0] else 0
-    else:
-        two_sided[..., top + order[inside]] += values[..., inside]
+        heard = heard.sum(axis=-1, keepdims=True)
+        n_max = 0
+    ascending = heard[..., ::-1] if direction > 0 else heard
+    for h in range(heard.shape[-2]):
+        low, high = h * z_ring - n_max, h * z_ring + n_max
+        first, last = max(low, -top), min(high, top)
+        if first <= last:
+            two_sided[..., top + first : top + last + 1] += ascending[..., h, first - low : last - low + 1]
+    return two_sided
 
 
 def _folded(two_sided: np.ndarray) -> np.ndarray:

@@ -17,9 +17,9 @@ from femgear.errors import CaseError, ContactError
 from femgear.system import MechanicalSystem, MeshExcitation
 
 if TYPE_CHECKING:
-    from femgear.contact.cycle import MeshCycle
     from femgear.fe.reduction import CyclicModes
-    from femgear.gears.planetary import PlanetarySet
+    from femgear.gears import PlanetarySet
+    from femgear.models.ring import RingModel
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,8 @@ def rigid_dofs(n_planets: int, motor: bool, brake: bool) -> tuple[str, ...]:
 
 def elastic_set(
     planetary_set: PlanetarySet,
-    ring: CyclicModes,
+    ring: RingModel,
     *,
-    ring_load_angle: float,
     sun: BodyData,
     carrier: BodyData,
     planet: BodyData,
@@ -91,10 +90,7 @@ def elastic_set(
     Parameters
     ----------
     planetary_set : PlanetarySet
-    ring : CyclicModes
-        Ring modes with one load: displacement into the ring body at a left flank.
-    ring_load_angle : float
-        Angle from the planet to the centre of the ring tooth that it loads [rad].
+    ring : RingModel
     sun, carrier, planet : BodyData
         Stiffness is the support of sun and carrier, and the bearing between a planet and the carrier.
     motor, brake : ShaftData, optional
@@ -105,24 +101,25 @@ def elastic_set(
     names = rigid_dofs(planetary_set.n_planets, motor is not None, brake is not None)
     place = {name: i for i, name in enumerate(names)}
     n_rigid = len(names)
-    paired = ring.paired
+    modes = ring.modes
+    paired = modes.paired
     ring_mode = np.repeat(np.arange(len(paired)), np.where(paired, 2, 1))
     ring_phase = np.concatenate([np.arange(2 if p else 1) for p in paired]).astype(int)
     n = n_rigid + len(ring_mode)
     M, K, W, load = np.zeros(n), np.zeros((n, n)), np.zeros((n, 2 * planetary_set.n_planets)), np.zeros(n)
     M[n_rigid:] = 1.0
-    K[range(n_rigid, n), range(n_rigid, n)] = (2 * np.pi * ring.frequency[ring_mode]) ** 2
+    K[range(n_rigid, n), range(n_rigid, n)] = (2 * np.pi * modes.frequency[ring_mode]) ** 2
     _place_bodies(M, K, place, planetary_set, sun, carrier, planet)
     _place_shafts(M, K, load, place, planetary_set, motor, brake, sun_torque)
     side = 1.0 if sun_torque >= 0 else -1.0
     rigid = np.zeros_like(W)
     _mesh_directions(rigid, place, planetary_set, side)
     W[:] = rigid
-    angles = np.asarray(planetary_set.planet_angles) + side * ring_load_angle
+    angles = np.asarray(planetary_set.planet_angles) + ring.load_angle
     n_p = planetary_set.n_planets
-    W[n_rigid:, n_p:] -= ring_displacement(ring, ring_mode, ring_phase, angles, side)
+    W[n_rigid:, n_p:] -= ring_displacement(modes, ring_mode, ring_phase, angles)
     ring_names = tuple(
-        f"ring: n={ring.nodal_diameter[m]} mode {m} {'sine' if p else 'cosine'}"
+        f"ring: n={modes.nodal_diameter[m]} mode {m} {'sine' if p else 'cosine'}"
         for m, p in zip(ring_mode, ring_phase)
     )
     system = MechanicalSystem(
@@ -132,20 +129,27 @@ def elastic_set(
         system=system,
         rigid_directions=rigid,
         ring_slice=slice(n_rigid, n),
-        ring_diameter=ring.nodal_diameter[ring_mode],
+        ring_diameter=modes.nodal_diameter[ring_mode],
         ring_phase=ring_phase,
         ring_mode=ring_mode,
         planet_angles=np.asarray(planetary_set.planet_angles),
     )
 
 
-def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles, side) -> np.ndarray:
-    """Displacement into the ring at its loaded flanks per unit ring coordinate, shape (coordinates, N)."""
-    # the right flank is the mirror image of the left one: the mirrored field at the mirrored angle
-    factor = ring.load[ring_mode, :1] * np.exp(1j * ring.nodal_diameter[ring_mode, None] * (side * angles))
+def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.ndarray:
+    """Displacement into the ring at its loaded flanks per unit ring coordinate, shape (coordinates, N).
+
+    Parameters
+    ----------
+    ring : CyclicModes
+    ring_mode, ring_phase : int arrays
+        Mode and kind (0 cosine, 1 sine) of every coordinate.
+    angles : (N,) array
+        Angles of the loaded teeth [rad].
+    """
+    factor = ring.load[ring_mode, :1] * np.exp(1j * ring.nodal_diameter[ring_mode, None] * angles)
     sine = ring_phase[:, None] == 1
-    value = ring.norm[ring_mode, None] * np.where(sine, factor.imag, factor.real)
-    return value
+    return ring.norm[ring_mode, None] * np.where(sine, factor.imag, factor.real)
 
 
 def _place_bodies(M, K, place, planetary_set, sun, carrier, planet):
@@ -222,11 +226,20 @@ def ring_mesh_compliance(harmonic_compliance, nodal_diameters, count, angles) ->
     return np.einsum("n,n,nij->ij", weight, np.asarray(harmonic_compliance), wave.conj()).real
 
 
-def mesh_excitation(cycle: MeshCycle, ring_compliance: np.ndarray, *, backlash) -> MeshExcitation:
+def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) -> MeshExcitation:
     """Mesh springs of the dynamic model: the static meshes less what the ring model keeps elastic.
 
     ``1/k_dyn = 1/k - c_jj`` for the tangent stiffness, and ``delta - C F`` for the deflection, with ``C`` the
     compliance of the dynamic ring between its mesh points, outer surface held.
+
+    Parameters
+    ----------
+    stiffness, deflection, force : (2N, P) arrays
+        Tangent stiffness [N/m], deflection [m] and force [N] of the static meshes.
+    ring_compliance : (N, N) array
+        See `ring_mesh_compliance` [m/N].
+    backlash : float or (2N,) array
+        [m].
 
     Raises
     ------
@@ -235,8 +248,9 @@ def mesh_excitation(cycle: MeshCycle, ring_compliance: np.ndarray, *, backlash) 
     ContactError
         When a mesh opens at some position, or the ring is softer than its mesh.
     """
-    N = len(cycle.force) // 2
-    if not cycle.force.any():
+    force, stiffness = np.asarray(force), np.asarray(stiffness)
+    N = len(force) // 2
+    if not force.any():
         raise CaseError(
             "without torque no tooth carries load, so there is no mesh stiffness for the dynamic model",
             code="E-NO-LOAD",
@@ -244,8 +258,9 @@ def mesh_excitation(cycle: MeshCycle, ring_compliance: np.ndarray, *, backlash) 
             limit="not zero for modes, dynamics and housing",
             remedy="give a torque, or run with --only static",
         )
-    if cycle.open_planets.any():
-        planets = np.flatnonzero(cycle.open_planets.any(axis=1)) + 1
+    opened = np.flatnonzero((stiffness <= 0).any(axis=1))
+    if len(opened):
+        planets = sorted(set(opened % N + 1))
         raise ContactError(
             f"planet {', '.join(map(str, planets))} carries nothing at some positions: the linear dynamic "
             "model cannot represent loss of contact",
@@ -254,17 +269,17 @@ def mesh_excitation(cycle: MeshCycle, ring_compliance: np.ndarray, *, backlash) 
         )
     own = np.zeros((2 * N, 1))
     own[N:, 0] = np.diag(ring_compliance)
-    remaining = 1.0 / cycle.stiffness - own
+    remaining = 1.0 / stiffness - own
     if remaining.min() <= 0:
         raise ContactError(
             "the compliance of the ring model exceeds that of the loaded mesh", code="E-RING-COMPLIANCE"
         )
-    deflection = np.array(cycle.deflection)
-    deflection[N:] -= ring_compliance @ cycle.force[N:]
+    spring = np.array(deflection)
+    spring[N:] -= ring_compliance @ force[N:]
     return MeshExcitation(
         stiffness=1.0 / remaining,
-        deflection=deflection,
-        force=cycle.force,
+        deflection=spring,
+        force=force,
         backlash=np.broadcast_to(np.asarray(backlash, float), (2 * N,)),
     )
 

@@ -43,7 +43,11 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     planets = [f"sun to ring over planet {p}" for p in static["planet"].values]
     position, overall = periodic(static["position"], static["ste_overall"] * 1e6)
     equal = np.abs(overall - overall[0]).max() <= 1e-6 * np.abs(overall).max()
-    rows = [("sun to ring over every planet (identical)", 0)] if equal else list(zip(planets, range(len(planets))))
+    rows = (
+        [("sun to ring over every planet (identical)", 0)]
+        if equal
+        else list(zip(planets, range(len(planets))))
+    )
     for i, (text, row) in enumerate(rows):
         right.plot(position, overall[row], label=text, **line_style(i + 2))
     label(right, POSITION, "sum of both meshes [µm]", "sun to ring")
@@ -117,10 +121,11 @@ def load_sharing(static: xr.Dataset) -> Figure:
 
 
 def tooth_loads(static: xr.Dataset) -> Figure:
-    """Load of every simultaneous tooth pair of one sun-planet and one planet-ring mesh.
+    """Load of one tooth pair from its first to its last contact, in a sun-planet and a planet-ring mesh.
 
-    The meshes shown are those of the first planet; the path coordinate of pair ``i`` is the position
-    plus ``i`` mesh periods, so that one curve follows one pair from its first to its last contact.
+    The simultaneous pairs of the dataset are one base pitch apart on the path of contact, so that
+    position plus pair number, in base pitches, strings them into the history of one pair. The meshes
+    are those of the first planet.
 
     Parameters
     ----------
@@ -131,27 +136,28 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     -------
     Figure
     """
-    figure, axes = new_figure(columns=2, width=9.5, sharex=True)
+    figure, axes = new_figure(columns=2, width=9.5, sharey=True)
     names = [str(name) for name in static["mesh"].values]
-    for ax, kind in zip(axes, ("sun-planet", "planet-ring")):
+    position = static["position"].values
+    for i, (ax, kind) in enumerate(zip(axes, ("sun-planet", "planet-ring"))):
         row = next(i for i, name in enumerate(names) if family(name) == kind)
-        load = static["tooth_load"].values[row]
-        force = static["mesh_force"].values[row]
-        position = static["position"].values
-        shown = [pair for pair in range(len(load)) if load[pair].max(initial=0.0) > 1e-9 * force.max(initial=0.0)]
-        for i, pair in enumerate(shown):
-            ax.plot(*periodic_gap(position, load[pair]), label=f"tooth pair {i + 1}", **line_style(i))
-        ax.plot(*periodic(position, force), color="0.45", linewidth=1.2, label="whole mesh")
-        ax.set_xlim(0, 1)
+        load, force = static["tooth_load"].values[row], static["mesh_force"].values[row]
+        path = (np.arange(len(load))[:, None] + position).ravel()
+        carried = np.flatnonzero(load.ravel() > 1e-9 * force.max(initial=0.0))
+        first, last = (carried[0], carried[-1]) if len(carried) else (0, load.size - 1)
+        shown = slice(max(first - 1, 0), last + 2)
+        ax.plot(
+            path[shown] - path[first],
+            load.ravel()[shown],
+            label=f"one tooth pair, {names[row]}",
+            **line_style(i),
+        )
+        ax.axhline(force.mean(), color="0.45", linewidth=1.0, linestyle=(0, (1, 2)), label="whole mesh, mean")
+        label(ax, "path since the first contact [base pitches]", title=names[row])
         ax.set_ylim(bottom=0)
-        label(ax, POSITION, "load along the line of action [N]", names[row])
-    legend_below(figure, columns=5)
+    label(axes[0], y="load along the line of action [N]")
+    legend_below(figure, columns=3)
     return figure
-
-
-def periodic_gap(position, values):
-    """A pair's load does not close at the end of the period: the next pair takes over."""
-    return np.asarray(position), np.asarray(values)
 
 
 def _draw(ax, names, position, values):

@@ -45,6 +45,7 @@ def new_figure(
         sharey=sharey,
         subplot_kw={"projection": "polar"} if polar else None,
     )
+    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.1)
     flat = list(axes.ravel())
     for ax in flat:
         ax.tick_params(labelsize=SIZE - 1)

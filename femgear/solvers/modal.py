@@ -236,7 +236,7 @@ def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
     if np.any(strain > _RIGID_TOLERANCE * size):
         mesh = int(np.argmax((strain - _RIGID_TOLERANCE * size).max(axis=1)))
         raise ConvergenceError(
-            f"a motion without stiffness strains mesh {mesh + 1}, whose mean stiffness is missing or far too small",
+            f"a motion without stiffness strains mesh {mesh + 1}: its mean stiffness is missing or too small",
             code="E-RIGID-MODE", remedy="give every mesh a mean stiffness",
         )  # fmt: skip
     work, size = np.abs(rigid.T @ system.load), np.abs(rigid).T @ np.abs(system.load)

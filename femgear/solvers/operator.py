@@ -75,7 +75,7 @@ def compliance(modes: Modes, omega: np.ndarray) -> np.ndarray:
     if np.any(infinite):
         mode = int(np.argwhere(infinite)[0][-1])
         raise ConvergenceError(
-            f"undamped resonance of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz: the response is infinite",
+            f"undamped resonance of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz: infinite response",
             code="E-RESONANCE", key="damping_ratio", value=float(modes.damping_ratio[mode]), limit="> 0",
             remedy="give the mode some damping or move the speed",
         )  # fmt: skip
@@ -121,7 +121,7 @@ def norm(deflection: np.ndarray) -> np.ndarray:
 
 
 def matrices(problem: HarmonicProblem) -> np.ndarray:
-    """``T G`` as real matrices (n_speeds, n L, n L) on interleaved real and imaginary parts, L = 2 (H + 1)."""
+    """``T G`` as matrices (n_speeds, n L, n L) on interleaved real and imaginary parts, L = 2 (H + 1)."""
     n, _, speeds, size = problem.receptance.shape
     product = problem.product.reshape(n, size, 2, 2 * size)
     columns = product[:, :, 0] + 1j * product[:, :, 1]
@@ -153,7 +153,13 @@ def solve_direct(problem: HarmonicProblem) -> np.ndarray:
             "the harmonic equations are singular: there is no periodic response at a parametric resonance",
             code="E-RESONANCE", remedy="give the modes some damping or move the speed",
         ) from error  # fmt: skip
-    return np.ascontiguousarray(solution[..., 0]).view(complex).reshape(speeds, n, size).transpose(1, 0, 2).copy()
+    return (
+        np.ascontiguousarray(solution[..., 0])
+        .view(complex)
+        .reshape(speeds, n, size)
+        .transpose(1, 0, 2)
+        .copy()
+    )
 
 
 def find_twins(signals: tuple[np.ndarray, ...]) -> Twins:

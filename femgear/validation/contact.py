@@ -43,7 +43,16 @@ def closed_forms() -> tuple[Row, ...]:
     return (
         printed("C1", HERTZ, roller + "half width [mm]", "6.2146279", 1e3 * nafems.half_width),
         printed("C1", HERTZ, roller + "peak pressure [MPa]", "3585.36223", 1e-6 * nafems.peak_pressure),
-        printed("C1", HERTZ, roller + "largest shear [MPa]", "1076.61", 1e-6 * shear, digits=2),
+        printed("C1", HERTZ, roller + "largest shear over peak", ".3002831", shear / nafems.peak_pressure),
+        printed("C1", HERTZ, roller + "its depth over half width", ".7861514", depth / nafems.half_width),
+        printed(
+            "C1",
+            HERTZ,
+            roller + "largest shear [MPa]",
+            "1076.61",
+            1e-6 * shear,
+            explanation="the printed ratio 0.3002831 times the printed peak 3585.36223 MPa is 1076.624 MPa",
+        ),
         printed("C1", HERTZ, roller + "depth of the largest shear [mm]", "4.8856", 1e3 * depth),
         printed("C2", HERTZ, pair + "half width [mm]", ".07162297", 1e3 * pinion.half_width),
         printed("C2", HERTZ, pair + "peak pressure [MPa]", "888.848552", 1e-6 * pinion.peak_pressure),

@@ -11,15 +11,15 @@ from femgear.fe.grid import Grid
 Mapping = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def mapped_grid(mapping: Mapping, cells_u: int, cells_v: int, *, closed: bool = False) -> Grid:
+def mapped_grid(mapping: Mapping, u_lines, v_lines, *, closed: bool = False) -> Grid:
     """Grid of the image of the unit square, two triangles a cell, every node on the mapping.
 
     Parameters
     ----------
     mapping : callable
         Turns arrays ``u, v`` in [0, 1] into ``x, y`` [m]; must keep the orientation.
-    cells_u, cells_v : int
-        Number of cells in both directions.
+    u_lines, v_lines : int or array
+        Number of equal cells in each direction, or the values of ``u``, ``v`` between them, 0 and 1 included.
     closed : bool
         Whether ``v = 1`` is the same curve as ``v = 0`` (a full ring).
 
@@ -29,8 +29,10 @@ def mapped_grid(mapping: Mapping, cells_u: int, cells_v: int, *, closed: bool = 
         With the boundaries ``"u=0"``, ``"u=1"`` and, unless closed, ``"v=0"``, ``"v=1"``, the body to
         the left of each edge.
     """
+    u_stations, v_stations = _stations(u_lines), _stations(v_lines)
+    cells_u, cells_v = len(u_stations) // 2, len(v_stations) // 2
     lines_u, lines_v = 2 * cells_u + 1, 2 * cells_v + (0 if closed else 1)
-    v, u = np.meshgrid(np.arange(lines_v) / (2 * cells_v), np.linspace(0.0, 1.0, lines_u), indexing="ij")
+    v, u = np.meshgrid(v_stations[:lines_v], u_stations, indexing="ij")
     points = np.stack(mapping(u, v), axis=-1).reshape(-1, 2)
 
     def node(i, j):
@@ -55,6 +57,15 @@ def mapped_grid(mapping: Mapping, cells_u: int, cells_v: int, *, closed: bool = 
         boundaries["v=1"] = edges(along_u[::-1] + 2, 2 * cells_v, -1, 0)
     triangles = np.vstack([lower, upper])
     return Grid(points, triangles, boundaries, {"body": np.arange(len(triangles))})
+
+
+def _stations(lines):
+    """Corner values with their middles in between: a shifted middle would cost an order of accuracy."""
+    corners = np.linspace(0.0, 1.0, lines + 1) if np.ndim(lines) == 0 else np.asarray(lines, dtype=float)
+    stations = np.empty(2 * len(corners) - 1)
+    stations[::2] = corners
+    stations[1::2] = 0.5 * (corners[1:] + corners[:-1])
+    return stations
 
 
 def ring_mapping(inner: float, outer: float, angle: float = 2 * np.pi) -> Mapping:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-import tempfile
 from collections import Counter
 from pathlib import Path
 
-from femgear.errors import StorageError
+from femgear.files import storage_errors, write_text
 from femgear.validation.rows import ROUNDING, Row
 from femgear.validation.run import Validation
 
@@ -43,6 +42,8 @@ def markdown(validation: Validation) -> str:
     order = ("passes", "FAILS", "differs", "information")
     tally = ", ".join(f"{verdicts[name]} {name}" for name in order if verdicts[name])
     parts = [INTRODUCTION.format(rounding=ROUNDING), f"{len(validation.rows)} rows: {tally}.\n"]
+    if validation.quick:
+        parts.append("Quick validation: what takes long was left out.\n")
     for theme in validation.themes:
         parts.append(f"## {theme.title}\n")
         if theme.introduction:
@@ -78,7 +79,7 @@ def summary(validation: Validation) -> str:
     return "\n".join([*lines, f"{len(validation.rows)} rows: {counted}"])
 
 
-def write_page(validation: Validation, path: str | os.PathLike) -> Path:
+def write_page(validation: Validation, path: str | os.PathLike) -> None:
     """Write the page, whole or not at all.
 
     Parameters
@@ -87,34 +88,14 @@ def write_page(validation: Validation, path: str | os.PathLike) -> Path:
     path : path
         File to write; its folder is made when missing.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     StorageError
         When the file cannot be written; an older file stays as it was.
     """
-    path = Path(path)
-    temporary = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=path.name, dir=path.parent)
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(markdown(validation))
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        raise StorageError(
-            f"the validation page cannot be written: {error.strerror}",
-            code="E-WRITE",
-            file=str(path),
-            remedy="name a file in a folder that can be written with -o",
-        ) from error
-    return path
+    with storage_errors(path):
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+    write_text(markdown(validation), path)
 
 
 def _cell(text: str) -> str:
@@ -129,6 +110,13 @@ def _number(value: float, decimals: int | None = None) -> str:
     if decimals is not None:
         return f"{value:.{decimals}f}"
     return f"{value:.8g}"
+
+
+def _size(value: float) -> str:
+    """A quantity that should vanish: rounding differs between machines, so small ones by their decade."""
+    if abs(value) >= 1e-5:
+        return f"{value:.2g}"
+    return f"< 1e{math.floor(math.log10(abs(value))) + 1}"
 
 
 def _decimals(row: Row) -> int | None:
@@ -147,10 +135,12 @@ def _reference(row: Row) -> str:
 def _ours(row: Row) -> str:
     if not math.isfinite(row.ours):
         return "none"
-    if (row.reference is None or row.reference == 0) and abs(row.ours) < ROUNDING:
+    if row.ours == 0:
+        return "0"
+    if row.reference is None and abs(row.ours) < ROUNDING:
         return f"< {ROUNDING:g}"
     if row.reference is None:
-        return f"{row.ours:.2g}"
+        return _size(row.ours)
     return _number(row.ours, _decimals(row))
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from femgear.errors import FemgearError
 from femgear.validation.rows import Row
 
-Progress = Callable[[str], None]
+Progress = Callable[[str, float, float], None]
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Validation:
-    """All tables of one validation."""
+    """All tables of one validation, and whether what takes long was left out."""
 
     themes: tuple[Table, ...]
+    quick: bool = False
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -73,7 +74,7 @@ def run_validation(
     quick : bool
         Leave out the parts that take long.
     progress : callable, optional
-        Called with the name of every part before it is computed.
+        Called as ``progress(theme, done, total)`` before and after every part.
 
     Returns
     -------
@@ -82,13 +83,16 @@ def run_validation(
     """
     tables = []
     for theme in themes:
+        parts = theme.parts if quick else theme.parts + theme.slow_parts
         rows: list[Row] = []
-        for part in theme.parts if quick else theme.parts + theme.slow_parts:
+        for done, part in enumerate(parts):
             if progress is not None:
-                progress(f"{theme.name}: {part.__name__.replace('_', ' ')}")
+                progress(theme.name, done, len(parts))
             rows.extend(_rows_of(theme, part))
+        if progress is not None:
+            progress(theme.name, len(parts), len(parts))
         tables.append(Table(theme.title, theme.introduction, tuple(rows)))
-    return Validation(tuple(tables))
+    return Validation(tuple(tables), quick)
 
 
 def _rows_of(theme, part):

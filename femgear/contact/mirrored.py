@@ -1,0 +1,53 @@
+"""The other flanks: a negative torque is the mirror image of a set under a positive one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from femgear.contact.cycle import MeshCycle, walk_mesh_cycle
+
+
+def mirrored_set(planetary_set):
+    """The set seen from behind, and the place of each of its planets in the original one.
+
+    Returns
+    -------
+    PlanetarySet
+        Planet angles counted the other way round, ascending from the first planet.
+    order : (N,) int array
+        Mirrored planet ``i`` is original planet ``order[i]``.
+    """
+    angles = np.asarray(planetary_set.planet_angles)
+    turned = np.mod(angles[0] - angles, 2 * np.pi)
+    order = np.argsort(turned, kind="stable")
+    return replace(planetary_set, planet_angles=tuple(angles[0] + turned[order])), order
+
+
+def walk_either_flank(planetary_set, bodies, *, sun_torque, progress=None, **options) -> MeshCycle:
+    """`walk_mesh_cycle` for a torque of either sign; results keep the order of planets and positions.
+
+    For a negative torque the right flanks of the sun carry. Position zero is then where the right flanks of
+    "sun-planet 1" touch at the pitch point, and positions still run with the rotation of the sun.
+    """
+    if sun_torque >= 0:
+        return walk_mesh_cycle(planetary_set, bodies, sun_torque=sun_torque, progress=progress, **options)
+    mirrored, order = mirrored_set(planetary_set)
+    cycle = walk_mesh_cycle(mirrored, bodies, sun_torque=-sun_torque, progress=progress, **options)
+    N, P = len(order), len(cycle.position)
+    back = np.empty(N, int)
+    back[order] = np.arange(N)
+    mesh, position = np.concatenate([back, back + N]), -np.arange(P) % P
+    return replace(
+        cycle,
+        deflection=cycle.deflection[mesh][:, position],
+        force=cycle.force[mesh][:, position],
+        stiffness=cycle.stiffness[mesh][:, position],
+        # the pair that comes first along the path leaves first when the rotation is seen from behind
+        tooth_load=cycle.tooth_load[mesh][:, ::-1][:, :, position],
+        max_pressure=cycle.max_pressure[mesh][:, position],
+        open_planets=cycle.open_planets[back][:, position],
+        residual=cycle.residual[position],
+        iterations=cycle.iterations[position],
+    )

@@ -1,0 +1,197 @@
+"""Results as xarray datasets: what goes to disk, every variable with its units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.analysis import DynamicsResult, HousingResult, ModesResult, StaticResult
+
+RPM = np.pi / 30.0
+
+
+def _variable(dims, values, units, long_name):
+    return dims, np.asarray(values), {"units": units, "long_name": long_name}
+
+
+def static_dataset(result: StaticResult) -> xr.Dataset:
+    """Contents of static.nc."""
+    import xarray as xr
+
+    cycle, gears = result.cycle, result.planetary_set
+    mesh_position = ("mesh", "position")
+    teeth = cycle.tooth_load.shape[1]
+    variables = {
+        "ste": (mesh_position, cycle.deflection, "m", "static transmission error of the mesh"),
+        "ste_overall": (
+            ("planet", "position"), cycle.overall_deflection, "m", "static transmission error from sun to ring",
+        ),
+        "mesh_force": (mesh_position, cycle.force, "N", "mesh force along the line of action"),
+        "mesh_stiffness": (mesh_position, cycle.stiffness, "N/m", "tangent mesh stiffness"),
+        "mesh_stiffness_secant": (mesh_position, cycle.secant_stiffness, "N/m", "secant mesh stiffness"),
+        "tooth_load": (("mesh", "tooth", "position"), cycle.tooth_load, "N", "load of a tooth pair"),
+        "load_share": (("planet", "position"), cycle.load_share, "1", "share of the planet in the torque"),
+        "max_pressure": (mesh_position, cycle.max_pressure, "Pa", "largest contact pressure"),
+        "residual": (("position",), cycle.residual, "1", "residual of contact conditions and equilibrium"),
+        "iterations": (("position",), cycle.iterations, "1", "steps of the active set"),
+    }
+    return xr.Dataset(
+        {name: _variable(*entry) for name, entry in variables.items()},
+        coords={
+            "mesh": _variable(("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+            "position": _variable(("position",), cycle.position, "1", "fraction of one mesh period"),
+            "planet": _variable(("planet",), np.arange(1, gears.n_planets + 1), "1", "planet"),
+            "tooth": _variable(("tooth",), np.arange(teeth), "1", "tooth pair in the order of the path"),
+        },
+        attrs={
+            "title": "static transmission error, load sharing and mesh stiffness",
+            "contact_ratio_sun_planet": gears.contact_ratio_sun_planet,
+            "contact_ratio_planet_ring": gears.contact_ratio_planet_ring,
+            "working_pressure_angle_sun_planet": gears.working_pressure_angle_sun_planet,
+            "working_pressure_angle_planet_ring": gears.working_pressure_angle_planet_ring,
+            "mesh_phases": np.asarray(gears.mesh_phases),
+            "planet_angles": np.asarray(gears.planet_angles),
+            "centre_distance": gears.centre_distance,
+            "face_width": gears.sun.face_width,
+            "teeth": np.array([gears.sun.teeth, gears.planet.teeth, gears.ring.teeth]),
+            "sun_torque": result.sun_torque,
+            "contact": cycle.contact,
+            "pressure_cells": cycle.unknowns,
+            "unknowns": np.array([b.unknowns for b in (result.bodies.sun, result.bodies.planet, result.bodies.ring)]),
+            "message": cycle.message,
+        },
+    )
+
+
+def modes_dataset(result: ModesResult) -> xr.Dataset:
+    """Contents of modes.nc."""
+    import xarray as xr
+
+    from femgear.models.elastic import ring_field
+    from femgear.models.ring import RADIAL, TANGENTIAL
+
+    modes, model, n_max = result.modes, result.model, result.max_diameter
+    coordinates = modes.shape[model.ring_slice].T
+    variables = {
+        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
+        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
+        "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
+        "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "dominant nodal diameter of the ring"),
+        "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+        "mesh_stiffness": (("mesh",), modes.mesh_stiffness, "N/m", "mean mesh stiffness, ring taken out"),
+        "mesh_deflection": (("mesh", "mode"), modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
+    }
+    for name, output in (("ring_shape", RADIAL), ("ring_tangential_shape", TANGENTIAL)):
+        field = ring_field(model, result.ring.modes, coordinates, output, n_max)
+        words = f"outer {'radial' if output == RADIAL else 'tangential'} displacement, component exp(i n phi)"
+        for part in ("real", "imag"):
+            values = getattr(field, part)
+            variables[f"{name}_{part}"] = (("mode", "circumferential"), values, "kg^-1/2", words)
+    n_meshes = len(modes.mesh_stiffness)
+    return xr.Dataset(
+        {name: _variable(*entry) for name, entry in variables.items()},
+        coords={
+            "mode": _variable(("mode",), np.arange(len(modes.frequency)), "1", "mode"),
+            "dof": _variable(("dof",), list(modes.dofs), "1", "degree of freedom"),
+            "mesh": _variable(("mesh",), _mesh_names(n_meshes // 2), "1", "gear mesh"),
+            "circumferential": _variable(
+                ("circumferential",), np.arange(-n_max, n_max + 1), "1", "signed nodal diameter n"
+            ),
+        },
+        attrs={
+            "title": "modal basis with mean mesh stiffnesses",
+            "unknowns": len(model.system.M),
+            "planet_angles": model.planet_angles,
+        },
+    )
+
+
+def dynamics_dataset(result: DynamicsResult) -> xr.Dataset:
+    """Contents of dynamics.nc."""
+    import xarray as xr
+
+    response, stability = result.response, result.stability
+    speed, lines = ("speed",), ("speed", "mesh", "harmonic")
+    field = ("speed", "harmonic", "circumferential")
+    n_max = result.ring_radial.shape[-1] // 2
+    variables = {
+        "mesh_frequency": (speed, response.mesh_frequency, "Hz", "mesh frequency"),
+        "carrier_speed": (speed, [s.carrier for s in result.speeds], "rad/s", "speed of the carrier"),
+        "converged": (speed, response.converged, "1", "whether the solution satisfies its tolerance"),
+        "iterations": (speed, response.iterations, "1", "iterations of the fixed point"),
+        "residual": (speed, response.residual, "1", "relative residual of the harmonic equations"),
+        "spectral_radius": (speed, response.spectral_radius, "1", "spectral radius of the fixed point"),
+        "tail": (speed, response.tail, "1", "share of the amplitude in the upper half of the harmonics"),
+        "method": (speed, list(response.method), "1", "method of solution"),
+        "floquet_multiplier": (speed, np.abs(stability.multiplier), "1", "largest Floquet multiplier"),
+        "stable": (speed, stability.stable, "1", "whether no perturbation grows"),
+    }
+    for name, dims, values, units, words in (
+        ("dte", lines, result.dte, "m", "dynamic transmission error"),
+        ("mesh_force", lines, response.force, "N", "dynamic mesh force"),
+        ("mesh_deflection", lines, response.deflection, "m", "deflection of the mesh spring"),
+        ("ring", field, result.ring_radial, "m", "outer radial displacement of the ring"),
+        ("ring_tangential", field, result.ring_tangential, "m", "outer tangential displacement of the ring"),
+    ):
+        variables[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
+        variables[f"{name}_imag"] = (dims, values.imag, units, f"{words}, imaginary part")
+    rpm = np.array([s.sun if s.sun else s.carrier for s in result.speeds]) / RPM
+    return xr.Dataset(
+        {name: _variable(*entry) for name, entry in variables.items()},
+        coords={
+            "speed": _variable(speed, rpm, "rpm", "speed of the input"),
+            "mesh": _variable(("mesh",), list(result.mesh_names), "1", "gear mesh"),
+            "harmonic": _variable(
+                ("harmonic",), np.arange(response.force.shape[-1]), "1", "harmonic of the mesh frequency"
+            ),
+            "circumferential": _variable(
+                ("circumferential",), np.arange(-n_max, n_max + 1), "1", "signed nodal diameter n"
+            ),
+        },
+        attrs={
+            "title": "periodic response by the spectral method",
+            "message": response.message,
+            "ring_teeth": result.ring_teeth,
+            "fourier_convention": "x(t) = Re sum_h X_h exp(i h omega t)",
+        },
+    )
+
+
+def housing_dataset(result: HousingResult) -> xr.Dataset:
+    """Contents of housing.nc."""
+    import xarray as xr
+
+    signal, speed = result.signal, ("speed",)
+    order = ("speed", "order")
+    variables = {
+        "seconds": (("speed", "time"), signal.seconds, "s", "time"),
+        "acceleration": (("speed", "time"), signal.acceleration, "m/s^2", "radial acceleration at the sensor"),
+        "displacement": (("speed", "time"), signal.displacement, "m", "radial displacement at the sensor"),
+        "order_amplitude": (
+            order, np.abs(result.linear.acceleration), "m/s^2", f"acceleration, linear over {result.points} points",
+        ),
+        "order_amplitude_exact": (order, np.abs(result.exact.acceleration), "m/s^2", "acceleration, exact lines"),
+        "order_phase_exact": (order, np.angle(result.exact.displacement), "rad", "displacement phase, exact lines"),
+    }
+    return xr.Dataset(
+        {name: _variable(*entry) for name, entry in variables.items()},
+        coords={
+            "speed": _variable(speed, result.input_speed / RPM, "rpm", "speed of the input"),
+            "time": _variable(("time",), signal.revolution, "1", "fraction of one carrier revolution"),
+            "order": _variable(("order",), result.linear.order, "1", "carrier order"),
+        },
+        attrs={
+            "title": "what a sensor fixed on the housing hears",
+            "sensor_angle": result.linear.sensor_angle,
+            "points": result.points,
+            "ring_teeth": result.linear.z_ring,
+        },
+    )
+
+
+def _mesh_names(n: int) -> list[str]:
+    return [f"sun-planet {i + 1}" for i in range(n)] + [f"planet {i + 1}-ring" for i in range(n)]

@@ -1,0 +1,155 @@
+"""Where the bodies of a planetary set stand, how fast they turn and what torques they carry."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from femgear.errors import GeometryError
+from femgear.gears.gear import working_half_angles
+
+if TYPE_CHECKING:
+    from femgear.gears.planetary import PlanetarySet
+
+MEMBERS = ("sun", "carrier", "ring")
+
+
+@dataclass(frozen=True)
+class Orientations:
+    """Angle [rad] of one tooth centreline of every body, about its own centre, in the carrier frame."""
+
+    sun: float
+    planets: tuple[float, ...]
+    ring: float
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """Absolute speeds [rad/s] (planet: its own axis too) and mesh frequency [Hz]."""
+
+    sun: float
+    planet: float
+    ring: float
+    carrier: float
+    mesh_frequency: float
+
+
+@dataclass(frozen=True)
+class Torques:
+    """External torques [N m] on the three members; they add up to zero (no losses)."""
+
+    sun: float
+    ring: float
+    carrier: float
+
+
+def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations:
+    """Rotations of all bodies at a position, loaded flanks touching.
+
+    Parameters
+    ----------
+    planetary : PlanetarySet
+    position : float
+        tau, fraction of one mesh period (may exceed 1): the sun turns by ``+2 pi tau / z_s``, a planet by
+        ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``.
+
+    Returns
+    -------
+    Orientations
+    """
+    s = planetary
+    psi, phase = s.planet_angles, s.mesh_phases.tolist()
+    eta_s, eta_p = working_half_angles(s.sun, s.planet, s.working_pressure_angle_sun_planet)
+    _, eta_r = working_half_angles(s.planet, s.ring, s.working_pressure_angle_planet_ring)
+    pitch_p = s.planet.pitch_angle
+    planets = tuple(psi[n] + math.pi - eta_p - (position + phase[n]) * pitch_p for n in range(s.n_planets))
+    return Orientations(
+        sun=psi[0] - eta_s + position * s.sun.pitch_angle,
+        planets=planets,
+        ring=psi[0] - eta_r - (position + phase[s.n_planets]) * s.ring.pitch_angle,
+    )
+
+
+def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> Speeds:
+    """Speeds of every body from one driven and one held member (Willis).
+
+    Parameters
+    ----------
+    planetary : PlanetarySet
+    input, fixed : {"sun", "carrier", "ring"}
+        Driven and held member; they differ.
+    speed : float
+        Absolute speed of the driven member [rad/s].
+
+    Returns
+    -------
+    Speeds
+        ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)``; the mesh frequency is
+        ``|w_s - w_c| z_s / (2 pi)``.
+
+    Raises
+    ------
+    GeometryError
+        Not one input and one fixed member (E-MECHANISM), or a speed that is not finite.
+    """
+    _check_mechanism(input, fixed)
+    if not math.isfinite(speed):
+        raise GeometryError(
+            f"a speed of {speed} rad/s", code="E-VALUE", key="operation.speeds", value=speed, limit="finite"
+        )
+    zs, zp, zr = planetary.sun.teeth, planetary.planet.teeth, planetary.ring.teeth
+    known = {input: speed, fixed: 0.0}
+    # z_s w_s + z_r w_r - (z_s + z_r) w_c = 0
+    weight = {"sun": zs, "ring": zr, "carrier": -(zs + zr)}
+    (free,) = (member for member in MEMBERS if member not in known)
+    known[free] = -sum(weight[member] * value for member, value in known.items()) / weight[free]
+    relative = known["sun"] - known["carrier"]
+    return Speeds(
+        sun=known["sun"],
+        planet=known["carrier"] - relative * zs / zp,
+        ring=known["ring"],
+        carrier=known["carrier"],
+        mesh_frequency=abs(relative) * zs / (2.0 * math.pi),
+    )
+
+
+def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
+    """External torques [N m] on sun, ring and carrier from that on one of them, without losses.
+
+    ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``.
+
+    Raises
+    ------
+    GeometryError
+        Unknown member (E-MECHANISM) or a torque that is not finite (E-VALUE).
+    """
+    if member not in MEMBERS:
+        _mechanism_error(f"the torque acts on {member!r}", member)
+    if not math.isfinite(torque):
+        raise GeometryError(
+            f"a torque of {torque} N m", code="E-VALUE", key="operation.torque", value=torque, limit="finite"
+        )
+    ratio = planetary.ring.teeth / planetary.sun.teeth
+    share = {"sun": 1.0, "ring": ratio, "carrier": -(1.0 + ratio)}
+    sun = torque / share[member]
+    return Torques(sun=sun, ring=sun * share["ring"], carrier=sun * share["carrier"])
+
+
+def _check_mechanism(input: str, fixed: str) -> None:
+    for member in (input, fixed):
+        if member not in MEMBERS:
+            _mechanism_error(f"{member!r} is no member that can be driven or held", member)
+    if input == fixed:
+        _mechanism_error(f"the {input} is both driven and held, which leaves two members free", input)
+
+
+def _mechanism_error(message: str, value):
+    raise GeometryError(
+        message,
+        code="E-MECHANISM",
+        key="operation.fixed",
+        value=value,
+        limit="one driven, one held and one output member out of sun, carrier and ring",
+        remedy='for example input = "sun", fixed = "ring"',
+    )

@@ -1,0 +1,376 @@
+"""Carrier orders: spectra, bands around a mesh harmonic, envelopes, lobes and the lines that dominate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.housing.checks import check_teeth, read_only
+
+
+@dataclass(frozen=True)
+class OrderSpectrum:
+    """Single-sided spectrum over carrier orders: ``x = Re sum_k value[k] exp(i order[k] theta)``.
+
+    Parameters
+    ----------
+    order : (n_orders,) array
+        Carrier orders k / revolutions from 0 upwards.
+    value : (..., n_orders) complex array
+        Complex amplitudes in the unit of the signal (peak values, not r.m.s.).
+    revolutions : int
+        Carrier revolutions that the spectrum resolves; 1 gives whole orders.
+    """
+
+    order: np.ndarray
+    value: np.ndarray
+    revolutions: int = 1
+
+    def __post_init__(self):
+        read_only(self, "order", "value")
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """Absolute values, shape (..., n_orders)."""
+        return np.abs(self.value)
+
+    @property
+    def mean_square(self) -> np.ndarray:
+        """Mean square of the signal (Parseval), shape (...)."""
+        power = np.abs(self.value) ** 2
+        return power[..., 0] + power[..., 1:].sum(axis=-1) / 2
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line: carrier order, amplitude in the unit of the spectrum, level [dB] below the strongest."""
+
+    order: float
+    amplitude: float
+    level: float
+
+
+@dataclass(frozen=True)
+class Lobes:
+    """Lobes of an envelope, one carrier revolution or several.
+
+    Parameters
+    ----------
+    position : (n_lobes,) array
+        Places of the maxima as fractions of the record, ascending.
+    height : (n_lobes,) array
+        Envelope there.
+    prominence : (n_lobes,) array
+        How far each stands out from its surroundings, in the unit of the envelope.
+    threshold : float
+        Prominence from which a maximum was counted, as a share of the largest envelope value.
+    per_revolution : float
+        Number of lobes a carrier revolution.
+    """
+
+    position: np.ndarray
+    height: np.ndarray
+    prominence: np.ndarray
+    threshold: float
+    per_revolution: float
+
+    def __post_init__(self):
+        read_only(self, "position", "height", "prominence")
+
+
+@dataclass(frozen=True)
+class BandAnalysis:
+    """What is heard around one mesh harmonic at one speed: orders low..high, lines, envelope, lobes."""
+
+    harmonic: int
+    low: int
+    high: int
+    lines: tuple[Line, ...]
+    signal: np.ndarray
+    envelope: np.ndarray
+    lobes: Lobes
+
+    def __post_init__(self):
+        read_only(self, "signal", "envelope")
+
+
+def order_spectrum(signal, *, revolutions: int = 1) -> OrderSpectrum:
+    """Order spectrum of a signal that spans whole carrier revolutions (no window, no leakage).
+
+    Parameters
+    ----------
+    signal : (..., n_samples) array
+        Equidistant samples, end point excluded.
+    revolutions : int
+        Carrier revolutions in the record.
+
+    Returns
+    -------
+    OrderSpectrum
+
+    Raises
+    ------
+    CaseError
+        ``E-SIGNAL`` for samples that are not finite or less than two, or no whole number of revolutions.
+    """
+    signal = np.asarray(signal, dtype=float)
+    n = signal.shape[-1] if signal.ndim else 0
+    if n < 2 or not np.all(np.isfinite(signal)) or revolutions != int(revolutions) or revolutions < 1:
+        raise CaseError(
+            f"a signal of {n} samples over {revolutions} revolutions has no order spectrum",
+            code="E-SIGNAL",
+            limit="two or more finite samples over a whole number of carrier revolutions",
+            remedy="cut the record to whole revolutions",
+        )
+    value = np.fft.rfft(signal, axis=-1) * (2 / n)
+    value[..., 0] /= 2
+    if n % 2 == 0:
+        value[..., -1] /= 2
+    return OrderSpectrum(np.arange(value.shape[-1]) / revolutions, value, int(revolutions))
+
+
+def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum:
+    """Spectrum with the orders low..high (both included) alone; a brick wall, exact for periodic signals.
+
+    Raises
+    ------
+    CaseError
+        ``E-BAND`` for limits that hold no order of the spectrum above zero.
+    """
+    inside = (spectrum.order >= low) & (spectrum.order <= high)
+    if low <= 0 or not inside.any():
+        raise CaseError(
+            f"no carrier orders from {low} to {high} in a spectrum that ends at {spectrum.order[-1]}",
+            code="E-BAND",
+            value=(low, high),
+            limit=f"0 < low <= high, low <= {spectrum.order[-1]}",
+            remedy="choose a mesh harmonic that the response contains",
+        )
+    return OrderSpectrum(spectrum.order, np.where(inside, spectrum.value, 0), spectrum.revolutions)
+
+
+def analytic_signal(spectrum: OrderSpectrum, *, samples: int | None = None) -> np.ndarray:
+    """Analytic signal sum_k value[k] exp(i order[k] theta); real part the signal, modulus the envelope.
+
+    Parameters
+    ----------
+    spectrum : OrderSpectrum
+    samples : int, optional
+        Samples over the record, more than twice the number of lines; default four times.
+
+    Returns
+    -------
+    (..., samples) complex array
+
+    Raises
+    ------
+    CaseError
+        ``E-SAMPLES`` for too few samples.
+    """
+    lines = spectrum.value.shape[-1]
+    samples = 4 * lines if samples is None else samples
+    if samples < 2 * lines - 1:
+        raise CaseError(
+            f"{samples} samples cannot carry {lines} lines",
+            code="E-SAMPLES",
+            key="samples",
+            value=samples,
+            limit=f"at least {2 * lines - 1}",
+            remedy="ask for more samples",
+        )
+    return np.fft.ifft(spectrum.value, samples, axis=-1) * samples
+
+
+def envelope(spectrum: OrderSpectrum, *, samples: int | None = None) -> np.ndarray:
+    """Envelope of a (band-passed) spectrum over its record: modulus of the analytic signal, (..., n)."""
+    return np.abs(analytic_signal(spectrum, samples=samples))
+
+
+def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int = 1) -> Lobes:
+    """Maxima of a periodic envelope that stand out by at least `threshold` times its largest value.
+
+    The record is turned until it begins and ends at its lowest value, so that its seam is no edge
+    and the prominences are those of the endless signal.
+
+    Parameters
+    ----------
+    periodic_envelope : (n_samples,) array
+        Envelope over whole carrier revolutions, not negative.
+    threshold : float
+        Least prominence as a share of the largest envelope value, 0 < threshold < 1.
+    revolutions : int
+        Carrier revolutions in the record.
+
+    Returns
+    -------
+    Lobes
+
+    Raises
+    ------
+    CaseError
+        ``E-SIGNAL`` for an envelope or a threshold that cannot be used.
+    """
+    from scipy.signal import find_peaks
+
+    values = np.asarray(periodic_envelope, dtype=float)
+    usable = values.ndim == 1 and values.size > 2 and np.all(np.isfinite(values)) and np.all(values >= 0)
+    if not usable or not 0 < threshold < 1:
+        raise CaseError(
+            f"no lobes can be counted on values of shape {values.shape} with the threshold {threshold}",
+            code="E-SIGNAL",
+            limit="one envelope, finite and not negative, 0 < threshold < 1",
+            remedy="pass the envelope of one speed",
+        )
+    largest = values.max()
+    if largest == 0:
+        return Lobes(np.empty(0), np.empty(0), np.empty(0), threshold, 0.0)
+    start = int(values.argmin())
+    turned = np.append(np.roll(values, -start), values[start])
+    peaks, properties = find_peaks(turned, prominence=threshold * largest)
+    place = (peaks + start) % values.size
+    by_place = np.argsort(place)
+    return Lobes(
+        place[by_place] / values.size,
+        turned[peaks][by_place],
+        properties["prominences"][by_place],
+        threshold,
+        peaks.size / revolutions,
+    )
+
+
+def dominant_lines(
+    spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6, floor: float = -60.0
+) -> tuple[Line, ...]:
+    """Strongest lines with orders low..high of one spectrum, strongest first.
+
+    Parameters
+    ----------
+    spectrum : OrderSpectrum
+        Of one signal: value of shape (n_orders,).
+    low, high : float
+        Carrier orders, both included.
+    count : int
+        Largest number of lines.
+    floor : float
+        Level [dB] under the strongest below which lines are left out.
+
+    Returns
+    -------
+    tuple of Line
+        Empty where the band is silent.
+
+    Raises
+    ------
+    CaseError
+        ``E-BAND`` as `band_pass`; ``E-SIGNAL`` for a spectrum of several signals.
+    """
+    amplitude = band_pass(spectrum, low, high).amplitude
+    if amplitude.ndim != 1:
+        raise CaseError(
+            f"lines are listed for one signal, not for values of shape {amplitude.shape}",
+            code="E-SIGNAL",
+            limit="a spectrum of shape (n_orders,)",
+            remedy="pick one speed first",
+        )
+    strongest = amplitude.max()
+    # stable, so that equal lines come in ascending order
+    ranking = np.argsort(-amplitude, kind="stable")[:count]
+    keep = [k for k in ranking if strongest > 0 and amplitude[k] >= strongest * 10 ** (floor / 20)]
+    return tuple(
+        Line(float(spectrum.order[k]), float(amplitude[k]), float(20 * np.log10(amplitude[k] / strongest)))
+        for k in keep
+    )
+
+
+def analyse_band(
+    spectrum: OrderSpectrum,
+    z_ring: int,
+    harmonic: int,
+    *,
+    half_width: int | None = None,
+    threshold: float = 0.1,
+    count: int = 6,
+) -> BandAnalysis:
+    """Band-pass around a mesh harmonic, its dominant lines, envelope and lobes.
+
+    Parameters
+    ----------
+    spectrum : OrderSpectrum
+        Of one signal.
+    z_ring : int
+        Teeth of the ring: the band is centred on order ``harmonic z_ring``.
+    harmonic : int
+        Mesh harmonic, 1 upwards.
+    half_width : int, optional
+        Orders on either side; default (z_ring - 1) // 2, so that bands do not overlap.
+    threshold : float
+        Prominence threshold of the lobes, see `count_lobes`.
+    count : int
+        Largest number of lines listed.
+
+    Returns
+    -------
+    BandAnalysis
+
+    Raises
+    ------
+    CaseError
+        ``E-TEETH``, ``E-BAND``, ``E-SIGNAL``.
+    """
+    check_teeth(z_ring)
+    half_width = (z_ring - 1) // 2 if half_width is None else half_width
+    low, high = harmonic * z_ring - half_width, harmonic * z_ring + half_width
+    lines = dominant_lines(spectrum, low=low, high=high, count=count)
+    analytic = analytic_signal(band_pass(spectrum, low, high))
+    lobes = count_lobes(np.abs(analytic), threshold=threshold, revolutions=spectrum.revolutions)
+    return BandAnalysis(harmonic, low, high, lines, analytic.real, np.abs(analytic), lobes)
+
+
+def symmetry_leakage(spectrum: OrderSpectrum, planets: int) -> np.ndarray:
+    """Largest amplitude at orders that are no multiple of the number of planets, over the largest of all.
+
+    Identical, equally spaced planets on a symmetric ring leave nothing there (McFadden and Smith,
+    1985): the sensor cannot tell the planets apart, so the signal repeats N times a revolution.
+
+    Returns
+    -------
+    (...) array
+        0 where there is no signal.
+    """
+    amplitude = spectrum.amplitude
+    others = np.abs(spectrum.order / planets - np.rint(spectrum.order / planets)) > 1e-9
+    largest = amplitude.max(axis=-1)
+    leak = amplitude[..., others].max(axis=-1, initial=0.0)
+    return np.divide(leak, largest, out=np.zeros_like(largest), where=largest > 0)
+
+
+def line_sources(
+    order: int, z_ring: int, *, direction: int, n_max: int, harmonics: int
+) -> tuple[tuple[int, int], ...]:
+    """Field components (h, n) heard at a carrier order: h z_ring - direction n = +order or -order.
+
+    Parameters
+    ----------
+    order : int
+        Carrier order, 0 upwards.
+    z_ring : int
+        Teeth of the ring.
+    direction : int
+        +1 where the carrier turns counter-clockwise, -1 clockwise.
+    n_max, harmonics : int
+        Largest |n| and h of the field.
+
+    Returns
+    -------
+    tuple of (h, n)
+        By ascending |n|.
+    """
+    found = {
+        (h, direction * (h * z_ring - heard))
+        for h in range(harmonics + 1)
+        for heard in (order, -order)
+        if abs(h * z_ring - heard) <= n_max
+    }
+    return tuple(sorted(found, key=lambda pair: (abs(pair[1]), pair)))

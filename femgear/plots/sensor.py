@@ -1,0 +1,263 @@
+"""Figures of housing.nc: what a sensor fixed to the housing hears during one carrier revolution."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band
+from femgear.housing.orders import order_spectrum as _spectrum
+from femgear.plots.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREY,
+    SIZE,
+    VERMILION,
+    label,
+    legend_below,
+    new_figure,
+    rpm,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+ACCELERATION = "acceleration [m/s²]"
+
+
+def strongest_harmonic(housing: xr.Dataset, *, speed_index: int, ring_teeth: int) -> int:
+    """Mesh harmonic whose band holds the strongest line at one speed."""
+    order, amplitude = housing["order"].values, housing["order_amplitude"].values[speed_index]
+    audible = order > ring_teeth / 2
+    return max(1, round(float(order[audible][np.argmax(amplitude[audible])]) / ring_teeth))
+
+
+def band(housing: xr.Dataset, *, speed_index: int, ring_teeth: int, harmonic: int) -> BandAnalysis:
+    """Lines, signal, envelope and lobes around one mesh harmonic; see `housing.orders.analyse_band`."""
+    spectrum = _spectrum(housing["acceleration"].values[speed_index])
+    return analyse_band(spectrum, ring_teeth, harmonic)
+
+
+def housing_signal(
+    housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int, harmonic: int | None = None
+) -> Figure:
+    """Acceleration over one carrier revolution: whole, and around one mesh harmonic with its envelope.
+
+    Parameters
+    ----------
+    housing : xarray.Dataset
+        With ``acceleration`` (speed, time) [m/s^2].
+    speed_index : int
+    ring_teeth : int
+    harmonic : int, optional
+        Mesh harmonic of the band; the one with the strongest line when omitted.
+
+    Returns
+    -------
+    Figure
+    """
+    if harmonic is None:
+        harmonic = strongest_harmonic(housing, speed_index=speed_index, ring_teeth=ring_teeth)
+    found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
+    signal = housing["acceleration"].values[speed_index]
+    envelope = _envelope(housing, speed_index)
+    figure, (top, bottom) = new_figure(rows=2, width=9.5, height=6.2, sharex=True)
+    speed = rpm(housing["speed"].values[speed_index])
+    for ax, values, around, title in (
+        (top, signal, envelope, f"{speed}: all orders"),
+        (bottom, found.signal, found.envelope, _band_title(speed, found)),
+    ):
+        at = np.arange(len(values)) / len(values)
+        ax.plot(at, values, color=BLUE, linewidth=0.5, label="acceleration of the fixed point")
+        at = np.append(np.arange(len(around)) / len(around), 1.0)
+        for sign in (1, -1):
+            ax.plot(at, sign * np.append(around, around[0]), color=VERMILION, linewidth=1.4, label="envelope")
+        label(ax, y=ACCELERATION, title=title)
+    bottom.plot(
+        found.lobes.position, found.lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False
+    )
+    bottom.set_xlim(0, 1)
+    label(bottom, "carrier revolutions [1]")
+    legend_below(figure)
+    return figure
+
+
+def _envelope(housing, speed_index):
+    from femgear.housing.orders import envelope
+
+    spectrum = _spectrum(housing["acceleration"].values[speed_index])
+    moving = OrderSpectrum(spectrum.order, np.where(spectrum.order > 0, spectrum.value, 0), 1)
+    return envelope(moving)
+
+
+def _band_title(speed: str, found: BandAnalysis) -> str:
+    count, threshold = len(found.lobes.position), found.lobes.threshold
+    return (
+        f"{speed}: orders {found.low} to {found.high}, around mesh harmonic {found.harmonic}: {count} lobes "
+        f"(prominence above {threshold:.0%} of the largest value)"
+    )
+
+
+def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int, zooms: int = 2) -> Figure:
+    """Order spectrum with the mesh harmonics marked, and the strongest bands with their lines labelled.
+
+    A line of harmonic ``h`` and nodal diameter ``n`` stands at order ``h z_ring - n``.
+
+    Parameters
+    ----------
+    housing : xarray.Dataset
+        With ``order_amplitude`` and ``order_amplitude_exact`` (speed, order) [m/s^2].
+    speed_index : int
+    ring_teeth : int
+    zooms : int
+        Number of bands shown enlarged.
+
+    Returns
+    -------
+    Figure
+    """
+    order = housing["order"].values
+    linear, exact = (
+        housing[name].values[speed_index] for name in ("order_amplitude", "order_amplitude_exact")
+    )
+    bands = _strongest_bands(order, linear, ring_teeth, zooms)
+    figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 2.9 * len(bands))
+    largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
+    floor = 1e-4 * largest
+    _stems(axes[0], order, linear, floor)
+    axes[0].set_xlim(0, order[-1] + 1)
+    multiples = np.arange(1, int(order[-1]) // ring_teeth + 1)
+    top = axes[0].secondary_xaxis("top")
+    top.set_xticks(multiples * ring_teeth, [str(h) for h in multiples])
+    top.tick_params(labelsize=SIZE - 2)
+    top.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
+    label(axes[0], y=ACCELERATION)
+    axes[0].set_ylim(floor, 2.5 * largest)
+    for ax, harmonic in zip(axes[1:], bands):
+        _draw_band(ax, order, linear, exact, ring_teeth, harmonic, floor)
+    label(axes[-1], "carrier order [1]")
+    figure.suptitle(
+        f"Order spectrum of the fixed sensor, {rpm(housing['speed'].values[speed_index])}", fontsize=12
+    )
+    legend_below(figure)
+    return figure
+
+
+def _strongest_bands(order, amplitude, ring_teeth, count):
+    """Mesh harmonics whose bands hold the strongest lines, ascending."""
+    harmonics = np.rint(order / ring_teeth).astype(int)
+    peaks = {int(h): amplitude[harmonics == h].max() for h in np.unique(harmonics) if h > 0}
+    ranked = sorted((h for h in peaks if peaks[h] > 0), key=lambda h: (-peaks[h], h))
+    return sorted(ranked[:count])
+
+
+def _stems(ax, order, amplitude, floor, *, text="Heaviside, linear interpolation", colour=BLUE, width=1.0):
+    shown = amplitude > floor
+    ax.vlines(order[shown], floor, amplitude[shown], color=colour, linewidth=width, label=text)
+    ax.set_yscale("log")
+
+
+def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, floor):
+    centre = harmonic * ring_teeth
+    loud = (np.maximum(linear, exact) > floor) & (np.rint(order / ring_teeth) == harmonic)
+    reach = int(np.abs(order[loud] - centre).max(initial=3.0)) + 2
+    reach = min(max(reach, 6), ring_teeth // 2)
+    inside = np.abs(order - centre) <= reach
+    _stems(ax, order[inside], linear[inside], floor, width=2.5)
+    shown = inside & (exact > floor)
+    ax.plot(
+        order[shown],
+        exact[shown],
+        "o",
+        markerfacecolor="none",
+        color=VERMILION,
+        label="exact circumferential Fourier",
+    )
+    peak = np.maximum(linear, exact)
+    limit = peak[inside].max(initial=floor)
+    for k in _labelled(order, peak, inside & (peak > floor), spacing=reach / 22):
+        offset = round(order[k]) - centre
+        text = (
+            f"{order[k]:g}"
+            if offset == 0
+            else f"{order[k]:g} = {_multiple(harmonic, ring_teeth)} {offset:+d}"
+        )
+        ax.annotate(
+            text.replace("-", "−"),
+            (order[k], peak[k]),
+            xytext=(0, 7),
+            textcoords="offset points",
+            rotation=90,
+            ha="center",
+            va="bottom",
+            fontsize=SIZE - 2.5,
+        )
+    # room above the strongest line for its label on the logarithmic axis
+    ax.set_ylim(floor, limit * (limit / floor) ** 0.55 if limit > floor else 10 * floor)
+    ax.set_xlim(centre - reach, centre + reach)
+    ax.axvline(centre, color=GREY, linewidth=0.8, linestyle=":")
+    label(ax, y=ACCELERATION, title=f"around mesh harmonic {harmonic} (order {centre})")
+
+
+def _multiple(harmonic, ring_teeth):
+    return str(ring_teeth) if harmonic == 1 else f"{harmonic}·{ring_teeth}"
+
+
+def _labelled(order, amplitude, candidates, *, spacing, limit=12):
+    """Strongest lines whose labels do not run into each other."""
+    chosen = []
+    for k in np.flatnonzero(candidates)[np.argsort(-amplitude[candidates], kind="stable")]:
+        if all(abs(order[k] - order[other]) >= spacing for other in chosen):
+            chosen.append(k)
+        if len(chosen) == limit:
+            break
+    return chosen
+
+
+def modulation_polar(
+    housing: xr.Dataset, *, ring_teeth: int, harmonics: dict[int, int] | None = None
+) -> Figure:
+    """Envelope around a mesh harmonic over the angle of the carrier, polar, one diagram for each speed.
+
+    Parameters
+    ----------
+    housing : xarray.Dataset
+        With ``acceleration`` (speed, time) [m/s^2]; at most three speeds are drawn.
+    ring_teeth : int
+    harmonics : dict of int to int, optional
+        Mesh harmonic for a speed index; the one with the strongest line where omitted.
+
+    Returns
+    -------
+    Figure
+    """
+    speeds = sorted(
+        {round(i) for i in np.linspace(0, housing.sizes["speed"] - 1, min(housing.sizes["speed"], 3))}
+    )
+    figure, axes = new_figure(columns=len(speeds), width=5.2 * len(speeds), height=6.0, polar=True)
+    for i, (ax, s) in enumerate(zip(axes, speeds)):
+        harmonic = (harmonics or {}).get(s)
+        if harmonic is None:
+            harmonic = strongest_harmonic(housing, speed_index=s, ring_teeth=ring_teeth)
+        found = band(housing, speed_index=s, ring_teeth=ring_teeth, harmonic=harmonic)
+        angle = np.linspace(0.0, 2 * np.pi, len(found.envelope) + 1)
+        value = np.append(found.envelope, found.envelope[0])
+        ax.plot(angle, value, color=COLOURS[i], linewidth=2.0)
+        ax.fill(angle, value, color=COLOURS[i], alpha=0.15, linewidth=0)
+        ax.plot(
+            2 * np.pi * found.lobes.position, found.lobes.height, "v", color=BLACK, markersize=6, label="lobe"
+        )
+        ax.set_ylim(0, 1.12 * value.max(initial=0.0) or 1.0)
+        ax.set_rlabel_position(15.0)
+        speed = rpm(housing["speed"].values[s])
+        ax.set_title(
+            f"{speed}, mesh harmonic {harmonic}: {len(found.lobes.position)} lobes\n"
+            f"envelope {ACCELERATION} over the carrier angle [°]",
+            fontsize=SIZE,
+            pad=14,
+        )
+    legend_below(figure)
+    return figure

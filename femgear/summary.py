@@ -1,0 +1,286 @@
+"""What an engineer wants to read first: the gears of a case, and the numbers of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.gears import check_set, speeds, tooth_thickness, torques
+from femgear.gears.checks import tip_clearances
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.case import Case
+    from femgear.gears import PlanetarySet
+    from femgear.storage import Results
+
+RPM = math.pi / 30
+_MANY = 8
+
+
+@dataclass(frozen=True)
+class Block:
+    """A titled table with notes under it.
+
+    Parameters
+    ----------
+    title : str
+    header : tuple of str
+        Names of the columns, or empty.
+    rows : tuple of tuple of str
+    notes : tuple of str
+    """
+
+    title: str
+    header: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def describe_case(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
+    """Geometry, operation and warnings of a case.
+
+    Parameters
+    ----------
+    case : Case
+    planetary : PlanetarySet
+        As `femgear.case.planetary_set` makes it.
+
+    Returns
+    -------
+    tuple of Block
+    """
+    return (
+        Block(case.title),
+        _gears(planetary),
+        _meshes(planetary),
+        _operation(case, planetary),
+        Block("Warnings", notes=warnings_of(case, planetary) or ("none",)),
+    )
+
+
+def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
+    """What is allowed but deserves a look, in sentences."""
+    found = [str(warning) for warning in check_set(planetary)] + list(case.notices)
+    if case.operation.torque == 0:
+        found.append(
+            "[W-TORQUE] operation.torque: without torque no tooth touches; only static results exist"
+        )
+    if case.operation.torque < 0:
+        found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
+    if case.response_harmonics < 2 * case.dynamics.mesh_harmonics:
+        found.append(
+            f"[W-HARMONICS] dynamics.response_harmonics: {case.response_harmonics} harmonics of the response for "
+            f"{case.dynamics.mesh_harmonics} of the mesh; twice as many are advised"
+        )
+    return tuple(found)
+
+
+def _gears(s: PlanetarySet) -> Block:
+    gears = (s.sun, s.planet, s.ring)
+
+    def row(name, value):
+        return (name, *(value(gear) for gear in gears))
+
+    rows = (
+        row("teeth", lambda g: str(g.teeth)),
+        row("profile shift", lambda g: f"{g.profile_shift:.5f}"),
+        row("reference diameter [mm]", lambda g: f"{2e3 * g.reference_radius:.4f}"),
+        row("tip diameter [mm]", lambda g: f"{2e3 * g.tip_radius:.4f}"),
+        row("root diameter [mm]", lambda g: f"{2e3 * g.root_radius:.4f}"),
+        row("start of involute, diameter [mm]", lambda g: f"{2e3 * g.form_radius:.4f}"),
+        row(
+            "tooth thickness at the tip [mm]",
+            lambda g: f"{1e3 * float(tooth_thickness(g, g.tip_radius)):.4f}",
+        ),
+        row("bore or outer diameter [mm]", lambda g: f"{2e3 * g.rim_radius:.4f}"),
+    )
+    angles = ", ".join(f"{math.degrees(angle):.6g}" for angle in s.planet_angles[:12])
+    notes = (
+        f"module {s.sun.module * 1e3:.6g} mm, pressure angle {math.degrees(s.sun.pressure_angle):.6g} deg, "
+        f"face width {s.sun.face_width * 1e3:.6g} mm, centre distance {s.centre_distance * 1e3:.6g} mm",
+        f"{s.n_planets} planets at {angles} deg",
+        "profile shift of the ring: positive moves the flank outwards (the opposite of ISO 21771)",
+    )
+    return Block("Gears", ("", "sun", "planet", "ring"), rows, notes)
+
+
+def _meshes(s: PlanetarySet) -> Block:
+    n = s.n_planets
+    phases = s.mesh_phases
+
+    def listing(values):
+        text = ", ".join(f"{value:.4f}" for value in values[:6])
+        return text + (", ..." if len(values) > 6 else "")
+
+    clearance = tip_clearances(s)
+    rows = (
+        (
+            "working pressure angle [deg]",
+            f"{math.degrees(s.working_pressure_angle_sun_planet):.4f}",
+            f"{math.degrees(s.working_pressure_angle_planet_ring):.4f}",
+        ),
+        ("contact ratio", f"{s.contact_ratio_sun_planet:.4f}", f"{s.contact_ratio_planet_ring:.4f}"),
+        (
+            "normal backlash [um]",
+            f"{s.backlash_sun_planet * 1e6 + 0.0:.2f}",
+            f"{s.backlash_planet_ring * 1e6 + 0.0:.2f}",
+        ),
+        (
+            "tip clearances [mm]",
+            f"{1e3 * clearance['sun tip to planet root']:.3f}, {1e3 * clearance['planet tip to sun root']:.3f}",
+            f"{1e3 * clearance['planet tip to ring root']:.3f}, {1e3 * clearance['ring tip to planet root']:.3f}",
+        ),
+        ("mesh phases [periods]", listing(phases[:n]), listing(phases[n:])),
+    )
+    return Block("Meshes", ("", "sun-planet", "planet-ring"), rows)
+
+
+def _operation(case: Case, s: PlanetarySet) -> Block:
+    operation = case.operation
+    chosen = operation.speeds
+    if len(chosen) > _MANY:
+        chosen = (*chosen[: _MANY // 2], *chosen[-_MANY // 2 :])
+    rows = []
+    for speed in chosen:
+        v = speeds(s, input=operation.input, fixed=operation.fixed, speed=speed)
+        turns = (f"{value / RPM:.4f}" for value in (v.sun, v.carrier, v.ring, v.planet))
+        rows.append((*turns, f"{v.mesh_frequency:.4f}"))
+    load = torques(s, member=operation.input, torque=operation.torque)
+    notes = [
+        f"input {operation.input}, fixed {operation.fixed}; torque on sun {load.sun:.6g} N m, "
+        f"carrier {load.carrier:.6g} N m, ring {load.ring:.6g} N m"
+    ]
+    if len(operation.speeds) > _MANY:
+        notes.append(f"{len(operation.speeds)} speeds, of which the first and the last are shown")
+    header = ("sun [rpm]", "carrier [rpm]", "ring [rpm]", "planet [rpm]", "mesh frequency [Hz]")
+    return Block("Operation", header, tuple(rows), tuple(notes))
+
+
+def describe_results(results: Results) -> tuple[Block, ...]:
+    """The numbers of a run, one block a stage.
+
+    Parameters
+    ----------
+    results : Results
+
+    Returns
+    -------
+    tuple of Block
+    """
+    describe = {"static": _static, "modes": _modes, "dynamics": _dynamics, "housing": _housing}
+    blocks = [describe[stage](getattr(results, stage)) for stage in results.stages]
+    timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
+    return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
+
+
+def _static(data: xr.Dataset) -> Block:
+    rows = []
+    for mesh in data.mesh.values:
+        one = data.sel(mesh=mesh)
+        ste = one.ste.values
+        rows.append(
+            (
+                str(mesh),
+                f"{ste.mean() * 1e6:.4f}",
+                f"{np.ptp(ste) * 1e6:.4f}",
+                f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
+                f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
+                f"{one.mesh_force.values.mean():.3f}",
+                f"{one.max_pressure.values.max() / 1e6:.1f}",
+            )
+        )
+    share = data.load_share.values
+    header = (
+        "mesh",
+        "STE mean [um]",
+        "STE p-p [um]",
+        "k mean [N/um]",
+        "k p-p [N/um]",
+        "force [N]",
+        "p max [MPa]",
+    )
+    notes = (
+        f"load share of a planet {share.min():.4f} to {share.max():.4f} "
+        f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
+    )
+    return Block("Static", header, tuple(rows), notes)
+
+
+def _modes(data: xr.Dataset) -> Block:
+    shown = min(data.sizes["mode"], 16)
+    rows = tuple(
+        (
+            str(i + 1),
+            f"{float(data.frequency[i]):.2f}",
+            str(data.kind.values[i]),
+            _diameter(int(data.nodal_diameter[i])),
+        )
+        for i in range(shown)
+    )
+    notes = (
+        f"{data.sizes['mode']} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown",
+    )
+    return Block("Modes", ("mode", "frequency [Hz]", "kind", "nodal diameters"), rows, notes)
+
+
+def _diameter(number: int) -> str:
+    return "-" if number < 0 else str(number)
+
+
+def _dynamics(data: xr.Dataset) -> Block:
+    dte = np.hypot(data.dte_real.values, data.dte_imag.values)  # speed, mesh, harmonic
+    rms = np.sqrt(0.5 * (dte[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
+    stable = np.abs(data.floquet_multiplier.values)
+    rows = tuple(
+        (
+            f"{float(data.speed[i]):.2f}",
+            f"{float(data.mesh_frequency[i]):.2f}",
+            f"{rms[i] * 1e6:.4f}",
+            str(data.method.values[i]),
+            str(int(data.iterations[i])),
+            f"{float(data.spectral_radius[i]):.4f}",
+            f"{stable[i]:.4f}",
+            "yes" if bool(data.converged[i]) else "NO",
+        )
+        for i in _chosen(data.sizes["speed"])
+    )
+    header = (
+        "speed [rpm]",
+        "mesh [Hz]",
+        "DTE rms [um]",
+        "method",
+        "iterations",
+        "radius",
+        "Floquet",
+        "converged",
+    )
+    notes = (
+        "DTE rms: the largest of all meshes, without its mean; radius: of the fixed point, which contracts below 1;",
+        "Floquet: largest multiplier, stable below 1",
+        f"{int(data.converged.sum())} of {data.sizes['speed']} speeds converged, {int((stable < 1).sum())} stable",
+    )
+    return Block("Dynamics", header, rows, notes)
+
+
+def _housing(data: xr.Dataset) -> Block:
+    rows = []
+    for i in _chosen(data.sizes["speed"]):
+        one = data.isel(speed=i)
+        amplitude = one.order_amplitude.values
+        largest = np.argsort(-amplitude, kind="stable")[:5]
+        lines = ", ".join(f"{int(round(float(one.order[j])))} ({amplitude[j]:.3g})" for j in largest)
+        rms = float(np.sqrt(np.mean(one.acceleration.values**2)))
+        rows.append((f"{float(one.speed):.2f}", f"{rms:.4g}", lines))
+    header = ("speed [rpm]", "rms [m/s^2]", "largest lines: carrier order (amplitude [m/s^2])")
+    return Block("Housing", header, tuple(rows))
+
+
+def _chosen(count: int) -> Iterator[int]:
+    """All indices of a short list, the first and last of a long one."""
+    return (i for i in range(count) if count <= _MANY or i < _MANY // 2 or i >= count - _MANY // 2)

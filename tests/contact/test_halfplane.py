@@ -1,0 +1,168 @@
+"""Half-plane influence functions against equilibrium, quadrature and limits known in closed form."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from femgear.contact.halfplane import (
+    cell_influence,
+    contact_modulus,
+    depth_displacement,
+    hertz_line,
+    point_surface_relative_to_depth,
+    relative_radius,
+    surface_displacement,
+    surface_relative_to_depth,
+    weber_banaschek,
+)
+from femgear.errors import ContactError
+
+E, NU = 206e9, 0.3
+MU = E / (2 * (1 + NU))
+
+
+@pytest.mark.parametrize("x", [0.0, 0.3e-3, -2e-3])
+def test_flamant_field_obeys_hooke(x):
+    """dw/dz equals the plane-strain strain of Flamant's stresses, sigma_r = -2 P cos(theta) / (pi r)."""
+    z, step, nu = 0.4e-3, 1e-8, 0.27
+    shear = E / (2 * (1 + nu))
+    upper, lower = (depth_displacement(x, depth, shear, nu) for depth in (z + step, z - step))
+    r4 = (x**2 + z**2) ** 2
+    stress_z, stress_x = -2 * z**3 / (np.pi * r4), -2 * x**2 * z / (np.pi * r4)
+    strain = ((1 - nu**2) * stress_z - nu * (1 + nu) * stress_x) / E
+    assert (upper - lower) / (2 * step) == pytest.approx(strain, rel=1e-7)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
+@pytest.mark.parametrize("x", [0.0, 1.5e-5, 2e-5, 7e-5, 9e-4])
+def test_cell_is_the_mean_of_line_loads(x, nu):
+    h, d = 2e-5, 5e-4
+    breaks = [x] if abs(x) < h else None
+    mean = quad(lambda s: point_surface_relative_to_depth(x - s, d, MU, nu), -h, h, points=breaks, limit=200)
+    got = surface_relative_to_depth(x, h, d, MU, nu)
+    assert float(got) == pytest.approx(mean[0] / (2 * h), rel=1e-9)
+    assert float(surface_relative_to_depth(-x, h, d, MU, nu)) == pytest.approx(float(got), rel=1e-12)
+
+
+def test_cell_relative_to_depth_is_the_difference_of_the_two_displacements():
+    h, d = 2e-5, 5e-4
+    for x in (0.0, 3e-5, 4e-4):
+        below = quad(lambda s: depth_displacement(x - s, d, MU, NU), -h, h)[0] / (2 * h)
+        difference = float(surface_displacement(x, h, MU, NU)) - below
+        assert float(surface_relative_to_depth(x, h, d, MU, NU)) == pytest.approx(difference, rel=1e-9)
+
+
+def test_far_from_the_cell_it_is_a_line_load():
+    h, d = 1e-6, 1e-4
+    x = np.array([1e-3, 1e-2, 0.1])
+    point = point_surface_relative_to_depth(x, d, MU, NU)
+    scale = float(surface_relative_to_depth(0.0, h, d, MU, NU))
+    assert np.abs(surface_relative_to_depth(x, h, d, MU, NU) - point).max() < 1e-8 * scale
+
+
+@pytest.mark.parametrize("nu", [0.1, 0.3])
+def test_semi_elliptic_pressure_gives_weber_and_banaschek(nu):
+    """At the middle of a Hertzian pressure, d >> a; the cells converge to it with an order above one."""
+    load, a, d = 1e5, 7e-5, 70e-3
+    shear = E / (2 * (1 + nu))
+    errors = []
+    for n in (40, 80, 160, 320, 640):
+        edges = np.linspace(-1, 1, n + 1)
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        # exact load on every cell of the semi-ellipse
+        primitive = (edges * np.sqrt(1 - edges**2) + np.arcsin(edges)) / np.pi
+        cells = load * np.diff(primitive)
+        approach = cells @ surface_relative_to_depth(a * middle, a / n, d, shear, nu)
+        errors.append(approach / weber_banaschek(load, a, d, E, nu) - 1)
+    errors = np.abs(errors)
+    assert errors[-1] < 1e-5
+    assert np.all(np.log2(errors[:-2] / errors[1:-1]) > 1.4)
+
+
+def test_the_sum_of_local_and_deep_part_does_not_depend_on_the_depth():
+    x, h = np.linspace(-2e-4, 2e-4, 9), 1e-7
+    sums = [
+        surface_relative_to_depth(x, h, d, MU, NU) + depth_displacement(x, d, MU, NU)
+        for d in (1e-4, 4e-4, 2e-3)
+    ]
+    np.testing.assert_allclose(sums[1], sums[0], rtol=1e-6)
+    np.testing.assert_allclose(sums[2], sums[0], rtol=1e-6)
+
+
+def test_cell_influence_of_a_hertzian_pressure_is_the_approach_less_the_shape():
+    """Displacement under the semi-ellipse: approach - x^2 / (2 R) inside the contact (Johnson, 4.2)."""
+    hertz = hertz_line(5e5, 0.15, contact_modulus(E, NU, E, NU))
+    a, n = hertz.half_width, 2000
+    edges = np.linspace(-1, 1, n + 1)
+    loads = hertz.line_load * np.diff((edges * np.sqrt(1 - edges**2) + np.arcsin(edges)) / np.pi)
+    middle = 0.5 * (edges[1:] + edges[:-1]) * a
+    datum = 40 * a
+    x = np.array([0.0, 0.3, 0.7]) * a
+    moved = cell_influence(x[:, None] - middle, a / n, datum, hertz.modulus) @ loads
+    np.testing.assert_allclose(moved, hertz.approach(datum) - x**2 / (2 * hertz.radius), rtol=2e-5)
+
+
+def test_influence_matrix_is_symmetric_positive_definite():
+    x = (np.arange(60) + 0.5) * 1e-5
+    for matrix in (
+        surface_relative_to_depth(x[:, None] - x, 0.5e-5, 4e-4, MU, NU),
+        cell_influence(x[:, None] - x, 0.5e-5, 0.05, 1e11),
+    ):
+        np.testing.assert_allclose(matrix, matrix.T, rtol=1e-12)
+        assert np.linalg.eigvalsh(matrix)[0] > 0
+
+
+def test_hertz_load_is_the_integral_of_its_pressure():
+    hertz = hertz_line(3e5, 0.02, 1.1e11)
+    total = quad(hertz.pressure, -hertz.half_width, hertz.half_width)[0]
+    assert total == pytest.approx(3e5, rel=1e-7)
+    assert hertz.pressure(2 * hertz.half_width) == 0
+
+
+def test_largest_shear_by_search_along_the_axis():
+    hertz = hertz_line(3e5, 0.02, 1.1e11)
+    z = np.linspace(0, 3, 300_001) * hertz.half_width
+    root = np.sqrt(hertz.half_width**2 + z**2)
+    stress_x = -hertz.peak_pressure / hertz.half_width * ((hertz.half_width**2 + 2 * z**2) / root - 2 * z)
+    stress_z = -hertz.peak_pressure * hertz.half_width / root
+    shear = 0.5 * np.abs(stress_x - stress_z)
+    tau, depth = hertz.max_shear()
+    assert tau == pytest.approx(shear.max(), rel=1e-9)
+    assert depth == pytest.approx(z[shear.argmax()], rel=1e-4)
+
+
+def test_no_load_no_contact():
+    hertz = hertz_line(0.0, 0.02, 1.1e11)
+    assert hertz.half_width == hertz.peak_pressure == hertz.approach(1.0) == hertz.max_shear()[0] == 0
+    assert hertz.pressure(np.zeros(2)).tolist() == [0, 0]
+
+
+def test_relative_radius_of_a_hollow_surface():
+    assert relative_radius(0.05, -0.075) == pytest.approx(0.15)
+    assert relative_radius(0.05, np.float64(1e9)) == pytest.approx(0.05)
+    for radii in ((0.05, -0.05), (0.05, -0.04), (0.0, 1.0), (np.nan, 1.0)):
+        with pytest.raises(ContactError, match="E-HALFPLANE"):
+            relative_radius(*radii)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: surface_displacement(0.0, 0.0, MU, NU),
+        lambda: surface_displacement(0.0, 1e-5, -MU, NU),
+        lambda: depth_displacement(0.0, 0.0, MU, NU),
+        lambda: point_surface_relative_to_depth(1.0, np.nan, MU, NU),
+        lambda: surface_relative_to_depth(0.0, 1e-5, -1e-4, MU, NU),
+        lambda: surface_relative_to_depth(0.0, 1e-5, 1e-4, MU, 0.5),
+        lambda: surface_relative_to_depth(0.0, 1e-5, 1e-4, MU, np.nan),
+        lambda: cell_influence(0.0, 1e-5, np.inf, 1e11),
+        lambda: contact_modulus(E, 0.6, E, 0.3),
+        lambda: hertz_line(-1.0, 0.01, 1e11),
+        lambda: hertz_line(np.nan, 0.01, 1e11),
+        lambda: hertz_line(1.0, -0.01, 1e11),
+        lambda: weber_banaschek(1.0, 0.0, 1e-3, E, NU),
+    ],
+)
+def test_impossible_values_are_refused(call):
+    with pytest.raises(ContactError, match="E-HALFPLANE"):
+        call()

@@ -1,0 +1,232 @@
+"""Meshing outlines: exact boundaries, cache, processes, and every outline that must be refused."""
+
+import os
+import threading
+
+import numpy as np
+import pytest
+
+from femgear.errors import GridError
+from femgear.fe import meshing
+from femgear.fe.meshing import Outline, check_outline, estimate_elements, mesh_outline, mesh_outlines, quality
+
+
+def polygon(corners, *, name="edge", divide=1):
+    """Closed polygon as one curve per side."""
+    corners = np.asarray(corners, dtype=float)
+    t = np.linspace(0, 1, 2 * divide + 1)[:, None]
+    sides = [(1 - t) * a + t * b for a, b in zip(corners, np.roll(corners, -1, axis=0))]
+    return Outline(tuple((f"{name}{i}", side) for i, side in enumerate(sides)))
+
+
+SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
+
+
+def refusal(outline, **options):
+    with pytest.raises(GridError) as error:
+        mesh_outline(outline, **options)
+    return error.value
+
+
+def test_square_grid():
+    grid = mesh_outline(polygon(SQUARE, divide=6))
+    a, b, c = (grid.points[grid.triangles[:, i]] for i in range(3))
+    det = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    assert det.min() > 0 and 0.5 * det.sum() == pytest.approx(1.0, rel=1e-13)
+    assert grid.regions["body"].size == len(grid.triangles)
+    assert quality(grid).min() > 0.6
+    vertices, edges, faces = len(np.unique(grid.triangles[:, :3])), grid.n_nodes, len(grid.triangles)
+    assert vertices - (edges - vertices) + faces == 1  # Euler: every edge has exactly one mid-side node
+
+
+def test_same_outline_same_grid_at_any_scale_and_place():
+    outline = polygon(SQUARE, divide=5)
+    moved = Outline(tuple((name, 1e-3 * points + [0.5, -0.3]) for name, points in outline.curves))
+    one, again, small = mesh_outline(outline), mesh_outline(outline), mesh_outline(moved)
+    assert np.array_equal(one.points, again.points) and np.array_equal(one.triangles, again.triangles)
+    assert np.array_equal(one.triangles, small.triangles)
+    assert np.allclose((small.points - [0.5, -0.3]) * 1e3, one.points, rtol=0, atol=1e-9)
+
+
+def test_several_outlines_in_order():
+    outlines = [polygon(np.array(SQUARE) * k, divide=3) for k in (1.0, 2.0, 3.0)]
+    grids = mesh_outlines(outlines, processes=2)
+    assert [grid.points.max() for grid in grids] == [1.0, 2.0, 3.0]
+
+
+def test_any_thread_may_mesh():  # bad input 58
+    result = []
+    thread = threading.Thread(target=lambda: result.append(mesh_outline(polygon(SQUARE, divide=2))))
+    thread.start()
+    thread.join()
+    assert result[0].n_nodes > 8
+
+
+def test_cache_is_used_and_damaged_files_are_made_again(tmp_path, monkeypatch):
+    outline = polygon(SQUARE, divide=4)
+    first = mesh_outline(outline, cache=tmp_path / "meshes")
+    (file,) = (tmp_path / "meshes").iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    second = mesh_outline(outline, cache=tmp_path / "meshes")
+    assert np.array_equal(first.points, second.points) and file.read_bytes() == whole
+    # a coordinate of the boundary that was changed in the file
+    place = whole.index(np.float64(0.25).tobytes())
+    file.write_bytes(whole[:place] + np.float64(0.26).tobytes() + whole[place + 8 :])
+    assert np.array_equal(mesh_outline(outline, cache=tmp_path / "meshes").points, first.points)
+    monkeypatch.setattr(meshing, "_run_gmsh", None)
+    third = mesh_outline(outline, cache=tmp_path / "meshes")
+    assert np.array_equal(first.points, third.points) and np.array_equal(first.triangles, third.triangles)
+
+
+def fake_gmsh(folder, monkeypatch, text):
+    (folder / "gmsh.py").write_text(text)
+    monkeypatch.setenv("PYTHONPATH", str(folder) + os.pathsep + os.environ.get("PYTHONPATH", ""))
+
+
+def test_generator_that_does_not_return_is_killed(tmp_path, monkeypatch):
+    fake_gmsh(tmp_path, monkeypatch, "import time\ntime.sleep(60)\n")
+    error = refusal(polygon(SQUARE), time_limit=0.8)
+    assert error.code == "E-GRID-TIMEOUT" and "0.8 s" in str(error)
+
+
+def test_missing_system_library_names_its_package(tmp_path, monkeypatch):
+    text = "raise OSError('libGLU.so.1: cannot open shared object file: No such file or directory')"
+    fake_gmsh(tmp_path, monkeypatch, text)
+    error = refusal(polygon(SQUARE))
+    assert error.code == "E-GRID-LIBRARY" and "apt-get install libglu1-mesa" in str(error)
+
+
+def test_generator_errors_are_passed_on(tmp_path, monkeypatch):
+    fake_gmsh(
+        tmp_path, monkeypatch, "def initialize(*a, **k): pass\ndef finalize(): pass\noption = model = None\n"
+    )
+    error = refusal(polygon(SQUARE))
+    assert error.code == "E-GRID-GMSH"
+
+
+def test_self_crossing_outline():  # bad input 52
+    error = refusal(polygon([(0, 0), (1, 1), (1, 0), (0, 1.5)]))
+    assert error.code == "E-GRID-CROSSING" and "edge0" in str(error) and "edge2" in str(error)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_points_that_are_not_numbers(value):  # bad input 53
+    corners = np.array(SQUARE, dtype=float)
+    corners[2, 0] = value
+    with np.errstate(invalid="ignore"):
+        outline = polygon(corners)
+    error = refusal(outline)
+    assert error.code == "E-GRID-NAN" and "finite" in str(error)
+
+
+def test_points_that_coincide():  # bad input 54
+    error = refusal(polygon([(0, 0), (1, 0), (1, 1e-13), (1, 1), (0, 1)]))
+    assert error.code == "E-GRID-CLOSE-POINTS" and "1.000e-13 m apart" in str(error)
+
+
+def test_clockwise_outline():  # bad input 55
+    assert refusal(polygon(SQUARE[::-1])).code == "E-GRID-CLOCKWISE"
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        [(0, 0), (1, 0), (0.5, 0)],
+        [(0, 0), (1, 0), (1, 1), (1, 0.5), (0.5, 0.5)],
+        [(0, 0), (1, 0), (1, 1), (0.5, 0), (0, 1)],
+        [(0, 0), (0, 0), (0, 0)],
+    ],
+    ids=["zero area", "slit", "corner on a side", "one point"],
+)
+def test_slits_and_zero_area(corners):  # bad input 56
+    assert refusal(polygon(corners)).code in ("E-GRID-CROSSING", "E-GRID-AREA")
+
+
+def test_thin_sliver_is_a_slit():
+    assert refusal(polygon([(0, 0), (1, 0), (1, 4e-9), (0, 4e-9)])).code in (
+        "E-GRID-AREA",
+        "E-GRID-CLOSE-POINTS",
+    )
+    assert refusal(polygon([(0, 0), (1, 0), (0.5, 1.9e-9)])).code in ("E-GRID-AREA", "E-GRID-CROSSING")
+
+
+def test_element_count_is_estimated_before_meshing(monkeypatch):  # bad input 57
+    monkeypatch.setattr(meshing, "_run_gmsh", None)
+    error = refusal(polygon(SQUARE, divide=400))
+    assert error.code == "E-GRID-COUNT" and "elements" in str(error) and "at most 200000" in str(error)
+    error = refusal(polygon(SQUARE, divide=2000))
+    assert error.code == "E-GRID-COUNT" and "8000 segments" in str(error)
+
+
+@pytest.mark.parametrize("divide", [4, 8, 25])
+def test_estimate_is_within_a_factor_two(divide):
+    outline = polygon(SQUARE, divide=divide)
+    count = len(mesh_outline(outline).triangles)
+    assert 0.5 < estimate_elements(check_outline(outline)) / count < 2.0
+
+
+def test_open_outline_and_wrong_shapes():
+    curves = polygon(SQUARE).curves
+    assert refusal(Outline(curves[:3])).code == "E-GRID-OPEN"
+    assert refusal(Outline(())).code == "E-GRID-SHAPE"
+    for points in (np.zeros((4, 2)), np.zeros((1, 2)), np.zeros((3, 3)), np.zeros(6)):
+        assert refusal(Outline((("edge", points),))).code == "E-GRID-SHAPE"
+
+
+def split_square(points, regions=(("lower", (0.5, 0.1)), ("upper", (0.5, 0.9)))):
+    return Outline(
+        polygon(SQUARE, divide=4).curves, (("interface", np.asarray(points, dtype=float)),), regions
+    )
+
+
+def straight(p, q, k=4):
+    t = np.linspace(0, 1, 2 * k + 1)[:, None]
+    return (1 - t) * np.array(p) + t * np.array(q)
+
+
+def test_interface_divides_the_body():
+    grid = mesh_outline(split_square(straight((0, 0.5), (1, 0.5))))
+    centre = grid.points[grid.triangles[:, :3]].mean(axis=1)
+    assert (centre[grid.regions["lower"], 1] < 0.5).all() and (centre[grid.regions["upper"], 1] > 0.5).all()
+    assert len(grid.boundaries["interface"]) == 4
+
+
+@pytest.mark.parametrize(
+    "points, code",
+    [
+        (straight((0, 0.5), (0.7, 0.6)), "E-GRID-INTERFACE"),
+        (straight((0, 0.5), (1, 0.55)), "E-GRID-INTERFACE"),
+        (straight((0.3, 0.5), (0.6, 0.5)), "E-GRID-INTERFACE"),
+        (straight((0, 0.5), (1, 0.5))[[0, 1, 2, 3, 8]], "E-GRID-CROSSING"),
+        (
+            np.vstack([straight((0, 0.5), (0.5, 1.5), 1)[:-1], straight((0.5, 1.5), (1, 0.5), 1)]),
+            "E-GRID-CROSSING",
+        ),
+    ],
+    ids=["dangling", "off a corner", "floating", "folded back", "outside"],
+)
+def test_interfaces_that_do_not_divide(points, code):
+    if code == "E-GRID-CROSSING" and len(points) == 5 and points[2, 1] == 0.5:
+        points = np.array([(0, 0.5), (0.4, 0.5), (0.8, 0.5), (0.6, 0.5), (0.4, 0.5), (0.7, 0.5), (1, 0.5)])
+    assert refusal(split_square(points)).code == code
+
+
+def test_interface_loop_outside_the_boundary_is_refused():
+    outside = np.array([(0, 0.5), (-0.5, 0.6), (-0.5, 0.75), (-0.3, 0.8), (0, 0.75)])
+    assert refusal(split_square(outside)).code == "E-GRID-INTERFACE"
+
+
+@pytest.mark.parametrize(
+    "regions",
+    [
+        (),
+        (("lower", (0.5, 0.1)),),
+        (("lower", (0.5, 0.1)), ("upper", (0.5, 1.9))),
+        (("lower", (0.5, 0.1)), ("upper", (0.5, 0.2))),
+        (("same", (0.5, 0.1)), ("same", (0.5, 0.9))),
+    ],
+    ids=["none", "one missing", "outside", "same part", "same name"],
+)
+def test_regions_must_name_every_part_once(regions):
+    assert refusal(split_square(straight((0, 0.5), (1, 0.5)), regions)).code == "E-GRID-REGION"

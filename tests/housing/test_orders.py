@@ -1,0 +1,178 @@
+"""Order spectra, bands, envelopes, lobes and lines of signals known in closed form."""
+
+import numpy as np
+import pytest
+
+from femgear.errors import CaseError
+from femgear.housing import (
+    OrderSpectrum,
+    analyse_band,
+    analytic_signal,
+    band_pass,
+    count_lobes,
+    dominant_lines,
+    envelope,
+    fixed_sensor_lines,
+    line_sources,
+    order_spectrum,
+    symmetry_leakage,
+)
+
+THETA = 2 * np.pi * np.arange(2048) / 2048
+
+
+def spectrum_of(lines, top=400):
+    value = np.zeros(top + 1, dtype=complex)
+    for order, amplitude in lines.items():
+        value[order] = amplitude
+    return OrderSpectrum(np.arange(top + 1), value)
+
+
+@pytest.mark.parametrize("samples", [64, 65])
+def test_amplitudes_are_peak_values_of_the_cosines(samples):
+    theta = 2 * np.pi * np.arange(samples) / samples
+    spectrum = order_spectrum(0.5 + 2 * np.cos(3 * theta + 0.4) - 0.1 * np.sin(20 * theta))
+    assert spectrum.value[0] == pytest.approx(0.5)
+    assert spectrum.value[3] == pytest.approx(2 * np.exp(0.4j))
+    assert spectrum.value[20] == pytest.approx(0.1j)
+    others = np.delete(spectrum.amplitude, [0, 3, 20])
+    assert others.max() < 1e-14
+
+
+@pytest.mark.parametrize("samples", [64, 65])
+def test_parseval_with_the_highest_line(samples):
+    signal = np.random.default_rng(3).normal(size=samples)
+    spectrum = order_spectrum(signal)
+    last = spectrum.amplitude[-1] ** 2 / 2 if samples % 2 == 0 else 0  # the Nyquist line is no cosine pair
+    assert spectrum.mean_square + last == pytest.approx(np.mean(signal**2), rel=1e-13)
+
+
+def test_several_revolutions_resolve_parts_of_orders():
+    theta = 2 * np.pi * 4 * np.arange(1024) / 1024
+    spectrum = order_spectrum(np.cos(10.25 * theta), revolutions=4)
+    assert spectrum.order[np.argmax(spectrum.amplitude)] == 10.25
+    assert count_lobes(1 + 0.5 * np.cos(3 * theta), revolutions=4).per_revolution == 3
+
+
+def test_band_pass_and_envelope_of_two_carriers():
+    modulated = (1 + 0.6 * np.cos(3 * THETA)) * np.cos(108 * THETA) + 0.7 * np.cos(216 * THETA)
+    band = band_pass(order_spectrum(modulated), 54, 162)
+    heard = envelope(band, samples=2050)
+    t = 2 * np.pi * np.arange(2050) / 2050
+    assert np.allclose(heard, 1 + 0.6 * np.cos(3 * t), atol=1e-12)
+    signal = analytic_signal(band, samples=2050).real
+    assert np.allclose(signal, (1 + 0.6 * np.cos(3 * t)) * np.cos(108 * t), atol=1e-12)
+
+
+def test_two_equal_side_lines_make_six_lobes():
+    # the sensor on a node line crosses a standing pattern of three nodal diameters
+    field = np.zeros((2, 7), dtype=complex)
+    field[1, 0] = field[1, 6] = 1e-6
+    lines = fixed_sensor_lines(field, 108, 5.2, 0.0)
+    spectrum = OrderSpectrum(lines.order, lines.displacement)
+    band = analyse_band(spectrum, 108, 1)
+    assert sorted(line.order for line in band.lines) == [105, 111]
+    assert [line.level for line in band.lines] == pytest.approx([0, 0], abs=1e-12)
+    assert (band.low, band.high) == (55, 161)
+    assert band.lobes.per_revolution == 6
+    assert np.allclose(band.lobes.position, np.arange(6) / 6, atol=1 / band.envelope.size)
+    assert band.lobes.height == pytest.approx(np.full(6, 2e-6), rel=1e-3)
+    t = 2 * np.pi * np.arange(band.envelope.size) / band.envelope.size
+    assert np.allclose(band.envelope, 2e-6 * np.abs(np.cos(3 * t)), atol=1e-18)
+    assert np.all(np.abs(band.signal) <= band.envelope + 1e-20)
+
+
+def test_lobes_survive_the_weight_of_the_acceleration():
+    field = np.zeros((2, 7), dtype=complex)
+    field[1, 0] = field[1, 6] = 1e-6
+    lines = fixed_sensor_lines(field, 108, 5.2, 0.3)
+    band = analyse_band(OrderSpectrum(lines.order, lines.acceleration), 108, 1)
+    assert [line.order for line in band.lines] == [111, 105]
+    assert band.lines[1].level == pytest.approx(40 * np.log10(105 / 111), abs=1e-9)
+    assert band.lobes.per_revolution == 6
+
+
+@pytest.mark.parametrize("shift", [0, 1, 170, 1023])
+def test_seam_of_the_revolution_is_no_edge(shift):
+    lobes = count_lobes(np.roll(1 + 0.5 * np.cos(6 * THETA), shift))
+    assert lobes.per_revolution == 6
+    assert lobes.prominence == pytest.approx(np.ones(6), rel=1e-4)
+    expected = np.sort((np.arange(6) / 6 + shift / 2048) % 1)
+    assert np.allclose(lobes.position, expected, atol=1 / 2048)
+
+
+def test_prominence_threshold_decides_on_small_lobes():
+    # maxima of 1 + cos(3x)/2 + a cos(6x): small ones between the large ones, 2a - 1/2 + 1/(32 a) prominent
+    ripple = 1 + 0.5 * np.cos(3 * THETA) + 0.2 * np.cos(6 * THETA)
+    prominence = 2 * 0.2 - 0.5 + 1 / (32 * 0.2)
+    share = prominence / 1.7
+    assert count_lobes(ripple, threshold=0.98 * share).per_revolution == 6
+    assert count_lobes(ripple, threshold=1.02 * share).per_revolution == 3
+
+
+def test_constant_and_silent_envelopes_have_no_lobes():
+    assert count_lobes(np.ones(100)).per_revolution == 0
+    assert count_lobes(np.zeros(100)).per_revolution == 0
+    noisy = 1 + 1e-13 * np.random.default_rng(0).normal(size=500)
+    assert count_lobes(noisy).per_revolution == 0
+
+
+def test_flat_topped_lobe_is_one_lobe():
+    assert count_lobes(np.repeat([0.0, 1.0, 0.2, 1.0], 25)).per_revolution == 2
+
+
+def test_dominant_lines_are_sorted_and_cut_at_the_floor():
+    spectrum = spectrum_of({108: 1.0, 105: 3.0, 111: 2.0j, 120: 1e-4, 216: 50.0})
+    lines = dominant_lines(spectrum, low=54, high=162)
+    assert [(line.order, line.amplitude) for line in lines] == [(105, 3.0), (111, 2.0), (108, 1.0)]
+    assert lines[1].level == pytest.approx(20 * np.log10(2 / 3))
+    assert len(dominant_lines(spectrum, low=54, high=162, count=2)) == 2
+    assert len(dominant_lines(spectrum, low=54, high=162, floor=-120)) == 4
+    assert dominant_lines(spectrum, low=300, high=310) == ()
+
+
+def test_symmetry_leakage_is_a_ratio_to_the_largest_line():
+    assert symmetry_leakage(spectrum_of({108: 2.0, 109: 0.5}), 3) == pytest.approx(0.25)
+    assert symmetry_leakage(spectrum_of({108: 2.0, 111: 0.5}), 3) == 0
+    assert symmetry_leakage(spectrum_of({}), 3) == 0
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_sources_of_a_line_are_the_components_that_sound_there(direction):
+    n_max, harmonics, z_ring = 9, 2, 12
+    for order in (0, 5, 9, 15, 30):
+        found = []
+        for h in range(harmonics + 1):
+            for n in range(-n_max, n_max + 1):
+                field = np.zeros((harmonics + 1, 2 * n_max + 1), dtype=complex)
+                field[h, n + n_max] = 1.0
+                lines = fixed_sensor_lines(field, z_ring, direction * 2.0, 0.0)
+                if abs(lines.displacement[order]) > 0.5:
+                    found.append((h, n))
+        sources = line_sources(order, z_ring, direction=direction, n_max=n_max, harmonics=harmonics)
+        assert set(sources) == set(found)
+        assert [abs(n) for _, n in sources] == sorted(abs(n) for _, n in sources)
+
+
+def test_unusable_requests_are_refused():
+    spectrum = spectrum_of({108: 1.0})
+    several = OrderSpectrum(np.arange(10), np.ones((2, 10), dtype=complex))
+    refused = [
+        (lambda: order_spectrum([1.0]), "E-SIGNAL"),
+        (lambda: order_spectrum([1.0, np.nan]), "E-SIGNAL"),
+        (lambda: order_spectrum(np.ones(8), revolutions=0), "E-SIGNAL"),
+        (lambda: order_spectrum(np.ones(8), revolutions=1.5), "E-SIGNAL"),
+        (lambda: band_pass(spectrum, 0, 10), "E-BAND"),
+        (lambda: band_pass(spectrum, 500, 600), "E-BAND"),
+        (lambda: analyse_band(spectrum, 108, 9), "E-BAND"),
+        (lambda: analyse_band(spectrum, 0, 1), "E-TEETH"),
+        (lambda: analytic_signal(spectrum, samples=800), "E-SAMPLES"),
+        (lambda: dominant_lines(several, low=1, high=5), "E-SIGNAL"),
+        (lambda: count_lobes(np.ones((2, 9))), "E-SIGNAL"),
+        (lambda: count_lobes(-np.ones(9)), "E-SIGNAL"),
+        (lambda: count_lobes(np.ones(9), threshold=1.5), "E-SIGNAL"),
+    ]
+    for call, code in refused:
+        with pytest.raises(CaseError) as caught:
+            call()
+        assert caught.value.code == code

@@ -1,0 +1,222 @@
+"""Datasets in the form of a run's results, made from closed forms: realistic sizes, exact symmetries."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import xarray as xr
+
+N, SUN, PLANET, RING, MODULE = 3, 27, 40, 108, 1.5e-3
+FACE_WIDTH, CENTRE_DISTANCE, OUTER = 0.025, 0.051, 0.1
+ANGLES = 2 * np.pi * np.arange(N) / N
+MESHES = [f"sun-planet {n + 1}" for n in range(N)] + [f"planet {n + 1}-ring" for n in range(N)]
+SPEEDS = np.array([250.0, 3100.0])
+HARMONICS, DIAMETERS = 12, 12
+CARRIER_FREQUENCY = SPEEDS / 60 * SUN / (SUN + RING)
+
+
+def planetary_set():
+    """What the pictures need to know of the gears."""
+
+    def gear(teeth, rim, sign):
+        reference = MODULE * teeth / 2
+        return SimpleNamespace(
+            teeth=teeth,
+            reference_radius=reference,
+            tip_radius=reference + sign * MODULE,
+            root_radius=reference - sign * 1.25 * MODULE,
+            rim_radius=rim,
+        )
+
+    return SimpleNamespace(
+        sun=gear(SUN, 0.009, 1),
+        planet=gear(PLANET, 0.018, 1),
+        ring=gear(RING, OUTER, -1),
+        centre_distance=CENTRE_DISTANCE,
+        planet_angles=ANGLES,
+    )
+
+
+def _variable(dims, values, units, long_name):
+    return (dims, np.asarray(values), {"units": units, "long_name": long_name})
+
+
+def static(*, defect: float = 0.0) -> xr.Dataset:
+    """STE, stiffness and sharing of identical planets; `defect` makes the last planet differ."""
+    position = np.arange(64) / 64
+    force, ratio = 100 / 3 / 0.01903, {"sun": 1.5507, "ring": 1.9301}
+    pair = [_pair_loads(position, ratio["sun" if j < N else "ring"], force) for j in range(2 * N)]
+    engaged = np.array([(p > 0).sum(axis=0) for p in pair])
+    stiffness = 2.6e8 * engaged * (1 + 0.05 * np.cos(2 * np.pi * position))
+    stiffness[N - 1] *= 1 - defect
+    ste = force / (0.93 * stiffness) + 2.2e-6
+    share = np.full((N, 64), 1 / N)
+    share[-1] -= defect * 0.1 * (1 + 0.2 * np.sin(2 * np.pi * position))
+    share[:-1] += (1 / N - share[-1]) / (N - 1)
+    mp = ("mesh", "position")
+    return xr.Dataset(
+        {
+            "ste": _variable(mp, ste, "m", "static transmission error"),
+            "ste_overall": _variable(("planet", "position"), ste[:N] + ste[N:], "m", "sun to ring"),
+            "mesh_force": _variable(mp, np.full((2 * N, 64), force), "N", "mesh force"),
+            "mesh_stiffness": _variable(mp, stiffness, "N/m", "tangent mesh stiffness"),
+            "mesh_stiffness_secant": _variable(mp, force / ste, "N/m", "secant mesh stiffness"),
+            "tooth_load": _variable(("mesh", "tooth", "position"), pair, "N", "load of a tooth pair"),
+            "load_share": _variable(("planet", "position"), share, "1", "share of the torque"),
+            "max_pressure": _variable(mp, 9e8 + 2e8 / engaged, "Pa", "largest contact pressure"),
+        },
+        coords={
+            "mesh": MESHES,
+            "position": _variable("position", position, "1", "position"),
+            "planet": [1, 2, 3],
+        },
+        attrs={
+            "contact_ratio_sun_planet": ratio["sun"],
+            "contact_ratio_planet_ring": ratio["ring"],
+            "working_pressure_angle_sun_planet": np.radians(22.1995),
+            "working_pressure_angle_planet_ring": np.radians(20.0),
+            "contact": "profile",
+        },
+    )
+
+
+def _pair_loads(position, contact_ratio, force):
+    """Two simultaneous pairs one base pitch apart, load split evenly in double contact."""
+    path = np.arange(2)[:, None] + position
+    on = (path < contact_ratio).astype(float)
+    return force * on / on.sum(axis=0)
+
+
+def modes() -> xr.Dataset:
+    """Rigid motion, body modes and cosine and sine ring modes."""
+    rigid = [f"{b}: {a}" for b in ("sun", "carrier", *(f"planet {n + 1}" for n in range(N))) for a in _AXES]
+    dofs = [*rigid, *(f"ring: n={n} {p}" for n in range(5) for p in ("cosine", "sine"))]
+    shape, frequency, kind, diameter = [], [], [], []
+    components = []
+
+    def add(values, hertz, what, n, field=()):
+        shape.append([values.get(name, 0.0) for name in dofs])
+        frequency.append(hertz)
+        kind.append(what)
+        diameter.append(n)
+        row = np.zeros(2 * DIAMETERS + 1, complex)
+        for m, value in field:
+            row[DIAMETERS + m] = value
+        components.append(row)
+
+    ring = {"sun: rotation": 20.0, "carrier: rotation": 4.0} | {
+        f"planet {n + 1}: rotation": -9.0 for n in range(N)
+    }
+    add(ring, 0.0, "rigid", 0)
+    add(
+        {f"planet {n + 1}: rotation": 50.0 for n in range(N)} | {"sun: rotation": 60.0},
+        310.0,
+        "rotational",
+        0,
+    )
+    for axis, hertz in (("x", 840.0), ("y", 840.0)):
+        add(
+            {f"sun: {axis}": 1.5, f"carrier: {axis}": 0.4}, hertz, "translational", 1, ((1, 0.05), (-1, 0.05))
+        )
+    for n, hertz in ((0, 5200.0), (1, 2100.0), (2, 2600.0), (3, 3150.0), (4, 4100.0)):
+        for phase in (1.0, -1j)[: 1 if n == 0 else 2]:
+            add({}, hertz, "ring", n, ((n, phase), (-n, np.conj(phase))))
+    order = np.argsort(frequency, kind="stable")
+    c = np.array(components)[order]
+    mc = ("mode", "circumferential")
+    return xr.Dataset(
+        {
+            "frequency": _variable("mode", np.array(frequency)[order], "Hz", "natural frequency"),
+            "damping_ratio": _variable("mode", np.full(len(order), 0.05), "1", "damping ratio"),
+            "kind": _variable("mode", np.array(kind)[order], "", "kind of mode"),
+            "nodal_diameter": _variable("mode", np.array(diameter)[order], "1", "nodal diameters"),
+            "shape": _variable(("dof", "mode"), np.array(shape)[order].T, "kg^-0.5", "mode shape"),
+            "ring_shape_real": _variable(mc, c.real, "kg^-0.5", "ring shape"),
+            "ring_shape_imag": _variable(mc, c.imag, "kg^-0.5", "ring shape"),
+        },
+        coords={
+            "dof": dofs,
+            "mode": np.arange(len(order)),
+            "circumferential": np.arange(-DIAMETERS, DIAMETERS + 1),
+        },
+    )
+
+
+_AXES = ("x", "y", "rotation")
+
+
+def ring_field() -> np.ndarray:
+    """Carrier-frame components (speed, harmonic, n) [m] with the symmetry of identical planets in phase."""
+    n = np.arange(-DIAMETERS, DIAMETERS + 1)
+    h = np.arange(HARMONICS + 1)
+    size = 2e-7 / (1 + h[:, None]) ** 2.2 / (1 + (n / 3) ** 2) * np.where(n == 0, 0.15, 1.0)
+    resonance = 1 / np.abs(1 - (h[None] * CARRIER_FREQUENCY[:, None] * RING / 5600) ** 2 + 0.1j)
+    field = size * resonance[:, :, None] * np.exp(1j * (0.7 * h[:, None] + 0.2 * np.abs(n))) * (n % N == 0)
+    field[:, 0] = 6e-6 * (n % N == 0) / (1 + (n / 4) ** 2) * np.cos(0.4 * n)
+    return field
+
+
+def dynamics(*, speeds: np.ndarray | None = None) -> xr.Dataset:
+    """Harmonics of identical planets; with `speeds` a resonance curve without ring components."""
+    rpm = SPEEDS if speeds is None else np.asarray(speeds)
+    mesh = rpm / 60 * SUN / (SUN + RING) * RING
+    h = np.arange(HARMONICS + 1)
+    gain = 1 / (1 - (h * mesh[:, None] / 1500) ** 2 + 0.1j * h * mesh[:, None] / 1500)
+    kind = np.where(np.arange(2 * N) < N, 1.0, 0.7)
+    dte = 1e-6 * kind[:, None] * np.exp(-1j * h) / (1 + h) ** 1.5 * gain[:, None, :]
+    dte[:, :, 0] = 5e-6
+    force = 3e8 * dte
+    smh, s = ("speed", "mesh", "harmonic"), len(rpm)
+    radius = 0.2 + 0.5 * np.abs(gain[:, 1]) / np.abs(gain).max()
+    data = {
+        "mesh_frequency": _variable("speed", mesh, "Hz", "mesh frequency"),
+        "converged": _variable("speed", np.ones(s, bool), "1", "converged"),
+        "iterations": _variable("speed", np.full(s, 14), "1", "iterations"),
+        "residual": _variable("speed", np.full(s, 3e-8), "1", "residual"),
+        "spectral_radius": _variable("speed", radius, "1", "spectral radius"),
+        "floquet_multiplier": _variable("speed", np.full(s, 0.83), "1", "largest Floquet multiplier"),
+        "method": _variable("speed", np.array(["fixed point"] * s), "", "method"),
+    } | {
+        f"{name}_{part}": _variable(smh, getattr(value, part), units, name)
+        for name, value, units in (("dte", dte, "m"), ("mesh_force", force, "N"))
+        for part in ("real", "imag")
+    }
+    coords = {"speed": _variable("speed", rpm, "rpm", "input speed"), "mesh": MESHES, "harmonic": h}
+    if speeds is None:
+        field, dims = ring_field(), ("speed", "harmonic", "circumferential")
+        for name, value in (("ring", field), ("ring_tangential", 0.3j * field)):
+            for part in ("real", "imag"):
+                data[f"{name}_{part}"] = _variable(dims, getattr(value, part), "m", name)
+        coords["circumferential"] = np.arange(-DIAMETERS, DIAMETERS + 1)
+    return xr.Dataset(data, coords=coords)
+
+
+def housing() -> xr.Dataset:
+    """Exact lines of `ring_field` at orders h z_ring - n, and the sum of them over one revolution."""
+    field, n, top = ring_field(), np.arange(-DIAMETERS, DIAMETERS + 1), (HARMONICS + 1) * RING
+    samples = 4096
+    lines = np.zeros((len(SPEEDS), top), complex)
+    for h in range(HARMONICS + 1):
+        for column, m in enumerate(n):
+            order = h * RING - m
+            if order > 0:
+                lines[:, order] += field[:, h, column]
+    lines *= (2 * np.pi * CARRIER_FREQUENCY[:, None] * np.arange(top)) ** 2
+    signal = np.fft.irfft(lines * samples / 2, samples, axis=1)
+    turn = np.arange(samples) / samples
+    st, so = ("speed", "time"), ("speed", "order")
+    return xr.Dataset(
+        {
+            "acceleration": _variable(st, signal, "m/s^2", "acceleration"),
+            "seconds": _variable(st, turn / CARRIER_FREQUENCY[:, None], "s", "time"),
+            "order_amplitude": _variable(so, 0.95 * np.abs(lines), "m/s^2", "amplitude, linear"),
+            "order_amplitude_exact": _variable(so, np.abs(lines), "m/s^2", "amplitude, exact"),
+        },
+        coords={
+            "speed": _variable("speed", SPEEDS, "rpm", "input speed"),
+            "time": _variable("time", turn, "1", "carrier revolutions"),
+            "order": _variable("order", np.arange(top), "1", "carrier order"),
+        },
+        attrs={"sensor_angle": 0.0},
+    )
