@@ -66,7 +66,7 @@ def with_value(case: Case, key: str, value: object) -> Case:
     key : str
         Dotted key such as ``"operation.torque"``.
     value : object
-        As the file would hold it: ``"50 N m"``, 0.3, 27.
+        As the file would hold it: ``"50 N m"``, 0.3, 27, a list or table of such; None leaves the entry out.
 
     Returns
     -------
@@ -83,9 +83,13 @@ def with_value(case: Case, key: str, value: object) -> Case:
     for part in tables:
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
-            raise CaseError(f"{part} is not a table", code="E-KEY", key=key, file=case.name)
-    table[last] = value
-    return _build(data, tomlfile.write(data), case.name, numbered=False)
+            raise CaseError(f"{part} is not a table", code="E-KEY", key=key, file=case.name or None)
+    if value is None:
+        table.pop(last, None)
+    else:
+        table[last] = value.tolist() if hasattr(value, "tolist") else value
+    text = tomlfile.write(data)
+    return _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
 
 
 def to_toml(case: Case) -> str:

@@ -10,7 +10,8 @@ from typing import Annotated, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from femgear import __version__
-from femgear.errors import FemgearError, StorageError
+from femgear.errors import FemgearError
+from femgear.files import storage_error
 
 INTERRUPTED = 130
 
@@ -119,11 +120,12 @@ def run(
         Replace the results that the folder holds.
     """
     from femgear import analysis
-    from femgear.case import read_case
+    from femgear.case import planetary_set, read_case
     from femgear.storage import open_results, prepare_output
     from femgear.summary import describe_results
 
     data = read_case(case)
+    planetary_set(data)  # refuse before the folder is touched
     folder = prepare_output(output, force=force)
     with _Progress() as progress:
         analysis.run_case(data, folder, only=only, pictures=pictures, progress=progress)
@@ -144,10 +146,11 @@ def report(folder: Path, /) -> int:
     folder
         Folder that femgear run wrote.
     """
-    from femgear.report import write_report
     from femgear.storage import open_results
 
     open_results(folder)
+    from femgear.report import write_report
+
     write_report(folder)
     print(f"report:  {folder / 'report.html'}")
     return 0
@@ -212,4 +215,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return 0
     except OSError as error:
-        return _fail(StorageError(error.strerror or str(error), file=error.filename))
+        return _fail(storage_error(error, error.filename))

@@ -24,13 +24,18 @@ def storage_errors(path: str | os.PathLike) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        raise StorageError(
-            f"{error.strerror or error}",
-            code="E-DISK-FULL" if full else "E-STORAGE",
-            file=os.fspath(path),
-            remedy="free some space or name another folder" if full else None,
-        ) from error
+        raise storage_error(error, path) from error
+
+
+def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageError:
+    """The `StorageError` that says what an `OSError` says, ``E-DISK-FULL`` or ``E-STORAGE``."""
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    return StorageError(
+        error.strerror or str(error),
+        code="E-DISK-FULL" if full else "E-STORAGE",
+        file=None if path is None else os.fsdecode(path),
+        remedy="free some space or name another folder" if full else None,
+    )
 
 
 def is_safe_path(name: str) -> bool:

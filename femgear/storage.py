@@ -201,7 +201,9 @@ def _clear(folder: Path, force: bool) -> None:
         )
     for name, digest in manifest.files.items():
         path = folder / name
-        if path.is_file() and not path.is_symlink() and checksum(path) == digest:
+        # a link inside the folder must not lead the removal out of it
+        inside = path.resolve() == folder.resolve() / name
+        if inside and path.is_file() and checksum(path) == digest:
             path.unlink()
 
 

@@ -75,8 +75,8 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
     if case.response_harmonics < 2 * case.dynamics.mesh_harmonics:
         found.append(
-            f"[W-HARMONICS] dynamics.response_harmonics: {case.response_harmonics} harmonics of the response for "
-            f"{case.dynamics.mesh_harmonics} of the mesh; twice as many are advised"
+            f"[W-HARMONICS] dynamics.response_harmonics: {case.response_harmonics} harmonics of the response "
+            f"for {case.dynamics.mesh_harmonics} of the mesh; twice as many are advised"
         )
     return tuple(found)
 
@@ -118,7 +118,7 @@ def _meshes(s: PlanetarySet) -> Block:
         text = ", ".join(f"{value:.4f}" for value in values[:6])
         return text + (", ..." if len(values) > 6 else "")
 
-    clearance = tip_clearances(s)
+    clearance = {name: f"{1e3 * value:.3f}" for name, value in tip_clearances(s).items()}
     rows = (
         (
             "working pressure angle [deg]",
@@ -128,13 +128,13 @@ def _meshes(s: PlanetarySet) -> Block:
         ("contact ratio", f"{s.contact_ratio_sun_planet:.4f}", f"{s.contact_ratio_planet_ring:.4f}"),
         (
             "normal backlash [um]",
-            f"{s.backlash_sun_planet * 1e6 + 0.0:.2f}",
-            f"{s.backlash_planet_ring * 1e6 + 0.0:.2f}",
+            f"{round(s.backlash_sun_planet * 1e6, 2) + 0.0:.2f}",
+            f"{round(s.backlash_planet_ring * 1e6, 2) + 0.0:.2f}",
         ),
         (
             "tip clearances [mm]",
-            f"{1e3 * clearance['sun tip to planet root']:.3f}, {1e3 * clearance['planet tip to sun root']:.3f}",
-            f"{1e3 * clearance['planet tip to ring root']:.3f}, {1e3 * clearance['ring tip to planet root']:.3f}",
+            f"{clearance['sun tip to planet root']}, {clearance['planet tip to sun root']}",
+            f"{clearance['planet tip to ring root']}, {clearance['ring tip to planet root']}",
         ),
         ("mesh phases [periods]", listing(phases[:n]), listing(phases[n:])),
     )
@@ -236,7 +236,8 @@ def _diameter(number: int) -> str:
 def _dynamics(data: xr.Dataset) -> Block:
     dte = np.hypot(data.dte_real.values, data.dte_imag.values)  # speed, mesh, harmonic
     rms = np.sqrt(0.5 * (dte[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
-    stable = np.abs(data.floquet_multiplier.values)
+    largest = np.abs(data.floquet_multiplier.values)
+    stable = data.stable.values.astype(bool) if "stable" in data else largest < 1.0
     rows = tuple(
         (
             f"{float(data.speed[i]):.2f}",
@@ -245,7 +246,7 @@ def _dynamics(data: xr.Dataset) -> Block:
             str(data.method.values[i]),
             str(int(data.iterations[i])),
             f"{float(data.spectral_radius[i]):.4f}",
-            f"{stable[i]:.4f}",
+            f"{largest[i]:.4f}",
             "yes" if bool(data.converged[i]) else "NO",
         )
         for i in _chosen(data.sizes["speed"])
@@ -261,9 +262,9 @@ def _dynamics(data: xr.Dataset) -> Block:
         "converged",
     )
     notes = (
-        "DTE rms: the largest of all meshes, without its mean; radius: of the fixed point, which contracts below 1;",
-        "Floquet: largest multiplier, stable below 1",
-        f"{int(data.converged.sum())} of {data.sizes['speed']} speeds converged, {int((stable < 1).sum())} stable",
+        "DTE rms: the largest of all meshes, without its mean; steps, radius: of the fixed point,",
+        "which contracts below 1; Floquet: largest multiplier, stable below 1",
+        f"{int(data.converged.sum())} of {len(stable)} speeds converged, {int(stable.sum())} stable",
     )
     return Block("Dynamics", header, rows, notes)
 
@@ -274,7 +275,7 @@ def _housing(data: xr.Dataset) -> Block:
         one = data.isel(speed=i)
         amplitude = one.order_amplitude.values
         largest = np.argsort(-amplitude, kind="stable")[:5]
-        lines = ", ".join(f"{int(round(float(one.order[j])))} ({amplitude[j]:.3g})" for j in largest)
+        lines = ", ".join(f"{round(float(one.order[j]))} ({amplitude[j]:.3g})" for j in largest)
         rms = float(np.sqrt(np.mean(one.acceleration.values**2)))
         rows.append((f"{float(one.speed):.2f}", f"{rms:.4g}", lines))
     header = ("speed [rpm]", "rms [m/s^2]", "largest lines: carrier order (amplitude [m/s^2])")

@@ -5,6 +5,7 @@ import math
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -125,6 +126,14 @@ def test_a_changed_case_can_be_written_and_read_again():
     assert read_case(CASE).operation.torque == 100
     assert parse_case(to_toml(case)) == case
     assert to_toml(read_case(CASE)) == TEXT
+
+
+def test_entries_can_be_left_out_and_numpy_numbers_are_numbers():
+    case = with_value(read_case(CASE), "motor", None)
+    assert case.motor is None and read_case(CASE).motor is not None
+    assert with_value(case, "sun.teeth", np.int64(30)).sun.teeth == 30
+    assert with_value(case, "dynamics.damping_ratio", np.float64(0.02)).dynamics.damping_ratio == 0.02
+    assert with_value(case, "operation.speeds", ("1 rpm", "2 rpm")).operation.speeds[1] > 0.2
 
 
 def test_negative_ring_teeth_mean_internal_and_are_echoed():  # bad input 32
@@ -388,6 +397,12 @@ WRONG = [
     ("static.contact", "hertz", "E-CHOICE", "line_of_action"),
     ("static.positions", 12, "E-RANGE", "6 mesh harmonics"),
     ("dynamics.response_harmonics", 5, "E-RANGE", "12 advised"),
+    ("dynamics.damping_ratio", math.nan, "E-FINITE", "dynamics.damping_ratio"),  # 10
+    pytest.param("dynamics.damping_ratio", 10**5000, "E-RANGE", "too long", id="5000 digits"),  # 12
+    pytest.param("sun.teeth", 10**1000, "E-RANGE", "5 to 5000", id="1000 digits"),  # 12
+    ("sun.teeth", np.bool_(True), "E-TYPE", "whole number"),  # 26
+    ("sun.teeth", np.float64(27), "E-TYPE", "whole number"),  # 26
+    ("sun.teeth", object(), "E-TYPE", "object"),
     ("title", "two\nlines", "E-RANGE", "printable"),
     ("title", 3, "E-TYPE", "text"),
     ("sun", 3, "E-TYPE", "[sun]"),

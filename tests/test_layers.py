@@ -13,7 +13,7 @@ LAYERS = (
     ("files",),
     ("system", "gears", "fe", "casefile", "netcdf"),
     ("contact", "models", "solvers", "housing", "case"),
-    ("storage", "plots", "scene"),
+    ("storage", "datasets", "plots", "scene"),
     ("analysis",),
     ("report", "sweep", "summary", "validation"),
     ("cli",),
@@ -27,18 +27,29 @@ def part_of(path: Path) -> str:
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
+def imports(path: Path):
+    """Import statements of a file, wherever they stand, but for those that only type checkers see."""
+    pending = [ast.parse(path.read_text(encoding="utf-8"))]
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node
+        elif not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            pending += ast.iter_child_nodes(node)
+
+
 def imported_parts(path: Path) -> set[str]:
-    """First name below ``femgear`` of everything a file imports, wherever in the file."""
+    """First name below ``femgear`` of everything that a file imports."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in imports(path):
         if isinstance(node, ast.Import):
             found |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("femgear.")}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}:{node.lineno}: relative import"
-            if node.module == "femgear":
-                found |= {alias.name for alias in node.names} - {"__version__"}
-            elif node.module.startswith("femgear."):
-                found.add(node.module.split(".")[1])
+            continue
+        assert node.level == 0, f"{path}:{node.lineno}: relative import"
+        if node.module == "femgear":
+            found |= {alias.name for alias in node.names} - {"__version__"}
+        elif node.module.startswith("femgear."):
+            found.add(node.module.split(".")[1])
     return found
 
 
@@ -56,9 +67,10 @@ def test_imports_go_downwards_only(path):
 def test_solvers_know_nothing_but_the_waist():
     for path in (PACKAGE / "solvers").rglob("*.py"):
         assert imported_parts(path) <= {"errors", "system", "solvers"}
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            names += [node.module] if isinstance(node, ast.ImportFrom) else []
+        for node in imports(path):
+            names = (
+                [node.module] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names]
+            )
             outside = {name.split(".")[0] for name in names} - set(sys.stdlib_module_names)
             assert outside <= {"femgear", "numpy", "scipy"}
 

@@ -109,7 +109,7 @@ def Number(
             raise refuse(
                 f"the number is out of range{': ' + note if note else ''}",
                 code="E-RANGE",
-                value=value,
+                value=shown(value) if isinstance(value, int) else value,
                 limit=limit,
             )
         return float(value)

@@ -196,7 +196,7 @@ def _check_tree(data: dict, name: str) -> list[str]:
 
 
 def write(data: dict) -> str:
-    """TOML text of nested tables of strings, booleans, integers, finite floats and lists of these.
+    """TOML text of nested tables of strings, booleans, integers, floats and lists of these.
 
     Returns
     -------
@@ -228,8 +228,10 @@ def _value(value: object) -> str:
     if isinstance(value, str):
         return '"' + "".join(_escape(character) for character in value) + '"'
     if isinstance(value, int):
+        if abs(value).bit_length() > 4096:
+            raise CaseError("the integer is too long", code="E-RANGE", value=shown(value))
         return str(value)
-    if isinstance(value, float) and math.isfinite(value):
+    if isinstance(value, float):
         return repr(value)
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(item) for item in value) + "]"
@@ -241,11 +243,10 @@ def _value(value: object) -> str:
 def _escape(character: str) -> str:
     if character in '"\\':
         return "\\" + character
-    return (
-        character
-        if character.isprintable()
-        else (f"\\u{ord(character):04x}" if ord(character) < 0x10000 else f"\\U{ord(character):08x}")
-    )
+    if character.isprintable():
+        return character
+    code = ord(character)
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 
 
 def shown(number: int) -> str:

@@ -86,7 +86,7 @@ def walk_mesh_cycle(
     sun_torque: float,
     positions: int = 64,
     contact: str = "profile",
-    cells: int = 28,
+    cells: int = 36,
     planet_gaps=None,
     progress: Callable[[int, int], None] | None = None,
 ) -> MeshCycle:

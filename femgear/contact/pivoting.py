@@ -26,7 +26,23 @@ NULL = 1e-10  # relative eigenvalue below which a motion is not restrained
 
 @dataclass(frozen=True)
 class Problem:
-    """Scaled to unit mean compliance and unit largest arm of every motion."""
+    """The contact problem scaled to unit mean compliance and unit largest arm of every motion.
+
+    Parameters
+    ----------
+    H : (n, n) array
+        Compliance over its mean diagonal entry.
+    gap : (n,) array
+        Separations over the same [N].
+    G : (n, m) array
+        Approach per motion, largest entry of every column one.
+    load : (m,) array
+        External load over the arm [N].
+    compliance : float
+        Mean diagonal entry that was taken out [m/N].
+    arm : (m,) array
+        Largest arms that were taken out.
+    """
 
     H: np.ndarray
     gap: np.ndarray
@@ -38,7 +54,24 @@ class Problem:
 
 @dataclass(frozen=True)
 class Step:
-    """Solution of the linear conditions of one active set, and what they violate."""
+    """Solution of the linear conditions of one active set, and what they violate; scaled as `Problem`.
+
+    Parameters
+    ----------
+    active : (n,) bool array
+    loads, gaps : (n,) arrays
+    motions : (m,) array
+    flips : integer array
+        Candidates that pull, penetrate or must touch; empty when the problem is solved.
+    forced : integer array
+        Those of `flips` that must touch to restrain a motion.
+    null : (m, k) array
+        Motions that no touching candidate restrains.
+    residual : float
+        See `femgear.contact.solve.ContactState`.
+    tolerance : float
+        Load that counts as rounding.
+    """
 
     active: np.ndarray
     loads: np.ndarray
@@ -52,7 +85,13 @@ class Step:
 
 
 def factor(H):
-    """Lower Cholesky factor."""
+    """Lower Cholesky factor of a symmetric matrix (its strict upper triangle is not used).
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-COMPLIANCE when the matrix is not positive definite.
+    """
     lower, info = lapack.dpotrf(H, lower=1, clean=0)
     if info:
         lowest = np.linalg.eigvalsh(H)[0]
@@ -68,12 +107,27 @@ def factor(H):
 
 
 def forward(lower, columns):
-    """``L^-1 columns``."""
+    """``L^-1 columns`` for a lower factor (n, n) and columns (n,) or (n, k)."""
     return lapack.dtrtrs(lower, columns, lower=1)[0]
 
 
 def solve_step(problem: Problem, active: np.ndarray) -> Step:
-    """Solve the linear conditions of one active set and list the candidates that violate the others."""
+    """Solve the linear conditions of one active set and list the candidates that violate the others.
+
+    Parameters
+    ----------
+    problem : Problem
+    active : (n,) bool array
+
+    Returns
+    -------
+    Step
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-UNSUPPORTED when no candidate can balance the load.
+    """
     loads, motions, null = _solve_bordered(problem, np.flatnonzero(active))
     elastic, approach = problem.H @ loads, problem.G @ motions
     gaps = problem.gap + elastic - approach
@@ -83,7 +137,7 @@ def solve_step(problem: Problem, active: np.ndarray) -> Step:
         shift, blocked, forced = _settle(problem, null, gaps, active)
         motions = motions + null @ shift
         # the multipliers of the least distance problem carry the rounding of its largest row
-        scale += 10 * np.abs(problem.G @ (null @ shift)).max()
+        scale += 10 * np.abs(problem.G @ (null @ shift)).max(initial=0.0)
         approach = problem.G @ motions
         gaps = problem.gap + elastic - approach
     rounding = ROUNDING * (np.abs(problem.gap) + scale + np.abs(approach))
@@ -118,7 +172,7 @@ def _solve_bordered(problem: Problem, index: np.ndarray):
     lower = factor(H)
     half = forward(lower, G)
     values, vectors = np.linalg.eigh(half.T @ half)
-    free = values <= NULL * values[-1]
+    free = values <= NULL * values.max(initial=0.0)
     null, held = vectors[:, free], vectors[:, ~free]
     touching = np.zeros(len(index))
     for _ in range(2):

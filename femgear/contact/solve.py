@@ -238,7 +238,8 @@ def _by_daqp(problem: Problem) -> tuple[Step, int]:
     loads, _, flag, info = daqp.solve(
         cost, problem.gap / unit, arms, upper, lower, sense, primal_tol=1e-12, dual_tol=1e-12
     )
-    if flag == 1:
+    # whatever daqp thinks of its digits, only an active set without violations is accepted
+    if flag > 0:
         step, more = pivot(problem, loads > 1e-10 * np.abs(loads).max(), max_steps=50, single=True)
         if not len(step.flips):
             return step, int(info["iterations"]) + more

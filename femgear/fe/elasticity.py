@@ -158,30 +158,35 @@ def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness
 
     scalar = basis(grid)
     nodes = node_of_dof(grid, scalar)
-    names = {name: material.lame(value) for name, value in _by_region(state).items()}
+    pairs = {name: material.lame(value) for name, value in _by_region(state).items()}
     depth = per_element(grid, thickness)
-    shape = (len(grid.triangles), 1)
-    lam = (per_element(grid, {name: pair[0] for name, pair in names.items()}) * depth).reshape(shape)
-    mu = (per_element(grid, {name: pair[1] for name, pair in names.items()}) * depth).reshape(shape)
-    lam, mu = (np.broadcast_to(c, scalar.dx.shape) for c in (lam, mu))
-    forms = (
-        BilinearForm(
-            lambda u, v, w: (w.lam + 2 * w.mu) * u.grad[0] * v.grad[0] + w.mu * u.grad[1] * v.grad[1]
-        ),
-        BilinearForm(
-            lambda u, v, w: (w.lam + 2 * w.mu) * u.grad[1] * v.grad[1] + w.mu * u.grad[0] * v.grad[0]
-        ),
-        BilinearForm(lambda u, v, w: w.lam * u.grad[1] * v.grad[0] + w.mu * u.grad[0] * v.grad[1]),
+    lam, mu = (
+        np.broadcast_to(
+            (depth * per_element(grid, {name: pair[i] for name, pair in pairs.items()}))[:, None],
+            scalar.dx.shape,
+        )
+        for i in range(2)
     )
-    xx, yy, xy = (form.assemble(scalar, lam=lam, mu=mu).tocoo() for form in forms)
+    # three scalar forms instead of one with vectors: a quarter of the calls
+    xx, yy, xy = (BilinearForm(form).assemble(scalar, lam=lam, mu=mu).tocoo() for form in (_xx, _yy, _xy))
     rows = [2 * nodes[xx.row], 2 * nodes[yy.row] + 1, 2 * nodes[xy.row], 2 * nodes[xy.col] + 1]
     columns = [2 * nodes[xx.col], 2 * nodes[yy.col] + 1, 2 * nodes[xy.col] + 1, 2 * nodes[xy.row]]
-    values = [xx.data, yy.data, xy.data, xy.data]
+    values = np.concatenate([xx.data, yy.data, xy.data, xy.data])
     size = 2 * grid.n_nodes
-    K = csc_array(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(size, size)
-    )
+    K = csc_array((values, (np.concatenate(rows), np.concatenate(columns))), shape=(size, size))
     return 0.5 * (K + K.T).tocsc()
+
+
+def _xx(u, v, w):
+    return (w.lam + 2 * w.mu) * u.grad[0] * v.grad[0] + w.mu * u.grad[1] * v.grad[1]
+
+
+def _yy(u, v, w):
+    return (w.lam + 2 * w.mu) * u.grad[1] * v.grad[1] + w.mu * u.grad[0] * v.grad[0]
+
+
+def _xy(u, v, w):
+    return w.lam * u.grad[1] * v.grad[0] + w.mu * u.grad[0] * v.grad[1]
 
 
 def mass(grid: Grid, material: Material, thickness=1.0):

@@ -95,7 +95,7 @@ def mirror(
     joined: tuple[str, ...] = ("tip", "rim", "root"),
     symmetry: str = "symmetry",
 ) -> Grid:
-    """Reflect the upper half of a sector in the x axis and join both halves.
+    """Reflect the upper half of a sector in the x axis; the nodes given keep their numbers.
 
     Parameters
     ----------
@@ -108,11 +108,6 @@ def mirror(
         Boundaries that also appear as one, without suffix.
     symmetry : str
         Boundary on the x axis along which the halves are joined; its name is dropped.
-
-    Returns
-    -------
-    Grid
-        The nodes of the given half keep their numbers.
 
     Raises
     ------
@@ -137,17 +132,21 @@ def mirror(
     upper[line, 1] = 0.0
     points = np.vstack([upper, upper[new] * [1.0, -1.0]])
     triangles = np.vstack([grid.triangles, image[grid.triangles][:, [0, 2, 1, 5, 4, 3]]])
-    boundaries = {}
     names = [name for name in grid.boundaries if name != symmetry] if mirrored is None else mirrored
-    for name in names:
-        left = boundary_edges(grid, name)
-        right = image[left][::-1, [1, 0, 2]]
-        boundaries[f"{name}_left"], boundaries[f"{name}_right"] = left, right
-        if name in joined:
-            boundaries[name] = np.vstack([right, left] if right[-1, 1] == left[0, 0] else [left, right])
+    boundaries = _both_halves({name: boundary_edges(grid, name) for name in names}, image, joined)
     m = len(grid.triangles)
     regions = {name: np.concatenate([e, e + m]) for name, e in grid.regions.items()}
     return Grid(points, triangles, boundaries, regions)
+
+
+def _both_halves(boundaries, image, joined):
+    result = {}
+    for name, left in boundaries.items():
+        right = image[left][::-1, [1, 0, 2]]
+        result[f"{name}_left"], result[f"{name}_right"] = left, right
+        if name in joined:
+            result[name] = np.vstack([right, left] if right[-1, 1] == left[0, 0] else [left, right])
+    return result
 
 
 def copy_nodes(grid: Grid, count: int) -> np.ndarray:

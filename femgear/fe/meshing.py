@@ -107,17 +107,21 @@ def mesh_outline(
         )
     if cache is None:
         return _mesh_plan(plan, time_limit)
-    path = Path(cache) / f"{_content_hash(plan)}.msh"
+    return _mesh_cached(plan, Path(cache), time_limit)
+
+
+def _mesh_cached(plan, folder, time_limit):
+    path = folder / f"{_content_hash(plan)}.msh"
     if path.exists():
         try:
             return _check_cached(read_grid(path), plan)
-        except (StorageError, GridError):  # a damaged file in the cache is simply made again
-            path.unlink(missing_ok=True)
+        except (StorageError, GridError):
+            pass  # a damaged file in the cache is made again and replaced
     grid = _mesh_plan(plan, time_limit)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StorageError(f"cannot make the folder {path.parent}: {error}", code="E-GRID-WRITE") from error
+        raise StorageError(f"cannot make the folder {folder}: {error}", code="E-GRID-WRITE") from error
     write_grid(path, grid)
     return grid
 

@@ -92,19 +92,7 @@ def check_outline(outline) -> Plan:
         )
     _check_distinct(points, size)
     _check_crossing(points, segments, names, size)
-    area = _area(points[segments[:n_boundary, 0]])
-    if abs(area) < 1e-6 * size**2:
-        raise GridError(
-            f"the outline encloses an area of {area:.3e} m^2 in a box {size:.3e} m wide: a slit",
-            code="E-GRID-AREA",
-        )
-    if area < 0:
-        raise GridError(
-            "the outline runs clockwise",
-            code="E-GRID-CLOCKWISE",
-            limit="counter-clockwise, the body on the left",
-            remedy="reverse the order of the curves and of the points of each",
-        )
+    area = _check_area(points[segments[:n_boundary, 0]], size)
     loops = _faces(points, segments, n_boundary, area, names)
     faces = _name_faces(points, segments, loops, tuple(getattr(outline, "regions", ())))
     return Plan(points, segments, mids, names, n_boundary, loops, faces)
@@ -216,6 +204,23 @@ def _side(a, b, c, size):
     d = b - a
     cross = d[:, 0] * (c[:, 1] - a[:, 1]) - d[:, 1] * (c[:, 0] - a[:, 0])
     return np.where(np.abs(cross) <= CLOSE * size * np.hypot(d[:, 0], d[:, 1]), 0, np.sign(cross))
+
+
+def _check_area(polygon, size):
+    area = _area(polygon)
+    if abs(area) < 1e-6 * size**2:
+        raise GridError(
+            f"the outline encloses an area of {area:.3e} m^2 in a box {size:.3e} m wide: a slit",
+            code="E-GRID-AREA",
+        )
+    if area < 0:
+        raise GridError(
+            "the outline runs clockwise",
+            code="E-GRID-CLOCKWISE",
+            limit="counter-clockwise, the body on the left",
+            remedy="reverse the order of the curves and of the points of each",
+        )
+    return area
 
 
 def _area(polygon):

@@ -127,8 +127,8 @@ def _assembly(s: PlanetarySet):
         wanted = feasible_angles(total, s.planet_angles)
         listing = ", ".join(f"{math.degrees(a):.6f}" for a in wanted[:24])
         raise GeometryError(
-            f"{s.n_planets} planets do not assemble at these angles: {s.sun.teeth} + {s.ring.teeth} teeth times "
-            f"the angle over one turn must be whole, one planet misses by {worst:.4f} teeth "
+            f"{s.n_planets} planets do not assemble at these angles: {s.sun.teeth} + {s.ring.teeth} teeth "
+            f"times the angle over one turn must be whole, one planet misses by {worst:.4f} teeth "
             f"((z_s + z_r)/N = {total / s.n_planets:.6g})",
             code="E-ASSEMBLY",
             key="set.planet_angles",
@@ -223,8 +223,8 @@ def _interference(s: PlanetarySet):
     )
     if margin < 0.0:
         raise GeometryError(
-            f"the tips of planet ({s.planet.teeth} teeth) and ring ({s.ring.teeth}) strike each other outside "
-            f"the path of contact: the corners overlap by {-margin * s.ring.tip_radius * 1e3:.4f} mm",
+            f"the tips of planet ({s.planet.teeth} teeth) and ring ({s.ring.teeth}) strike each other "
+            f"outside the path of contact: the corners overlap by {-margin * s.ring.tip_radius * 1e3:.4f} mm",
             code="E-TROCHOID",
             key="ring.teeth",
             value=s.ring.teeth,

@@ -13,6 +13,19 @@ import numpy as np
 
 from femgear.errors import GeometryError
 
+# coefficients of x^19, x^17, .. x^3 in the Taylor series of tan(x) (DLMF 4.19.3)
+_TANGENT_SERIES = (
+    443861162 / 1856156927625,
+    6404582 / 10854718875,
+    929569 / 638512875,
+    21844 / 6081075,
+    1382 / 155925,
+    62 / 2835,
+    17 / 315,
+    2 / 15,
+    1 / 3,
+)
+
 
 def inv(angle):
     """Involute function ``tan(angle) - angle`` (ISO 21771, eq. 9).
@@ -27,10 +40,8 @@ def inv(angle):
     float or array [rad]
     """
     a = np.asarray(angle, dtype=float)
-    # the difference loses digits below 0.03 rad, where five terms of the series are exact to rounding
-    a2 = a * a
-    series = a * a2 * (1 / 3 + a2 * (2 / 15 + a2 * (17 / 315 + a2 * (62 / 2835 + a2 * 1382 / 155925))))
-    value = np.where(np.abs(a) < 0.03, series, np.tan(a) - a)
+    # the difference loses digits below 0.15 rad, where these terms of the series are exact to rounding
+    value = np.where(np.abs(a) < 0.15, a**3 * np.polyval(_TANGENT_SERIES, a * a), np.tan(a) - a)
     return float(value) if value.ndim == 0 else value
 
 

@@ -61,6 +61,16 @@ def basic_rack_factor(*, dedendum: float, pressure_angle: float) -> float:
     return (1.0 + 0.5 * (1.2 - dedendum)) * (1.0 - 0.02 * (20.0 - math.degrees(pressure_angle)))
 
 
+def blank_factor(*, web_ratio: float, rim_ratio: float) -> float:
+    """C_R = ``1 + ln(b_s/b) / (5 exp(s_R/(5 m)))`` of gears with a web (ISO 6336-1, method B).
+
+    ``web_ratio`` is b_s/b, web thickness over face width, taken within 0.2 .. 1.2; ``rim_ratio`` is s_R/m,
+    rim thickness over module, taken as at least 1. It is 1 for solid discs.
+    """
+    web = min(max(web_ratio, 0.2), 1.2)
+    return 1.0 + math.log(web) / (5.0 * math.exp(max(rim_ratio, 1.0) / 5.0))
+
+
 def mesh_stiffness_method_b(
     teeth_1: int,
     teeth_2: float,

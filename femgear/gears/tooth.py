@@ -11,11 +11,12 @@ from femgear.errors import GeometryError
 from femgear.gears.fillet import fillet_point
 from femgear.gears.gear import Gear, flank_points, half_thickness_angle
 
-# point spacing in modules, before `refine`
+# point spacing in modules, before `refine`: about 1200 triangles in the half sector of the reference sun
 FILLET_SIZE = 0.05
 FINEST_SIZE = 0.02
-LARGEST_SIZE = 0.8
-GROWTH = 0.3  # increase of the spacing per unit length along a curve
+INNER_SIZE = 0.1
+LARGEST_SIZE = 0.5
+GROWTH = 0.11  # increase of the spacing per unit length along a curve
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,9 @@ class HalfSector:
         "flank" (involute), "fillet" (generated), "root" (arc; absent when the fillets meet), "cut" (radial
         line at pi/z) and "rim" (arc at the rim radius).
     interfaces : tuple of (str, (2 k + 1, 2) array)
-        "tooth_base": arc from the symmetry line to the fillet that splits tooth and body. It ends at the
-        fillet vertex whose tangent is nearest to 45 deg from the arc, since an arc on the root circle itself
-        would touch the fillet at zero angle.
+        "tooth_base": arc from the symmetry line to the fillet that splits tooth and body. It ends where
+        the fillet stands at 45 deg to the arc; an arc on the root circle itself would touch the fillet at
+        zero angle.
     regions : tuple of (str, (float, float))
         A point [m] inside each of "tooth" and "body".
     flank_roll : (2 n + 1,) array
@@ -75,10 +76,10 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     unit = gear.module / refine
     rolls = np.linspace(gear.tip_roll, flank_end_roll(gear, count), 2 * count + 1)
     flank = flank_points(gear, rolls)
-    fillet = _fillet(gear, flank, rolls[-1], unit)
+    fillet, split = _fillet(gear, flank, rolls[-1], unit)
     root = _root(gear, fillet, unit)
     tip = _tip(gear, flank, unit)
-    base, split = _tooth_base(gear, fillet, unit)
+    base = _tooth_base(fillet[split], unit)
     last = _last_edge(root if root is not None else fillet)
     cut = _cut(gear, unit, start=last)
     rim = _rim(gear, unit)
@@ -146,8 +147,8 @@ def flank_end_roll(gear: Gear, flank_elements: int) -> float:
     return max(gear.form_roll, gear.tip_roll / (flank_elements + 1))
 
 
-def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, unit: float) -> np.ndarray:
-    """Fillet from the flank's end to the root circle, spaced by arc length."""
+def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, unit: float) -> tuple[np.ndarray, int]:
+    """Fillet from the flank's end to the root circle, spaced by arc length; row where the tooth base ends."""
 
     def point(p):
         # p in -1 .. 0: rest of the involute, 0 .. 1: generated fillet
@@ -159,16 +160,26 @@ def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, unit: float) -> np.n
     p = np.linspace(0.0, 1.0, 2001)
     if end_roll > gear.form_roll:
         p = np.concatenate([np.linspace(-1.0, 0.0, 200, endpoint=False), p])
-    edges = np.linalg.norm(np.diff(point(p), axis=0), axis=1)
+    dense = point(p)
+    edges = np.linalg.norm(np.diff(dense, axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(edges)])
+    split = length[_base_row(dense)]
     size = FILLET_SIZE * unit
     start = min(max(_last_edge(flank), FINEST_SIZE * unit), size)
-    fractions = _spacing(length[-1], start, size, largest=size)
-    stations = np.interp(fractions * length[-1], length, p)
-    stations[-1] = 1.0
-    points = point(stations)
+    upper = split * _spacing(split, start, size, largest=size)
+    lower = split + (length[-1] - split) * _spacing(length[-1] - split, size, size, largest=size)
+    points = point(np.interp(np.concatenate([upper, lower[1:]]), length, p))
     points[0] = flank[-1]
-    return points
+    return points, len(upper) - 1
+
+
+def _base_row(points: np.ndarray) -> int:
+    """Row of a finely sampled fillet, first from the root, that leaves the circles at 45 deg (else its middle)."""
+    tangent = points[2:] - points[:-2]
+    radial = points[1:-1] / np.linalg.norm(points[1:-1], axis=1)[:, None]
+    slope = np.abs(np.sum(tangent * radial, axis=1)) / np.linalg.norm(tangent, axis=1)
+    steep = np.flatnonzero(slope >= math.sqrt(0.5))
+    return 1 + int(steep[-1]) if len(steep) else len(points) // 2
 
 
 def _root(gear: Gear, fillet: np.ndarray, unit: float) -> np.ndarray | None:
@@ -178,7 +189,7 @@ def _root(gear: Gear, fillet: np.ndarray, unit: float) -> np.ndarray | None:
     if length < 1e-6 * gear.module:
         fillet[-1] = gear.root_radius * math.cos(end), gear.root_radius * math.sin(end)
         return None
-    fractions = _spacing(length, _last_edge(fillet), 2.0 * _last_edge(fillet), largest=0.25 * unit)
+    fractions = _spacing(length, _last_edge(fillet), 2.0 * _last_edge(fillet), largest=INNER_SIZE * unit)
     points = _arc(gear.root_radius, start, end, fractions)
     points[0] = fillet[-1]
     return points
@@ -189,31 +200,29 @@ def _tip(gear: Gear, flank: np.ndarray, unit: float) -> np.ndarray:
     end = math.atan2(flank[0, 1], flank[0, 0])
     edge = _last_edge(flank[::-1])
     points = _arc(
-        gear.tip_radius, 0.0, end, _spacing(gear.tip_radius * end, 2.5 * edge, edge, largest=0.25 * unit)
+        gear.tip_radius,
+        0.0,
+        end,
+        _spacing(gear.tip_radius * end, INNER_SIZE * unit, edge, largest=INNER_SIZE * unit),
     )
     points[0, 1] = 0.0
     points[-1] = flank[0]
     return points
 
 
-def _tooth_base(gear: Gear, fillet: np.ndarray, unit: float) -> tuple[np.ndarray, int]:
-    """Arc from the symmetry line to a fillet vertex, and the row of that vertex."""
-    tangent = fillet[2:] - fillet[:-2]
-    radial = fillet[1:-1] / np.linalg.norm(fillet[1:-1], axis=1)[:, None]
-    slope = np.abs(np.sum(tangent * radial, axis=1)) / np.linalg.norm(tangent, axis=1)
-    rows = np.arange(2, len(fillet) - 1, 2)
-    row = int(rows[np.argmin(np.abs(slope[rows - 1] - math.sqrt(0.5)))]) if len(rows) else 0
-    radius, end = math.hypot(*fillet[row]), math.atan2(fillet[row, 1], fillet[row, 0])
-    edge = FILLET_SIZE * unit
-    points = _arc(radius, 0.0, end, _spacing(radius * end, 4.0 * edge, edge, largest=0.3 * unit))
+def _tooth_base(end: np.ndarray, unit: float) -> np.ndarray:
+    """Arc about the gear centre from the symmetry line to a fillet point."""
+    radius, angle, edge = math.hypot(*end), math.atan2(end[1], end[0]), FILLET_SIZE * unit
+    spacing = _spacing(radius * angle, INNER_SIZE * unit, edge, largest=INNER_SIZE * unit)
+    points = _arc(radius, 0.0, angle, spacing)
     points[0, 1] = 0.0
-    points[-1] = fillet[row]
-    return points, row
+    points[-1] = end
+    return points
 
 
 def _rim_size(gear: Gear, unit: float) -> float:
-    """Element size at the rim [m]: not wider than half of the half sector there."""
-    return min(LARGEST_SIZE * unit, 0.5 * math.pi / gear.teeth * gear.rim_radius)
+    """Element size at the rim [m]: at least three across the half sector."""
+    return min(LARGEST_SIZE * unit, 0.35 * math.pi / gear.teeth * gear.rim_radius)
 
 
 def _cut(gear: Gear, unit: float, *, start: float) -> np.ndarray:
@@ -241,7 +250,7 @@ def _symmetry(gear: Gear, base_radius: float, unit: float, *, tip: float, base: 
     rim, top = gear.rim_radius, gear.tip_radius
     size = _rim_size(gear, unit)
     inner = _spacing(abs(base_radius - rim), size, base, largest=LARGEST_SIZE * unit)
-    outer = _spacing(abs(top - base_radius), base, tip, largest=0.35 * unit)
+    outer = _spacing(abs(top - base_radius), base, tip, largest=INNER_SIZE * unit)
     x = np.concatenate([rim + (base_radius - rim) * inner, (base_radius + (top - base_radius) * outer)[1:]])
     x[0], x[2 * (len(inner) // 2)], x[-1] = rim, base_radius, top
     return np.column_stack([x, np.zeros_like(x)])

@@ -1,4 +1,15 @@
-"""The classical model of a planet's passage: every planet carries a Hanning window past the sensor."""
+"""The classical model of a planet's passage: every planet carries a Hanning window past the sensor.
+
+The sensor hears sum_p w(phi - psi_p) s_p(t), phi its angle in the carrier frame, psi_p that of planet p,
+s_p the signal of the planet's mesh with the ring, and w(x) = (1 + cos(2 pi x / width))/2 for
+|x| < width/2, 0 elsewhere. A window that rides on the planet is a field of the carrier frame:
+U[h, n] = sum_p c_n exp(-i n psi_p) s_p[h], where
+
+    c_n = width/(4 pi) sinc(v)/(1 - v^2),  v = n width/(2 pi),  c_n = width/(8 pi) where |v| = 1.
+
+width = 2 pi: McFadden and Smith (1985), every planet always heard; width = 2 pi/N: Inalpolat and
+Kahraman (2009), only the nearest planet of N is heard.
+"""
 
 from __future__ import annotations
 
@@ -28,16 +39,6 @@ def phased_harmonics(harmonics, mesh_phases) -> np.ndarray:
 
 def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max: int = 24) -> np.ndarray:
     """Carrier-frame field of the Hanning-window model, for `fixed_sensor_lines`.
-
-    The sensor hears sum_p w(phi - psi_p) s_p(t), phi its angle in the carrier frame, psi_p that of planet p,
-    s_p the signal of the planet's mesh with the ring, and w(x) = (1 + cos(2 pi x / width))/2 for
-    |x| < width/2, 0 elsewhere. A window that rides on the planet is a field of the carrier frame:
-    U[h, n] = sum_p c_n exp(-i n psi_p) s_p[h], where
-
-        c_n = width/(4 pi) sinc(v)/(1 - v^2),  v = n width/(2 pi),  c_n = width/(8 pi) where |v| = 1.
-
-    width = 2 pi: McFadden and Smith (1985), every planet always heard; width = 2 pi/N: Inalpolat and
-    Kahraman (2009), only the nearest planet of N is heard.
 
     Parameters
     ----------

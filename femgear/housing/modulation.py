@@ -137,10 +137,6 @@ def fixed_sensor_lines(
         Highest carrier order; default: the larger of (H + 1) z_ring and H z_ring + n_max, so that no
         line is lost.
 
-    Returns
-    -------
-    SensorLines
-
     Raises
     ------
     CaseError

@@ -203,16 +203,12 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int =
     revolutions : int
         Carrier revolutions in the record.
 
-    Returns
-    -------
-    Lobes
-
     Raises
     ------
     CaseError
         ``E-SIGNAL`` for an envelope or a threshold that cannot be used.
     """
-    from scipy.signal import find_peaks
+    from scipy.signal import find_peaks  # takes longer to import than all the rest
 
     values = np.asarray(periodic_envelope, dtype=float)
     usable = values.ndim == 1 and values.size > 2 and np.all(np.isfinite(values)) and np.all(values >= 0)

@@ -18,6 +18,7 @@ from femgear.plots.style import (
     legend_below,
     line_style,
     new_figure,
+    periodic,
     rpm,
 )
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from femgear.gears.planetary import PlanetarySet
+
+_BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
 
 
 def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
@@ -61,8 +64,8 @@ def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = 
             )
             if static is not None:
                 ste = static["ste"].values[row] * 1e6
-                at = static["position"].values
-                ax.plot(at, ste - ste.mean(), ":", color=COLOURS[i % len(COLOURS)], label=f"static, {text}")
+                at, ste = periodic(static["position"], ste - ste.mean())
+                ax.plot(at, ste, ":", color=COLOURS[i % len(COLOURS)], label=f"static, {text}")
         ax.set_xlim(0, 1)
         frequency = float(dynamics["mesh_frequency"].values[s])
         label(
@@ -180,10 +183,9 @@ def ring_mean_deflection(
     ax.fill_between(angle, 0.0, radial, color=SKY, alpha=0.35, linewidth=0)
     ax.plot(angle, radial, color=BLUE, linewidth=2.0, label="outer surface, outwards positive")
     for n, psi in enumerate(planetary_set.planet_angles):
-        ax.plot([psi, psi], [-2 * size, 1.25 * size], "--", color=VERMILION, linewidth=1.2, label="planets")
-        ax.text(
-            psi, 1.38 * size, f"planet {n + 1}", ha="center", va="center", fontsize=SIZE - 1, color=VERMILION
-        )
+        ax.plot([psi, psi], [-1.2 * size, 1.25 * size], "--", color=VERMILION, linewidth=1.2, label="planets")
+        ax.text(psi, -0.75 * size, str(n + 1), bbox=_BADGE, ha="center", va="center", fontsize=SIZE)
+    ax.spines["inner"].set_visible(False)
     ax.set_rorigin(-2 * size)
     ax.set_ylim(-1.2 * size, 1.25 * size)
     ax.set_rlabel_position(_free_angle(planetary_set.planet_angles))

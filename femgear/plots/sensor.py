@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,6 @@ from femgear.plots.style import (
     BLACK,
     BLUE,
     COLOURS,
-    GREY,
     SIZE,
     VERMILION,
     label,
@@ -41,10 +41,16 @@ def band(housing: xr.Dataset, *, speed_index: int, ring_teeth: int, harmonic: in
     return analyse_band(spectrum, ring_teeth, harmonic)
 
 
+def shown_harmonics(housing: xr.Dataset, *, speed_index: int, ring_teeth: int) -> tuple[int, ...]:
+    """The first mesh harmonic, and the one with the strongest line where that is another one."""
+    strongest = strongest_harmonic(housing, speed_index=speed_index, ring_teeth=ring_teeth)
+    return tuple(sorted({1, strongest}))
+
+
 def housing_signal(
-    housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int, harmonic: int | None = None
+    housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int, harmonics: Sequence[int] | None = None
 ) -> Figure:
-    """Acceleration over one carrier revolution: whole, and around one mesh harmonic with its envelope.
+    """Acceleration over one carrier revolution: whole, and around mesh harmonics with its envelope.
 
     Parameters
     ----------
@@ -52,37 +58,39 @@ def housing_signal(
         With ``acceleration`` (speed, time) [m/s^2].
     speed_index : int
     ring_teeth : int
-    harmonic : int, optional
-        Mesh harmonic of the band; the one with the strongest line when omitted.
+    harmonics : sequence of int, optional
+        Mesh harmonics of the bands; the first and the one with the strongest line when omitted.
 
     Returns
     -------
     Figure
     """
-    if harmonic is None:
-        harmonic = strongest_harmonic(housing, speed_index=speed_index, ring_teeth=ring_teeth)
-    found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
-    signal = housing["acceleration"].values[speed_index]
-    envelope = _envelope(housing, speed_index)
-    figure, (top, bottom) = new_figure(rows=2, width=9.5, height=6.2, sharex=True)
+    if harmonics is None:
+        harmonics = shown_harmonics(housing, speed_index=speed_index, ring_teeth=ring_teeth)
     speed = rpm(housing["speed"].values[speed_index])
-    for ax, values, around, title in (
-        (top, signal, envelope, f"{speed}: all orders"),
-        (bottom, found.signal, found.envelope, _band_title(speed, found)),
-    ):
-        at = np.arange(len(values)) / len(values)
-        ax.plot(at, values, color=BLUE, linewidth=0.5, label="acceleration of the fixed point")
-        at = np.append(np.arange(len(around)) / len(around), 1.0)
-        for sign in (1, -1):
-            ax.plot(at, sign * np.append(around, around[0]), color=VERMILION, linewidth=1.4, label="envelope")
-        label(ax, y=ACCELERATION, title=title)
-    bottom.plot(
-        found.lobes.position, found.lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False
+    figure, axes = new_figure(
+        rows=1 + len(harmonics), width=9.5, height=1.0 + 2.5 * (1 + len(harmonics)), sharex=True
     )
-    bottom.set_xlim(0, 1)
-    label(bottom, "carrier revolutions [1]")
+    signal = housing["acceleration"].values[speed_index]
+    _draw_signal(axes[0], signal, _envelope(housing, speed_index), f"{speed}: all orders")
+    for ax, harmonic in zip(axes[1:], harmonics):
+        found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
+        _draw_signal(ax, found.signal, found.envelope, _band_title(speed, found))
+        lobes = found.lobes
+        ax.plot(lobes.position, lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False)
+    axes[-1].set_xlim(0, 1)
+    label(axes[-1], "carrier revolutions [1]")
     legend_below(figure)
     return figure
+
+
+def _draw_signal(ax, signal, around, title):
+    at = np.arange(len(signal)) / len(signal)
+    ax.plot(at, signal, color=BLUE, linewidth=0.5, label="acceleration of the fixed point")
+    at = np.append(np.arange(len(around)) / len(around), 1.0)
+    for sign in (1, -1):
+        ax.plot(at, sign * np.append(around, around[0]), color=VERMILION, linewidth=1.3, label="envelope")
+    label(ax, y=ACCELERATION, title=title)
 
 
 def _envelope(housing, speed_index):
@@ -124,7 +132,7 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
         housing[name].values[speed_index] for name in ("order_amplitude", "order_amplitude_exact")
     )
     bands = _strongest_bands(order, linear, ring_teeth, zooms)
-    figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 2.9 * len(bands))
+    figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.3 * len(bands))
     largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
     floor = 1e-4 * largest
     _stems(axes[0], order, linear, floor)
@@ -134,7 +142,7 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     top.set_xticks(multiples * ring_teeth, [str(h) for h in multiples])
     top.tick_params(labelsize=SIZE - 2)
     top.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
-    label(axes[0], y=ACCELERATION)
+    label(axes[0], "carrier order [1]", ACCELERATION)
     axes[0].set_ylim(floor, 2.5 * largest)
     for ax, harmonic in zip(axes[1:], bands):
         _draw_band(ax, order, linear, exact, ring_teeth, harmonic, floor)
@@ -195,10 +203,12 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, floor):
             va="bottom",
             fontsize=SIZE - 2.5,
         )
+    decades = np.arange(np.ceil(np.log10(floor)), np.floor(np.log10(2 * limit)) + 1)
+    ax.set_yticks(10.0**decades)
+    ax.minorticks_off()
     # room above the strongest line for its label on the logarithmic axis
-    ax.set_ylim(floor, limit * (limit / floor) ** 0.55 if limit > floor else 10 * floor)
+    ax.set_ylim(floor, limit * (limit / floor) ** 0.8 if limit > floor else 10 * floor)
     ax.set_xlim(centre - reach, centre + reach)
-    ax.axvline(centre, color=GREY, linewidth=0.8, linestyle=":")
     label(ax, y=ACCELERATION, title=f"around mesh harmonic {harmonic} (order {centre})")
 
 
@@ -218,46 +228,53 @@ def _labelled(order, amplitude, candidates, *, spacing, limit=12):
 
 
 def modulation_polar(
-    housing: xr.Dataset, *, ring_teeth: int, harmonics: dict[int, int] | None = None
+    housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int, harmonics: Sequence[int] | None = None
 ) -> Figure:
-    """Envelope around a mesh harmonic over the angle of the carrier, polar, one diagram for each speed.
+    """Envelope around mesh harmonics over the angle of the carrier, one polar diagram for each.
 
     Parameters
     ----------
     housing : xarray.Dataset
-        With ``acceleration`` (speed, time) [m/s^2]; at most three speeds are drawn.
+        With ``acceleration`` (speed, time) [m/s^2].
+    speed_index : int
     ring_teeth : int
-    harmonics : dict of int to int, optional
-        Mesh harmonic for a speed index; the one with the strongest line where omitted.
+    harmonics : sequence of int, optional
+        Mesh harmonics; the first and the one with the strongest line when omitted.
 
     Returns
     -------
     Figure
     """
-    speeds = sorted(
-        {round(i) for i in np.linspace(0, housing.sizes["speed"] - 1, min(housing.sizes["speed"], 3))}
-    )
-    figure, axes = new_figure(columns=len(speeds), width=5.2 * len(speeds), height=6.0, polar=True)
-    for i, (ax, s) in enumerate(zip(axes, speeds)):
-        harmonic = (harmonics or {}).get(s)
-        if harmonic is None:
-            harmonic = strongest_harmonic(housing, speed_index=s, ring_teeth=ring_teeth)
-        found = band(housing, speed_index=s, ring_teeth=ring_teeth, harmonic=harmonic)
-        angle = np.linspace(0.0, 2 * np.pi, len(found.envelope) + 1)
+    if harmonics is None:
+        harmonics = shown_harmonics(housing, speed_index=speed_index, ring_teeth=ring_teeth)
+    speed = rpm(housing["speed"].values[speed_index])
+    figure, axes = new_figure(columns=len(harmonics), width=5.2 * len(harmonics), height=6.2, polar=True)
+    for i, (ax, harmonic) in enumerate(zip(axes, harmonics)):
+        found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
+        lobes, angle = found.lobes, np.linspace(0.0, 2 * np.pi, len(found.envelope) + 1)
         value = np.append(found.envelope, found.envelope[0])
-        ax.plot(angle, value, color=COLOURS[i], linewidth=2.0)
-        ax.fill(angle, value, color=COLOURS[i], alpha=0.15, linewidth=0)
-        ax.plot(
-            2 * np.pi * found.lobes.position, found.lobes.height, "v", color=BLACK, markersize=6, label="lobe"
-        )
+        ax.plot(angle, value, color=COLOURS[i % len(COLOURS)], linewidth=2.0)
+        ax.fill(angle, value, color=COLOURS[i % len(COLOURS)], alpha=0.15, linewidth=0)
+        ax.plot(2 * np.pi * lobes.position, lobes.height, "v", color=BLACK, markersize=6, label="lobe")
+        ax.set_yticks(np.arange(1, 5) * _round_step(value.max(initial=0.0) / 4))
         ax.set_ylim(0, 1.12 * value.max(initial=0.0) or 1.0)
-        ax.set_rlabel_position(15.0)
-        speed = rpm(housing["speed"].values[s])
+        for text in ax.get_yticklabels():
+            text.set_bbox({"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0})
+        # the scale stands where the curve is lowest, so that it hides nothing
+        ax.set_rlabel_position(float(np.degrees(angle[np.argmin(value)])))
         ax.set_title(
-            f"{speed}, mesh harmonic {harmonic}: {len(found.lobes.position)} lobes\n"
-            f"envelope {ACCELERATION} over the carrier angle [°]",
+            f"{speed}, mesh harmonic {harmonic}: {len(lobes.position)} lobes\n"
+            "envelope of the acceleration [m/s²] over the carrier angle",
             fontsize=SIZE,
             pad=14,
         )
     legend_below(figure)
     return figure
+
+
+def _round_step(step: float) -> float:
+    """The next larger of 1, 2, 2.5, 5, 10 times a power of ten."""
+    if step <= 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(step))
+    return min(f * power for f in (1.0, 2.0, 2.5, 5.0, 10.0) if f * power >= step * (1 - 1e-12))

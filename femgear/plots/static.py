@@ -38,18 +38,17 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     """
     figure, (left, right) = new_figure(columns=2, width=9.5, sharex=True)
     names = static["mesh"].values
-    _draw(left, names, static["position"], static["ste"] * 1e6)
+    drawn = distinct_lines(names, static["ste"])
+    for i, (text, row) in enumerate(drawn):
+        left.plot(*periodic(static["position"], static["ste"][row] * 1e6), label=text, **line_style(i))
     label(left, POSITION, "transmission error [µm]", "each mesh, along its line of action")
     planets = [f"sun to ring over planet {p}" for p in static["planet"].values]
     position, overall = periodic(static["position"], static["ste_overall"] * 1e6)
-    equal = np.abs(overall - overall[0]).max() <= 1e-6 * np.abs(overall).max()
-    rows = (
-        [("sun to ring over every planet (identical)", 0)]
-        if equal
-        else list(zip(planets, range(len(planets))))
-    )
+    rows = list(zip(planets, range(len(planets))))
+    if _equal(overall):
+        rows = [("sun to ring over every planet (identical)", 0)]
     for i, (text, row) in enumerate(rows):
-        right.plot(position, overall[row], label=text, **line_style(i + 2))
+        right.plot(position, overall[row], label=text, **line_style(i + len(drawn)))
     label(right, POSITION, "sum of both meshes [µm]", "sun to ring")
     right.set_xlim(0, 1)
     legend_below(figure)
@@ -105,17 +104,18 @@ def load_sharing(static: xr.Dataset) -> Figure:
     """
     figure, (ax,) = new_figure(height=3.8)
     position, share = periodic(static["position"], static["load_share"] * 100)
-    for i, planet in enumerate(static["planet"].values):
-        # equal shares lie on top of each other: thinner and thinner lines keep all of them visible
-        width = 1.4 + 1.6 * (len(share) - 1 - i)
-        ax.plot(position, share[i], label=f"planet {planet}", linewidth=width, **line_style(i))
+    identical = _equal(share)
+    for i, planet in enumerate(static["planet"].values[:1] if identical else static["planet"].values):
+        text = "every planet (identical)" if identical else f"planet {planet}"
+        ax.plot(position, share[i], label=text, linewidth=2.0, **line_style(i))
     equal = 100.0 / len(share)
-    ax.axhline(equal, color="0.5", linewidth=0.8, linestyle=(0, (1, 3)), label=f"equal share {equal:.4g} %")
+    ax.axhline(equal, color="0.4", linewidth=0.8, linestyle=(0, (1, 3)), label=f"equal share {equal:.4g} %")
     spread = np.abs(share - equal).max()
     if spread < 0.05 * equal:
         ax.set_ylim(0.94 * equal, 1.06 * equal)
     ax.set_xlim(0, 1)
-    label(ax, POSITION, "share of the torque [%]", f"largest departure from equal shares: {spread:.3g} %")
+    title = f"largest departure from equal shares: {spread:.3g} %" if spread > 1e-6 else "equal shares"
+    label(ax, POSITION, "share of the torque [%]", title)
     legend_below(figure, columns=4)
     return figure
 
@@ -139,7 +139,7 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     figure, axes = new_figure(columns=2, width=9.5, sharey=True)
     names = [str(name) for name in static["mesh"].values]
     position = static["position"].values
-    for i, (ax, kind) in enumerate(zip(axes, ("sun-planet", "planet-ring"))):
+    for ax, kind in zip(axes, ("sun-planet", "planet-ring")):
         row = next(i for i, name in enumerate(names) if family(name) == kind)
         load, force = static["tooth_load"].values[row], static["mesh_force"].values[row]
         path = (np.arange(len(load))[:, None] + position).ravel()
@@ -149,8 +149,8 @@ def tooth_loads(static: xr.Dataset) -> Figure:
         ax.plot(
             path[shown] - path[first],
             load.ravel()[shown],
-            label=f"one tooth pair, {names[row]}",
-            **line_style(i),
+            label="one tooth pair",
+            color=COLOURS[0],
         )
         ax.axhline(force.mean(), color="0.45", linewidth=1.0, linestyle=(0, (1, 2)), label="whole mesh, mean")
         label(ax, "path since the first contact [base pitches]", title=names[row])
@@ -160,7 +160,5 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     return figure
 
 
-def _draw(ax, names, position, values):
-    for i, (text, row) in enumerate(distinct_lines(names, values)):
-        ax.plot(*periodic(position, values[row]), label=text, **line_style(i))
-    ax.set_xlim(0, 1)
+def _equal(rows) -> bool:
+    return bool(np.abs(rows - rows[0]).max() <= 1e-6 * np.abs(rows).max(initial=0.0))

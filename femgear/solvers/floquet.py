@@ -94,7 +94,8 @@ def stability(
     frequency_ratio : float
         Modes above this many times the highest excitation frequency are counted as static flexibility:
         parametric resonances need ``h f = f_i + f_j``, their first order a ratio of one, their second order
-        two. Their own multipliers ``exp(-zeta omega T)`` still count.
+        two. Their own multipliers ``exp(-zeta omega T)`` still count. The static flexibility costs up to
+        1e-3 of a modulus below one and less of a growing one; a ratio of 5 or 20 follows nearly every mode.
 
     Returns
     -------

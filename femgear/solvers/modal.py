@@ -60,7 +60,7 @@ def solve_modes(
     scale, values, shape = _eigen(system.M, stiffness, count, max_frequency)
     rigid = _rigid(values, scale, len(system.M))
     if np.any(rigid):
-        shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid], scale)
+        shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
     rows = system.W.T @ shape
     modal_load = shape.T @ system.load
     _check_rigid(system, shape[:, rigid])
@@ -218,16 +218,24 @@ def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
     return np.abs(values) <= threshold
 
 
-def _refined_rigid(mass, stiffness, shape, scale) -> np.ndarray:
-    """Rigid modes cleaned of elastic parts by two inverse iterations, mass-orthonormal again."""
+def _refined_rigid(mass, stiffness, shape) -> np.ndarray:
+    """Rigid modes cleaned of elastic parts, mass-orthonormal: twice ``x - (K + a M x x^T M)^-1 K x``."""
     from scipy import linalg
 
-    factor = linalg.cho_factor(stiffness + (1e-10 * scale) * mass)
     for _ in range(2):
-        shape = linalg.cho_solve(factor, mass @ shape)
+        shape = shape - linalg.cho_solve(_held(mass, stiffness, shape), stiffness @ shape)
         lower = np.linalg.cholesky(shape.T @ mass @ shape)
         shape = linalg.solve_triangular(lower, shape.T, lower=True).T
     return shape
+
+
+def _held(mass, stiffness, rigid):
+    """Cholesky factor of ``K + a M R R^T M``: the elastic part as it is, rigid motions held by a spring a."""
+    from scipy import linalg
+
+    carried = mass @ rigid
+    weight = np.trace(stiffness) / np.trace(mass) or 1.0
+    return linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
 
 
 def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
@@ -265,10 +273,7 @@ def _pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
 
     carried = mass @ rigid
     loads = loads - carried @ (rigid.T @ loads)
-    # the mean diagonal of the pencil: no worse conditioned than the elastic part itself
-    weight = np.trace(stiffness) / np.trace(mass)
-    lower = linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
-    out = linalg.cho_solve(lower, loads)
+    out = linalg.cho_solve(_held(mass, stiffness, rigid), loads)
     return out - rigid @ (carried.T @ out)
 
 

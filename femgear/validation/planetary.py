@@ -40,7 +40,7 @@ def reference_set() -> PlanetarySet:
 
 
 def nrel_set() -> PlanetarySet:
-    """Planetary stage 2 of the NREL 5 MW gearbox; rims are not in the report and do not enter."""
+    """Planetary stage 2 of the NREL 5 MW gearbox."""
     rack = BasicRack(addendum=1.0, dedendum=1.25, root_radius=0.38)
     ring_rack = BasicRack(addendum=1.0, dedendum=1.25, root_radius=0.30)
 
@@ -59,10 +59,10 @@ def nrel_set() -> PlanetarySet:
         )
 
     return PlanetarySet(
-        sun=gear(18, 0.3890, 0.432838, 0.341838, 0.1, rack),
-        planet=gear(36, 0.5039, 0.815663, 0.724663, 0.2, rack),
+        sun=gear(18, 0.3890, 0.432838, 0.341838, 0.5 * 0.19432, rack),
+        planet=gear(36, 0.5039, 0.815663, 0.724663, 0.5 * 0.57696, rack),
         # ISO 21771 prints the shift of an internal gear with the opposite sign
-        ring=gear(93, -0.1171, 1.906081, 2.000581, 1.2, ring_rack, internal=True),
+        ring=gear(93, -0.1171, 1.906081, 2.000581, 0.5 * 2.14882, ring_rack, internal=True),
         centre_distance=0.584,
         planet_angles=equal_planet_angles(3),
     )

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from femgear.validation import contact, elasticity, geometry, modulation, planetary, vibration
+from femgear.validation import (
+    contact,
+    elasticity,
+    geometry,
+    modulation,
+    parametric,
+    planetary,
+    standard,
+    vibration,
+)
 from femgear.validation.run import Theme
 
 THEMES = (
@@ -27,6 +36,12 @@ THEMES = (
         (planetary.reference_geometry, planetary.nrel_report, planetary.assembly),
     ),
     Theme(
+        "ISO 6336",
+        "Mesh stiffness of ISO 6336-1",
+        "Method B, which the computed mesh stiffness is compared with.",
+        (standard.single_pairs, standard.nrel_stiffness),
+    ),
+    Theme(
         "elasticity",
         "Plane elasticity",
         "Structured grids of second-order triangles with the assembly that the gears use.",
@@ -44,7 +59,7 @@ THEMES = (
     Theme(
         "vibration",
         "Plane vibration",
-        "Finite elements as above; the closed form of the annulus is the one that the toothed ring is compared with.",
+        "Finite elements as above, and the closed form of the annulus that rings are compared with.",
         (
             vibration.tapered_membrane,
             vibration.annulus,
@@ -65,9 +80,21 @@ THEMES = (
         ),
     ),
     Theme(
+        "stability",
+        "Parametric stability",
+        "G5 and G6: one gear pair of unit mass, contact ratio 1.635, mesh stiffness 1 and 0.65.",
+        (
+            parametric.mathieu,
+            parametric.meissner,
+            parametric.rectangular_stiffness,
+            parametric.fixed_point,
+        ),
+    ),
+    Theme(
         "modulation",
         "Modulation by the carrier",
-        "Orders are carrier orders; a ring pattern of n nodal diameters at mesh harmonic h is heard at order h z_ring - n.",
+        "Orders are carrier orders; a ring pattern of n nodal diameters at mesh harmonic h is heard at order "
+        "h z_ring - n.",
         (
             modulation.modulated_carriers,
             modulation.planet_passage,

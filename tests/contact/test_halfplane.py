@@ -47,7 +47,7 @@ def test_cell_is_the_mean_of_line_loads(x, nu):
 def test_cell_relative_to_depth_is_the_difference_of_the_two_displacements():
     h, d = 2e-5, 5e-4
     for x in (0.0, 3e-5, 4e-4):
-        below = quad(lambda s: depth_displacement(x - s, d, MU, NU), -h, h)[0] / (2 * h)
+        below = quad(lambda s, x=x: depth_displacement(x - s, d, MU, NU), -h, h)[0] / (2 * h)
         difference = float(surface_displacement(x, h, MU, NU)) - below
         assert float(surface_relative_to_depth(x, h, d, MU, NU)) == pytest.approx(difference, rel=1e-9)
 

@@ -1,4 +1,4 @@
-"""Exact annulus frequencies against the Bessel determinant and limits; the published values are in validation."""
+"""Exact annulus frequencies against the Bessel determinant and its limits."""
 
 import numpy as np
 import pytest
@@ -73,7 +73,7 @@ def test_impossible_counts():
         annulus_frequencies(1.0, 2.0, STEEL, nodal_diameters=[2], count=0)
 
 
-def test_almost_solid_disc_is_refused_or_right():
+def test_small_hole_approaches_the_solid_disc():
     """Fundamental n = 2 of a solid disc, plane stress, from the 2 x 2 Bessel determinant without Y."""
 
     def solid(frequency):

@@ -1,6 +1,8 @@
 """Meshing outlines: exact boundaries, cache, processes, and every outline that must be refused."""
 
 import os
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -230,3 +232,10 @@ def test_interface_loop_outside_the_boundary_is_refused():
 )
 def test_regions_must_name_every_part_once(regions):
     assert refusal(split_square(straight((0, 0.5), (1, 0.5)), regions)).code == "E-GRID-REGION"
+
+
+def test_heavy_libraries_are_imported_late():
+    heavy = "{'gmsh', 'skfem', 'meshio', 'scipy', 'matplotlib', 'pyvista'}"
+    code = f"import sys, femgear.fe.meshing, femgear.fe.elasticity; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

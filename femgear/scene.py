@@ -1,0 +1,297 @@
+"""PyVista scenes: the whole set and the ring's modes as VTK grids, pictures of them, and an animation."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from femgear.errors import CaseError, FemgearError
+from femgear.files import replace_file
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+    from femgear.fe.grid import Grid
+    from femgear.fe.reduction import CyclicModes
+
+_QUADRATIC_TRIANGLE = 22  # VTK_QUADRATIC_TRIANGLE: corners, then the middles of 01, 12, 20
+_BODY_COLOURS = ("#D55E00", "#0072B2", "#999999")
+
+
+class Body(NamedTuple):
+    """One body of a scene.
+
+    Parameters
+    ----------
+    name : str
+    points : (n, 2) array
+        [m], in the frame of the set.
+    triangles : (m, 6) int array
+        Corners counter-clockwise, then the nodes between 01, 12 and 20.
+    displacement : (n, 2) array, optional
+        [m]; zero when omitted.
+    """
+
+    name: str
+    points: np.ndarray
+    triangles: np.ndarray
+    displacement: np.ndarray | None = None
+
+
+def load_pyvista():
+    """PyVista, ready to draw without a screen.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    FemgearError
+        ``E-SYSTEM-LIBRARY`` where the machine lacks the OpenGL library that drawing needs: VTK would
+        end the process without a word.
+    """
+    if sys.platform.startswith("linux"):
+        if _loads("libEGL.so.1"):
+            os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+        else:
+            raise FemgearError(
+                "pictures of grids need the system library libEGL.so.1, which is not installed",
+                code="E-SYSTEM-LIBRARY",
+                value="libEGL.so.1",
+                remedy="apt-get install -y --no-install-recommends libegl1 libgl1 (Debian, Ubuntu)",
+            )
+    import pyvista
+
+    return pyvista
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, displacement=None) -> Body:
+    """A body from a grid that is turned about its origin, then moved to its place in the set.
+
+    Parameters
+    ----------
+    grid : Grid
+        Centred on the origin.
+    name : str
+    centre : (2,) array
+        [m]
+    angle : float
+        [rad]
+    displacement : (n, 2) array, optional
+        In the frame of the grid [m]; turned along.
+
+    Returns
+    -------
+    Body
+    """
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, s], [-s, c]])
+    moved = None if displacement is None else np.asarray(displacement) @ turn
+    return Body(name, grid.points @ turn + np.asarray(centre, float), grid.triangles, moved)
+
+
+def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
+    """All bodies in one grid of VTK quadratic triangles.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+        Plain tuples of the same order are taken as well.
+
+    Returns
+    -------
+    pyvista.UnstructuredGrid
+        Point data ``displacement`` [m] (3 components), cell data ``body`` (index), field data
+        ``body_names``.
+
+    Raises
+    ------
+    CaseError
+        When there is no body, or arrays do not fit together.
+    """
+    pv = load_pyvista()
+    bodies = [Body(*body) for body in bodies]
+    if not bodies:
+        raise CaseError("a scene needs at least one body", code="E-SCENE")
+    for body in bodies:
+        _check_body(body)
+    start = np.cumsum([0] + [len(body.points) for body in bodies])
+    points, displacement = np.zeros((start[-1], 3)), np.zeros((start[-1], 3))
+    for body, first in zip(bodies, start):
+        points[first : first + len(body.points), :2] = body.points
+        if body.displacement is not None:
+            displacement[first : first + len(body.points), :2] = body.displacement
+    cells = np.vstack([body.triangles + first for body, first in zip(bodies, start)])
+    grid = pv.UnstructuredGrid({_QUADRATIC_TRIANGLE: cells}, points)
+    grid.point_data["displacement"] = displacement
+    grid.cell_data["body"] = np.repeat(np.arange(len(bodies)), [len(body.triangles) for body in bodies])
+    grid.field_data["body_names"] = [body.name for body in bodies]
+    return grid
+
+
+def _check_body(body: Body) -> None:
+    points, triangles = np.asarray(body.points), np.asarray(body.triangles)
+    fits = points.ndim == 2 and points.shape[1] == 2 and triangles.ndim == 2 and triangles.shape[1] == 6
+    fits = fits and len(points) > 0 and len(triangles) > 0
+    fits = fits and 0 <= triangles.min() and triangles.max() < len(points)
+    fits = fits and (body.displacement is None or np.shape(body.displacement) == points.shape)
+    if not fits:
+        raise CaseError(
+            f"body {body.name!r}: points {points.shape}, triangles {triangles.shape} and displacement "
+            f"{np.shape(body.displacement)} do not fit together",
+            code="E-SCENE",
+            limit="(n, 2), (m, 6) with node numbers below n, (n, 2)",
+        )
+
+
+def ring_modes_grid(
+    sector: Grid, modes: CyclicModes, shown: Sequence[int], *, boundary_names=("cut_right", "cut_left")
+) -> pv.UnstructuredGrid:
+    """The whole ring with one displacement field a mode.
+
+    Parameters
+    ----------
+    sector : Grid
+    modes : CyclicModes
+        Of that sector; the cosine mode of every pair is shown, largest displacement 1.
+    shown : sequence of int
+        Mode numbers.
+
+    Returns
+    -------
+    pyvista.UnstructuredGrid
+        Point data ``"mode 5, n = 3, 2600 Hz"`` and so on (3 components).
+    """
+    from femgear.fe.grid import copy_nodes, rotated_copies
+
+    whole, numbers = rotated_copies(sector, modes.count), copy_nodes(sector, modes.count)
+    grid = assemble_set([Body("ring", whole.points, whole.triangles)])
+    del grid.point_data["displacement"]
+    for mode in shown:
+        field = np.zeros((whole.n_nodes, 3))
+        field[:, :2] = cyclic_field(modes.shape[:, mode], int(modes.nodal_diameter[mode]), numbers)
+        name = f"mode {mode}, n = {modes.nodal_diameter[mode]}, {modes.frequency[mode]:.0f} Hz"
+        grid.point_data[name] = field / (np.abs(field).max() or 1.0)
+    return grid
+
+
+def cyclic_field(shape, nodal_diameter: int, numbers: np.ndarray, *, phase: float = 0.0) -> np.ndarray:
+    """Displacement of a whole cyclic body from that of one sector, ``Re(U e^{i(n k 2 pi/count + phase)})``.
+
+    Parameters
+    ----------
+    shape : (2 n_nodes,) complex array
+        Of the first sector, in its own frame: x and y of every node in turn.
+    nodal_diameter : int
+    numbers : (count, n_nodes) int array
+        Nodes of the whole body; see `fe.grid.copy_nodes`.
+    phase : float
+        [rad]
+
+    Returns
+    -------
+    (n, 2) array
+    """
+    count = len(numbers)
+    local = np.asarray(shape).reshape(-1, 2)
+    field = np.zeros((numbers.max() + 1, 2))
+    for k in range(count - 1, -1, -1):
+        angle = 2 * np.pi * k / count
+        x, y = (local * np.exp(1j * (nodal_diameter * angle + phase))).real.T
+        c, s = np.cos(angle), np.sin(angle)
+        field[numbers[k]] = np.column_stack([c * x - s * y, s * x + c * y])
+    return field
+
+
+def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
+    """Write a grid as compressed VTU; the file is either the old or the new one, whole.
+
+    Raises
+    ------
+    StorageError
+        When the file cannot be written.
+    """
+    if Path(path).suffix != ".vtu":
+        raise CaseError("fields are written as VTU", code="E-SUFFIX", value=str(path), limit=".vtu")
+    replace_file(path, lambda temporary: grid.save(temporary, binary=True), size=grid.actual_memory_size * 1024)
+
+
+def polar_curve(values, *, radius: float, height: float) -> pv.PolyData:
+    """A periodic function around a circle as a closed curve, for display beside the grids.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Equally spaced over one turn, first value at angle 0; stored as point data ``value``.
+    radius : float
+        Radius of the value zero [m].
+    height : float
+        Radial distance that the largest absolute value takes [m].
+
+    Returns
+    -------
+    pyvista.PolyData
+    """
+    pv = load_pyvista()
+    values = np.asarray(values, float)
+    angle = 2 * np.pi * np.arange(len(values)) / len(values)
+    r = radius + height * values / (np.abs(values).max(initial=0.0) or 1.0)
+    points = np.column_stack([r * np.cos(angle), r * np.sin(angle), np.zeros(len(values))])
+    curve = pv.PolyData(points, lines=np.concatenate([[len(values) + 1], np.arange(len(values)), [0]]))
+    curve.point_data["value"] = values
+    return curve
+
+
+def deformed_picture(
+    grid: pv.UnstructuredGrid,
+    path: str | os.PathLike,
+    *,
+    field: str = "displacement",
+    scale: float | None = None,
+    title: str = "",
+    size: int = 900,
+) -> float:
+    """Picture of a deformed grid seen from above, coloured by the size of the displacement.
+
+    Parameters
+    ----------
+    grid : pyvista.UnstructuredGrid
+        As `assemble_set` makes it.
+    path : path-like
+        PNG file.
+    field : str
+        Point data of the displacement.
+    scale : float, optional
+        Magnification; when omitted, the largest displacement takes 3 % of the largest radius.
+    title : str
+    size : int
+        Width and height in pixels.
+
+    Returns
+    -------
+    float
+        The magnification.
+
+    Raises
+    ------
+    FemgearError
+        See `load_pyvista`.
+    """
+    from femgear.scene_drawing import picture
+
+    return picture(grid, path, field=field, scale=scale, title=title, size=size)

@@ -1,0 +1,187 @@
+"""The sector route against the same grid solved as a whole gear."""
+
+import numpy as np
+import pytest
+
+from femgear.contact.flanks import flank_load_columns, flank_stations
+from femgear.errors import GridError
+from femgear.fe.compliance import (
+    condense_sector,
+    dof_pairs,
+    interpolation,
+    mirror_nodes,
+    mirrored_columns,
+    symmetric_factor,
+    tooth_compliance,
+)
+from femgear.fe.elasticity import Material, foundation, mass, stiffness
+from femgear.fe.grid import copy_nodes, mirror, rotated_copies
+from femgear.fe.meshing import mesh_outline
+from femgear.fe.reduction import cyclic_modes, sector_basis
+from femgear.gears import Gear, half_sector
+
+STEEL = Material(206e9, 0.3, 7850.0)
+THICKNESS = 0.02
+
+
+@pytest.fixture(scope="module")
+def gear():
+    return Gear(
+        teeth=18,
+        module=3e-3,
+        pressure_angle=np.deg2rad(20),
+        profile_shift=0.2,
+        face_width=THICKNESS,
+        rim_radius=0.014,
+    )
+
+
+@pytest.fixture(scope="module")
+def sector(gear):
+    return mirror(mesh_outline(half_sector(gear, flank_elements=8)))
+
+
+@pytest.fixture(scope="module")
+def whole(sector, gear):
+    return rotated_copies(sector, gear.teeth)
+
+
+def test_sector_compliance_is_that_of_the_whole_gear(gear, sector, whole):
+    """Displacements on several teeth for loads on both flanks of tooth 0: to 1e-10 of the largest."""
+    K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
+    stations = flank_stations(sector, gear)
+    loads = flank_load_columns(sector, stations)
+    cyclic = tooth_compliance(
+        condense_sector(sector, K, count=gear.teeth, held="rim", loads=loads, observations=loads)
+    )
+    K_whole = stiffness(whole, STEEL, state="plane strain", thickness=THICKNESS)
+    free = np.setdiff1d(np.arange(K_whole.shape[0]), dof_pairs(np.unique(whole.boundaries["rim"])))
+    nodes = copy_nodes(sector, gear.teeth)
+    both = np.hstack([loads, mirrored_columns(loads, mirror_nodes(sector))])
+    n_whole = 2 * len(whole.points)
+    force = _on_tooth(both, nodes[0], 0.0, n_whole)
+    u = np.zeros_like(force)
+    u[free] = symmetric_factor(K_whole[free][:, free]).solve(force[free])
+    for tooth in (0, 1, 5, 9, 17):
+        observe = _on_tooth(both, nodes[tooth], tooth * gear.pitch_angle, n_whole)
+        assert np.abs(observe.T @ u - cyclic[tooth]).max() < 1e-10 * cyclic[0].max()
+
+
+def _on_tooth(columns, nodes, angle, size):
+    """Columns of a sector placed on the tooth at `angle` of the whole gear."""
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    result = np.zeros((size, columns.shape[1]))
+    turned = np.einsum("ij,njm->nim", turn, columns.reshape(-1, 2, columns.shape[1]))
+    np.add.at(result, 2 * nodes, turned[:, 0])
+    np.add.at(result, 2 * nodes + 1, turned[:, 1])
+    return result
+
+
+def test_compliance_is_reciprocal_and_positive(gear, sector):
+    K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
+    loads = flank_load_columns(sector, flank_stations(sector, gear))
+    H = tooth_compliance(
+        condense_sector(sector, K, count=gear.teeth, held="rim", loads=loads, observations=loads)
+    )
+    assert np.abs(H - np.roll(H[::-1], 1, axis=0).transpose(0, 2, 1)).max() < 1e-12 * H.max()
+    z, n = gear.teeth, H.shape[1]
+    lag = (np.arange(z)[:, None] - np.arange(z)) % z
+    full = H[lag].transpose(0, 2, 1, 3).reshape(z * n, z * n)
+    assert np.linalg.eigvalsh(0.5 * (full + full.T))[0] > 0
+
+
+def test_compliance_does_not_depend_on_the_scale(gear):
+    """With E fixed the compliance per unit thickness is scale-free (benchmark A10)."""
+    values = []
+    for scale in (1.0, 10.0):
+        big = Gear(
+            teeth=18,
+            module=scale * 3e-3,
+            pressure_angle=np.deg2rad(20),
+            profile_shift=0.2,
+            face_width=THICKNESS,
+            rim_radius=scale * 0.014,
+        )
+        grid = mirror(mesh_outline(half_sector(big, flank_elements=8)))
+        K = stiffness(grid, STEEL, state="plane strain", thickness=THICKNESS)
+        loads = flank_load_columns(grid, flank_stations(grid, big))
+        schur = condense_sector(grid, K, count=18, held="rim", loads=loads, observations=loads)
+        values.append(tooth_compliance(schur)[0])
+    assert np.abs(values[1] - values[0]).max() < 1e-9 * values[0].max()
+
+
+def test_free_body_is_refused(gear, sector):
+    K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
+    loads = flank_load_columns(sector, flank_stations(sector, gear))
+    loads[dof_pairs(np.unique(sector.boundaries["cut_left"]))] = 1.0
+    with pytest.raises(GridError, match="cut"):
+        condense_sector(sector, K, count=18, held="rim", loads=loads, observations=loads)
+
+
+def test_interpolation_is_exact_for_quadratics(sector, gear):
+    rng = np.random.default_rng(1)
+    stations = flank_stations(sector, gear)
+    points = stations.points + stations.normals * rng.uniform(0.1e-3, 1.0e-3, (len(stations.points), 1))
+    W = interpolation(sector, points)
+
+    def f(p):
+        return 1.0 + 300 * p[:, 0] - 50 * p[:, 1] + 2e4 * p[:, 0] * p[:, 1] - 1e4 * p[:, 1] ** 2
+
+    straight = np.abs(W @ f(sector.points) - f(points))
+    # exact in straight elements; in the curved ones along flank and fillet the map itself is quadratic
+    assert np.median(straight) < 1e-12
+    assert straight.max() < 1e-3
+    assert np.abs(W @ sector.points - points).max() < 1e-15
+    with pytest.raises(GridError, match="outside"):
+        interpolation(sector, np.array([[1.0, 0.0]]))
+
+
+def test_cyclic_modes_are_those_of_the_whole_body(gear, sector, whole):
+    """Every natural frequency of the whole gear on a foundation, by nodal diameter, to 1e-4."""
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    def matrices(grid):
+        K = stiffness(grid, STEEL, state="plane stress", thickness=THICKNESS)
+        return K + foundation(grid, "rim", 1e11, 1e11, thickness=THICKNESS), mass(grid, STEEL, THICKNESS)
+
+    K, M = matrices(sector)
+    loads = flank_load_columns(sector, flank_stations(sector, gear))[:, 3:4]
+    basis = sector_basis(sector, K, M, count=gear.teeth, loads=loads)
+    modes = cyclic_modes(
+        basis,
+        count=gear.teeth,
+        nodal_diameters=range(10),
+        loads=loads,
+        outputs=loads,
+        max_frequency=6e4,
+        static_correction=False,
+    )
+    sector_frequencies = np.sort(np.repeat(modes.frequency, np.where(modes.paired, 2, 1)))
+    K_whole, M_whole = matrices(whole)
+    factor = symmetric_factor(K_whole)
+    inverse = LinearOperator(K_whole.shape, matvec=factor.solve, dtype=float)
+    values = eigsh(K_whole, k=16, M=M_whole, sigma=0.0, OPinv=inverse, return_eigenvectors=False)
+    reference = np.sort(np.sqrt(values)) / (2 * np.pi)
+    assert np.abs(sector_frequencies[:16] / reference - 1).max() < 1e-4
+
+
+def test_reduced_ring_is_statically_complete(gear, sector):
+    """Modes plus static shape give the exact cyclic compliance of the load, whatever the cut-off frequency."""
+    K = stiffness(sector, STEEL, state="plane stress", thickness=THICKNESS)
+    K = K + foundation(sector, "rim", 1e11, 1e11, thickness=THICKNESS)
+    loads = flank_load_columns(sector, flank_stations(sector, gear))[:, 3:4]
+    basis = sector_basis(sector, K, mass(sector, STEEL, THICKNESS), count=gear.teeth, loads=loads)
+    from femgear.fe.compliance import cyclic_harmonics
+
+    exact = cyclic_harmonics(
+        condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads),
+        np.arange(10),
+    )[:, 0, 0].real
+    for top in (1.0, 3e4):
+        modes = cyclic_modes(
+            basis, count=gear.teeth, nodal_diameters=range(10), loads=loads, outputs=loads, max_frequency=top
+        )
+        terms = np.abs(modes.load[:, 0]) ** 2 / (2 * np.pi * modes.frequency) ** 2
+        ours = np.bincount(modes.nodal_diameter, weights=terms)
+        # the foundation is 1e3 times softer than the tooth: rounding costs that much of the double precision
+        assert np.abs(ours / exact - 1).max() < 1e-8

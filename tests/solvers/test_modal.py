@@ -1,0 +1,156 @@
+import numpy as np
+import pytest
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.modal import output_load, output_response, residual_output, solve_modes
+from femgear.solvers.spectral import solve_spectral
+from femgear.system import MechanicalSystem
+
+
+def pair(m1=2.0, m2=3.0, load=(5.0, 5.0)):
+    """Two free masses pressed together through one mesh."""
+    return MechanicalSystem(
+        np.diag([m1, m2]), np.zeros((2, 2)), np.zeros((2, 2)), np.ones((2, 1)), np.array(load), ("a", "b")
+    )
+
+
+def test_free_pair_closed_form():
+    modes = solve_modes(pair(), [30.0], damping_ratio=0.05)
+    assert modes.kind == ("rigid", "elastic")
+    assert modes.frequency[0] == 0.0 and modes.damping_ratio[0] == 0.0
+    assert modes.frequency[1] == pytest.approx(np.sqrt(30.0 * (1 / 2 + 1 / 3)) / (2 * np.pi), rel=1e-12)
+    assert modes.mesh_deflection[0, 0] == 0.0
+    assert modes.load_deflection[0] == pytest.approx(5.0 / 30.0, rel=1e-12)
+    assert abs(modes.residual[0, 0]) < 1e-15
+
+
+def test_modes_left_out_leave_their_flexibility():
+    only_rigid = solve_modes(pair(), [30.0], damping_ratio=0.05, count=1)
+    assert only_rigid.residual[0, 0] == pytest.approx(1 / 30.0, rel=1e-12)
+    assert only_rigid.load_deflection[0] == pytest.approx(5.0 / 30.0, rel=1e-12)
+
+
+def test_shapes_are_mass_normalised(geared_chain):
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0)
+    stiffness = geared_chain.K + (geared_chain.W * [1.0, 1.4]) @ geared_chain.W.T
+    omega = 2 * np.pi * modes.frequency
+    np.testing.assert_allclose(modes.shape.T @ geared_chain.M @ modes.shape, np.eye(4), atol=1e-12)
+    np.testing.assert_allclose(modes.shape.T @ stiffness @ modes.shape, np.diag(omega**2), atol=1e-12)
+    np.testing.assert_allclose(modes.modal_load, modes.shape.T @ geared_chain.load)
+    expected = geared_chain.W.T @ np.linalg.solve(stiffness, geared_chain.load)
+    np.testing.assert_allclose(modes.load_deflection, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kept", [1, 2, 3])
+def test_static_flexibility_is_the_same_for_any_number_of_modes(geared_chain, kept):
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0, count=kept)
+    omega = 2 * np.pi * modes.frequency
+    total = modes.residual + (modes.mesh_deflection / omega**2) @ modes.mesh_deflection.T
+    stiffness = geared_chain.K + (geared_chain.W * [1.0, 1.4]) @ geared_chain.W.T
+    np.testing.assert_allclose(total, geared_chain.W.T @ np.linalg.solve(stiffness, geared_chain.W))
+
+
+def test_rigid_mode_is_found_beside_very_stiff_parts():
+    """A free chain whose couplings span eight decades still has exactly one clean rigid mode."""
+    n, springs = 6, np.array([1e2, 1e10, 1e10, 1e9])
+    K, W = np.zeros((n, n)), np.zeros((n, 1))
+    for i, k in zip((0, 2, 3, 4), springs):
+        K[np.ix_([i, i + 1], [i, i + 1])] += k * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    W[1, 0], W[2, 0] = 1.0, 2.0
+    load = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 2.0])
+    system = MechanicalSystem(np.eye(n), np.zeros((n, n)), K, W, load, tuple("abcdef"))
+    modes = solve_modes(system, [1e6], damping_ratio=0.02)
+    assert modes.kind.count("rigid") == 1
+    np.testing.assert_allclose(modes.load_deflection, [1e-6], rtol=1e-8)
+
+
+def test_multiple_eigenvalue_is_not_cut(planet_set):
+    system = planet_set()
+    everything = solve_modes(system, np.ones(6), damping_ratio=0.0).frequency
+    first = int(np.argmax(np.diff(everything) < 1e-9 * everything[1:]))
+    kept = solve_modes(system, np.ones(6), damping_ratio=0.0, count=first + 1)
+    assert len(kept.frequency) == first + 2
+    kept = solve_modes(system, np.ones(6), damping_ratio=0.0, max_frequency=everything[first + 1])
+    assert len(kept.frequency) == first + 2
+
+
+def test_damping_from_a_proportional_matrix(geared_chain):
+    stiffness = geared_chain.K + (geared_chain.W * [1.0, 1.4]) @ geared_chain.W.T
+    system = MechanicalSystem(
+        geared_chain.M, 0.01 * geared_chain.M + 0.02 * stiffness, geared_chain.K, geared_chain.W,
+        geared_chain.load, geared_chain.dofs,
+    )  # fmt: skip
+    modes = solve_modes(system, [1.0, 1.4])
+    omega = 2 * np.pi * modes.frequency
+    np.testing.assert_allclose(modes.damping_ratio, 0.005 / omega + 0.01 * omega, rtol=1e-10)
+    with pytest.raises(CaseError, match="damping matrix"):
+        solve_modes(system, [1.0, 1.4], damping_ratio=0.05)
+
+
+def test_outputs_of_few_modes_follow_those_of_all(planet_set, planet_excitation):
+    """At low speed a displacement of the ring body does not depend on the number of modes kept."""
+    system, excitation = planet_set(), planet_excitation(np.zeros(6))
+    rows = np.random.default_rng(1).standard_normal((3, len(system.M)))
+    outputs = []
+    for count in (None, 8):
+        modes = solve_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05, count=count)
+        response = solve_spectral(modes, excitation, 1e-4, method="direct")
+        residual, load = residual_output(system, modes, rows), output_load(system, modes, rows)
+        outputs.append(output_response(modes, response, rows @ modes.shape, residual=residual, load=load))
+        if count is None:
+            assert np.abs(residual).max() < 1e-10
+            np.testing.assert_allclose(
+                np.einsum("om,smh->soh", rows @ modes.shape, response.modal), outputs[0]
+            )
+    assert np.abs(outputs[0] - outputs[1]).max() < 1e-5 * np.abs(outputs[0]).max()
+
+
+def test_load_that_nothing_holds_is_refused():
+    with pytest.raises(CaseError, match="rigid-body") as caught:
+        solve_modes(pair(load=(5.0, 4.0)), [30.0], damping_ratio=0.05)
+    assert caught.value.code == "E-LOAD-BALANCE"
+
+
+def test_open_mesh_is_refused():
+    system = pair()
+    with pytest.raises(ConvergenceError, match="strains mesh 1"):
+        solve_modes(system, [0.0], damping_ratio=0.05)
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"K": np.array([[1.0, 0.5], [0.0, 1.0]])}, "not symmetric"),
+        ({"K": np.array([[np.nan, 0.0], [0.0, 1.0]])}, "not finite"),
+        ({"K": -100.0 * np.eye(2)}, "negative"),
+        ({"M": np.diag([1.0, 0.0])}, "positive definite"),
+        ({"load": np.zeros(3)}, "shape"),
+        ({"gyroscopic": np.array([[0.0, 1.0], [-1.0, 0.0]])}, "gyroscopic"),
+    ],
+)
+def test_bad_systems_are_refused(change, match):
+    from dataclasses import replace
+
+    with pytest.raises((CaseError, ConvergenceError), match=match):
+        solve_modes(replace(pair(), **change), [30.0], damping_ratio=0.05)
+
+
+@pytest.mark.parametrize("damping", [-0.1, np.nan, [0.1, 0.1, 0.1]])
+def test_bad_damping_is_refused(damping):
+    with pytest.raises(CaseError, match="damping"):
+        solve_modes(pair(), [30.0], damping_ratio=damping)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "options"),
+    [
+        ([-1.0], {}),
+        ([np.inf], {}),
+        ([30.0], {"count": 0}),
+        ([30.0], {"max_frequency": -1.0}),
+        ([30.0], {"max_frequency": 1.0, "count": 1}),
+    ],
+)
+def test_bad_requests_are_refused(stiffness, options):
+    with pytest.raises(CaseError):
+        solve_modes(pair(), stiffness, damping_ratio=0.05, **options)

@@ -1,0 +1,298 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers import operator
+from femgear.solvers.harmonics import harmonics_of, multiply, pad, product_matrix, sample
+from femgear.solvers.modal import solve_modes
+from femgear.solvers.spectral import solve_spectral
+from femgear.system import MechanicalSystem, MeshExcitation
+
+
+def series(amplitudes, angle):
+    """Value of one-sided harmonics (n, H + 1) at one angle."""
+    return (amplitudes @ np.exp(1j * np.arange(amplitudes.shape[-1]) * angle)).real
+
+
+def integrate(system, excitation, modes, frequency, harmonics, instants=64):
+    """Periodic mesh deflections by DOP853 and linear shooting in physical coordinates."""
+    k, s, f = (
+        harmonics_of(a, harmonics) for a in (excitation.stiffness, excitation.deflection, excitation.force)
+    )
+    n, omega = len(system.M), 2 * np.pi * frequency
+    damping = (
+        system.M
+        @ (modes.shape * (4 * np.pi * modes.frequency * modes.damping_ratio))
+        @ modes.shape.T
+        @ system.M
+    )
+    inverse = np.linalg.inv(system.M)
+
+    def rate(t, y, forced):
+        x = y.reshape(2, n, -1)
+        stiffness = series(k, omega * t)[:, None]
+        force = stiffness * (system.W.T @ x[0])
+        outside = np.zeros((n, 1))
+        if forced:
+            force = force + series(f, omega * t)[:, None] - stiffness * series(s, omega * t)[:, None]
+            outside = system.load[:, None]
+        acceleration = inverse @ (outside - damping @ x[1] - system.K @ x[0] - system.W @ force)
+        return np.stack([x[1], acceleration]).ravel()
+
+    options = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
+    period = 1 / frequency
+    free = solve_ivp(rate, (0, period), np.eye(2 * n).ravel(), args=(False,), **options).y[:, -1]
+    forced = solve_ivp(rate, (0, period), np.zeros(2 * n), args=(True,), **options).y[:, -1]
+    start = np.linalg.solve(np.eye(2 * n) - free.reshape(2 * n, 2 * n), forced)
+    times = np.arange(instants) * period / instants
+    motion = solve_ivp(rate, (0, period), start, args=(True,), t_eval=times, **options).y[:n]
+    return system.W.T @ motion
+
+
+def test_product_of_harmonics_is_the_product_of_signals():
+    rng = np.random.default_rng(0)
+    a, b = (rng.standard_normal((2, 64)) for _ in range(2))
+    a, b = harmonics_of(a, 4), harmonics_of(b, 6)
+    product = multiply(product_matrix(a, 6), b[:, None, :])[:, 0]
+    np.testing.assert_allclose(product, harmonics_of(sample(a, 64) * sample(b, 64), 6), atol=1e-14)
+
+
+def test_harmonics_need_enough_positions():
+    signal = np.cos(2 * np.pi * np.arange(13) / 13 * 6 + 0.4)
+    np.testing.assert_allclose(np.abs(harmonics_of(signal, 6)), [0, 0, 0, 0, 0, 0, 1], atol=1e-12)
+    with pytest.raises(CaseError, match="12 positions"):
+        harmonics_of(signal[:12], 6)
+
+
+def test_quasi_static_response_is_the_static_state(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.2)
+    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05, count=2)
+    for method in ("direct", "fixed point"):
+        response = solve_spectral(modes, excitation, [0.0, 1e-7], method=method, tolerance=1e-12)
+        for h in range(7):
+            expected = harmonics_of(excitation.deflection, 6)[:, h]
+            np.testing.assert_allclose(
+                response.deflection[:, :, h], [expected] * 2, atol=1e-6 * abs(expected).max()
+            )
+            expected = harmonics_of(excitation.force, 6)[:, h]
+            np.testing.assert_allclose(response.force[:, :, h], [expected] * 2, atol=2e-6)
+        assert np.abs(response.deflection[:, :, 7:]).max() < 1e-6
+
+
+def test_quasi_static_state_does_not_depend_on_the_stiffness_in_the_modes(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.2)
+    modes = solve_modes(geared_chain, [1.2, 1.1], damping_ratio=0.05)
+    response = solve_spectral(modes, excitation, 0.0, tolerance=1e-12)
+    np.testing.assert_allclose(
+        response.deflection[0, :, :7], harmonics_of(excitation.deflection, 6), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("depth", [0.1, 0.3])
+def test_fixed_point_equals_direct_solution_where_it_contracts(geared_chain, chain_excitation, depth):
+    excitation = chain_excitation(depth)
+    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    frequency = np.linspace(0.01, 0.6, 60)
+    direct = solve_spectral(modes, excitation, frequency, method="direct")
+    fixed = solve_spectral(
+        modes, excitation, frequency, method="fixed point", tolerance=1e-11, max_iterations=3000
+    )
+    contracts = direct.spectral_radius < 0.98
+    np.testing.assert_array_equal(fixed.converged[contracts], True)
+    scale = np.abs(direct.deflection).max(axis=(1, 2))[contracts]
+    error = np.abs(fixed.deflection - direct.deflection).max(axis=(1, 2))[contracts]
+    assert contracts.sum() > 30 and np.all(error < 1e-8 * scale)
+
+
+def test_response_equals_time_integration(geared_chain, chain_excitation):
+    """Three speeds: a low one, one at a resonance, one where the fixed point diverges."""
+    excitation = chain_excitation(0.35)
+    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.02, count=4)
+    frequency = np.array([0.03, modes.frequency[3], modes.frequency[3] / 2])
+    response = solve_spectral(modes, excitation, frequency, response_harmonics=30, tolerance=1e-9)
+    assert response.spectral_radius[1:].max() > 1.0 and "direct" in response.method
+    waves = sample(response.deflection, 64)
+    for i, f in enumerate(frequency):
+        exact = integrate(geared_chain, excitation, modes, f, 6)
+        assert np.abs(waves[i] - exact).max() < 1e-4 * np.ptp(exact, axis=1).min()
+
+
+def test_single_mass_equals_time_integration():
+    system = MechanicalSystem(
+        np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)), np.ones(1), ("x",)
+    )
+    stiffness = (1.0 + 0.3 * np.cos(2 * np.pi * np.arange(32) / 32))[None]
+    excitation = MeshExcitation(stiffness, 1 / stiffness, np.ones_like(stiffness), np.zeros(1))
+    modes = solve_modes(system, [1.0], damping_ratio=0.1)
+    frequency = np.array([0.03, 0.155, 0.3])
+    response = solve_spectral(modes, excitation, frequency, response_harmonics=16, tolerance=1e-10)
+    for i, f in enumerate(frequency):
+        exact = integrate(system, excitation, modes, f, 6)
+        assert np.abs(sample(response.deflection, 64)[i] - exact).max() < 1e-4 * np.ptp(exact)
+
+
+def test_modal_coordinates_give_back_the_deflection(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.3)
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    response = solve_spectral(modes, excitation, [0.1, 0.2, 0.3], method="direct")
+    rebuilt = np.einsum("jk,skh->sjh", modes.mesh_deflection, response.modal)
+    np.testing.assert_allclose(rebuilt, response.deflection, atol=1e-12 * np.abs(rebuilt).max())
+
+
+def test_few_modes_with_residual_flexibility_follow_all_modes(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.2)
+    mean = excitation.stiffness.mean(axis=1)
+    responses = []
+    for count in (4, 3):
+        modes = solve_modes(geared_chain, mean, damping_ratio=0.05, count=count)
+        responses.append(solve_spectral(modes, excitation, 0.0002, method="direct").deflection)
+    error = np.abs(responses[1] - responses[0])[..., 1:].max() / np.abs(responses[0])[..., 1:].max()
+    assert error < 1e-4
+    poor = replace(modes, residual=np.zeros((2, 2)))
+    wrong = solve_spectral(poor, excitation, 0.0002, method="direct").deflection
+    assert np.abs(wrong - responses[0])[..., 1:].max() > 0.05 * np.abs(responses[0])[..., 1:].max()
+
+
+@pytest.mark.parametrize("step", [0.0, 1 / 3, 2 / 3])
+def test_identical_planets_repeat_each_other_in_time(planet_set, planet_excitation, step):
+    system = planet_set()
+    phase = step * np.arange(3)
+    excitation = planet_excitation(np.concatenate([phase, phase + 0.25]))
+    modes = solve_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    response = solve_spectral(modes, excitation, np.linspace(0.05, 0.5, 7), method="direct")
+    shift = np.exp(-2j * np.pi * np.arange(13) * phase[:, None])
+    scale = np.abs(response.deflection).max()
+    for first in (0, 3):
+        expected = response.deflection[:, first : first + 1] * shift
+        np.testing.assert_allclose(response.deflection[:, first : first + 3], expected, atol=1e-12 * scale)
+
+
+def full_problem(modes, excitation, frequency):
+    """The unreduced equations, built by hand from samples and the modal sum."""
+    k, s, f = (harmonics_of(a, 6) for a in (excitation.stiffness, excitation.deflection, excitation.force))
+    k, s, f = (np.pad(a, ((0, 0), (0, 6))) for a in (k, s, f))
+    forcing = f - multiply(product_matrix(k, 12), s)
+    k[:, 0] -= modes.mesh_stiffness
+    omega, w = 2 * np.pi * np.outer(frequency, np.arange(13)), 2 * np.pi * modes.frequency
+    modal = 1 / (w**2 - omega[..., None] ** 2 + 2j * modes.damping_ratio * w * omega[..., None])
+    r = modes.mesh_deflection
+    receptance = np.einsum("ik,jk,shk->ijsh", r, r, modal) + modes.residual[:, :, None, None]
+    source = -np.einsum("ijsh,jh->ish", receptance, forcing)
+    source[..., 0] += modes.load_deflection[:, None]
+    return operator.HarmonicProblem(receptance, product_matrix(k, 12), source)
+
+
+@pytest.mark.parametrize("spoiled", [False, True])
+def test_reduction_to_one_planet_equals_the_full_equations(planet_set, planet_excitation, spoiled):
+    system = planet_set()
+    if spoiled:
+        mass = system.M.copy()
+        mass[6, 6] *= 1.3
+        system = replace(system, M=mass)
+    phase = np.arange(3) / 3
+    excitation = planet_excitation(np.concatenate([phase, phase + 0.25]))
+    modes = solve_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    frequency = np.linspace(0.05, 0.5, 5)
+    problem = full_problem(modes, excitation, frequency)
+    twins = operator.find_twins((pad(harmonics_of(excitation.stiffness, 6), 12),))
+    assert len(twins.leaders) == 2
+    assert (operator.reduce_twins(problem, twins) is None) is spoiled
+    exact = operator.solve_direct(problem).transpose(1, 0, 2)
+    for method in ("direct", "auto"):
+        response = solve_spectral(modes, excitation, frequency, method=method, tolerance=1e-12)
+        np.testing.assert_allclose(response.deflection, exact, atol=1e-10 * np.abs(exact).max())
+        assert response.residual.max() < 1e-11
+
+
+def test_arnoldi_finds_the_spectral_radius(planet_set, planet_excitation):
+    excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
+    modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
+    problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
+    exact = operator.spectral_radius(problem, exact_limit=np.inf)
+    np.testing.assert_allclose(operator.spectral_radius(problem, exact_limit=0.0), exact, rtol=0.02)
+
+
+def test_many_speeds_equal_one_at_a_time(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.2)
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    frequency = np.linspace(0.01, 0.5, 95)
+    together = solve_spectral(modes, excitation, frequency, tolerance=1e-11)
+    for i in (0, 39, 40, 94):
+        alone = solve_spectral(modes, excitation, frequency[i], tolerance=1e-11)
+        np.testing.assert_allclose(together.deflection[i], alone.deflection[0], atol=1e-9)
+
+
+def test_record_of_two_periods_has_every_second_line(geared_chain, chain_excitation):
+    single = chain_excitation(0.2)
+    double = MeshExcitation(
+        *(np.tile(a, (1, 2)) for a in (single.stiffness, single.deflection, single.force)),
+        np.zeros(2),
+        periods=2,
+    )
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    one = solve_spectral(modes, single, [0.1, 0.2], method="direct")
+    two = solve_spectral(modes, double, [0.1, 0.2], method="direct")
+    assert two.periods == 2 and two.deflection.shape[-1] == 25
+    np.testing.assert_allclose(two.deflection[..., ::2], one.deflection, atol=1e-12)
+    assert np.abs(two.deflection[..., 1::2]).max() < 1e-12
+
+
+def test_divergence_is_flagged_and_the_direct_solution_takes_over(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.35)
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.005)
+    at = modes.frequency[3]
+    failed = solve_spectral(modes, excitation, at, method="fixed point")
+    assert not failed.converged[0] and np.all(np.isnan(failed.deflection)) and failed.spectral_radius[0] > 1
+    assert "did not converge" in failed.message
+    rescued = solve_spectral(modes, excitation, at)
+    assert rescued.converged[0] and rescued.method == ("direct",) and rescued.residual[0] < 1e-12
+
+
+def test_truncation_is_reported(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.35)
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.005)
+    rough = solve_spectral(modes, excitation, modes.frequency[3] / 5, response_harmonics=6)
+    fine = solve_spectral(modes, excitation, modes.frequency[3] / 5, response_harmonics=40)
+    assert "Too few response harmonics" in rough.message and "Too few" not in fine.message
+    assert fine.tail[0] < 1e-3 < rough.tail[0]
+
+
+def test_undamped_resonance_is_refused_with_its_frequency(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.2)
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0)
+    with pytest.raises(ConvergenceError, match=f"{modes.frequency[1]:.6g} Hz") as caught:
+        solve_spectral(modes, excitation, [0.3, modes.frequency[1]])
+    assert caught.value.code == "E-RESONANCE"
+
+
+@pytest.mark.parametrize(
+    ("frequency", "options"),
+    [
+        (-1.0, {}),
+        (np.nan, {}),
+        ([], {}),
+        (0.1, {"method": "magic"}),
+        (0.1, {"tolerance": 0.0}),
+        (0.1, {"max_iterations": 0}),
+        (0.1, {"response_harmonics": 3}),
+        (0.1, {"excitation_harmonics": 0}),
+        (0.1, {"excitation_harmonics": 40, "response_harmonics": 80}),
+    ],
+)
+def test_bad_requests_are_refused(geared_chain, chain_excitation, frequency, options):
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    with pytest.raises(CaseError):
+        solve_spectral(modes, chain_excitation(0.2), frequency, **options)
+
+
+def test_bad_excitation_is_refused(geared_chain, chain_excitation):
+    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    good = chain_excitation(0.2)
+    stiffness = good.stiffness.copy()
+    stiffness[0, 3] = np.nan
+    for bad in (replace(good, stiffness=stiffness), replace(good, force=good.force[:, :-1])):
+        with pytest.raises(CaseError):
+            solve_spectral(modes, bad, 0.1)

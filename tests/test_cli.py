@@ -1,0 +1,318 @@
+"""The command line: exit codes, messages, and that it never shows a traceback."""
+
+import errno
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from femgear import analysis, cli
+from femgear.case import parse_case, with_value
+from femgear.errors import ConvergenceError
+from femgear.storage import finish, open_results, write_dataset, write_text
+
+CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
+TEXT = CASE.read_text(encoding="utf-8")
+
+
+def synthetic():
+    spec = importlib.util.spec_from_file_location(
+        "synthetic", Path(__file__).with_name("synthetic_results.py")
+    )
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def edited(*changes: tuple[str, object]) -> str:
+    """Text of the reference case with some entries changed; None leaves an entry out."""
+    case = parse_case(TEXT)
+    for key, value in changes:
+        case = with_value(case, key, value)
+    return case.source
+
+
+def standard(sun: int, planet: int, ring: int, planets: int = 3) -> str:
+    """Text of an unshifted set of module 1.5 mm with small bores."""
+    changes = {
+        "teeth = 27": f"teeth = {sun}",
+        "teeth = 40": f"teeth = {planet}",
+        "teeth = 108": f"teeth = {ring}",
+        "profile_shift = 0.52681": "profile_shift = 0.0",
+        '"51 mm"': f'"{0.75 * (sun + planet)} mm"',
+        "planets = 3": f"planets = {planets}",
+        '"9 mm"': '"3 mm"',
+        '"18 mm"': '"3 mm"',
+        "cutter_teeth = 30": "",
+    }
+    text = TEXT
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.fixture
+def check(tmp_path, capsys):
+    """Run ``femgear check`` on a text; gives exit code, standard output and standard error."""
+
+    def run(text: str):
+        path = tmp_path / "case.toml"
+        path.write_text(text, encoding="utf-8")
+        code = cli.main(["check", str(path)])
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return run
+
+
+# --- check -----------------------------------------------------------------------------------------
+
+
+def test_check_prints_the_published_numbers_of_the_reference_set(check):
+    code, out, err = check(TEXT)
+    assert code == 0 and err == ""
+    for number in ("22.1995", "20.0000", "1.5507", "1.9301", "90.0000", "1116.0000", "400 N m", "none"):
+        assert number in out
+    assert "-0.00" not in out
+
+
+def test_check_of_many_speeds_shows_some(check):
+    code, out, _ = check(edited(("operation.speeds", {"from": "1 rpm", "to": "1000 rpm", "count": 1000})))
+    assert code == 0 and "1000 speeds" in out and len(out.splitlines()) < 80
+
+
+def test_check_finds_the_shifts_that_are_left_out(check):
+    code, out, _ = check(TEXT.replace("profile_shift = 0.52681\n", ""))
+    assert code == 0 and "0.52681" in out
+
+
+def test_check_finds_the_centre_distance_that_is_left_out(check):
+    text = TEXT.replace('centre_distance = "51 mm"\n', "").replace("profile_shift = 0.52681\n", "")
+    code, out, _ = check(text)
+    assert code == 0 and "centre distance 51 mm" in out
+
+
+def test_check_echoes_negative_ring_teeth(check):  # bad input 32
+    code, out, _ = check(edited(("ring.teeth", -108)))
+    assert code == 0 and "108 teeth" in out and "ISO 21771" in out
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("operation.torque", "0 N m"), "no tooth touches"),  # 24
+        (("operation.torque", "-100 N m"), "the other flanks"),  # 25
+        (("dynamics.response_harmonics", 7), "twice as many"),
+        (("sun.tip_diameter", "45.6 mm"), "W-CLEARANCE"),  # 40
+        (("set.backlash", "1 mm"), "W-TIP-THIN"),  # 35
+        (("set.planets", 1), "W-PLANETS"),  # 47
+    ],
+)
+def test_check_warns(check, change, words):
+    code, out, _ = check(edited(change))
+    assert code == 0 and words in out
+
+
+def test_check_flags_undercut_with_the_shift_that_avoids_it(check):  # bad input 33
+    text = standard(14, 40, 94).replace("teeth = 94", 'teeth = 94\ntip_diameter = "138.6 mm"')
+    code, out, _ = check(text)
+    # x_min = h - rho (1 - sin(alpha)) - z sin^2(alpha)/2 = 1.25 - 0.1645 - 0.8188
+    assert code == 0 and "W-UNDERCUT" in out and "x >= 0.2667" in out
+
+
+GEOMETRY = [
+    # bad input, text, code, words of the message
+    (34, edited(("sun.tip_diameter", "48 mm")), "E-POINTED", "pointed"),
+    (36, edited(("rack.root_radius", 0.6)), "E-ROOT-RADIUS", "0.4719"),
+    (36, edited(("rack.root_radius", 0.38)), "E-FILLET", "planet's root fillet"),
+    (37, edited(("sun.profile_shift", -0.5)), "E-CONTACT-RATIO", "contact ratio 0.8283"),
+    (38, standard(36, 18, 72), "E-INTERFERENCE", "0.3849 mm"),
+    (40, edited(("sun.tip_diameter", "46 mm")), "E-CLEARANCE", "-0.1250 mm"),
+    (41, edited(("planet.bore_radius", "30 mm")), "E-RIM", "planet.bore_radius"),
+    (41, edited(("ring.outer_radius", "80 mm")), "E-RIM", "ring.outer_radius"),
+    (42, edited(("set.centre_distance", "40 mm")), "E-CENTRE-DISTANCE", "47.2196 mm"),
+    (43, edited(("set.centre_distance", "50.5 mm")), "E-BACKLASH", "overlap"),
+    (44, standard(27, 36, 99, planets=4), "E-ASSEMBLY", "91.428571"),
+    (45, standard(20, 30, 80, planets=5), "E-NEIGHBOURS", "at most 4"),
+    (46, edited(("ring.teeth", 108), ("set.centre_distance", "50.25 mm")), "E-BACKLASH", "overlap"),
+    (47, edited(("set.planets", 1000)), "E-NEIGHBOURS", "found:   1000"),
+    (48, edited(("set.planet_angles", ["0 deg", "120 deg", "120 deg"])), "E-ANGLES", "equal"),
+    (48, edited(("set.planet_angles", ["0 deg", "240 deg", "120 deg"])), "E-ANGLES", "ascending"),
+    (48, edited(("set.planet_angles", ["0 deg", "121 deg", "240 deg"])), "E-ASSEMBLY", "120.000000"),
+]
+
+
+@pytest.mark.parametrize(("number", "text", "code", "words"), GEOMETRY)
+def test_gears_that_cannot_be_are_refused_with_numbers(check, number, text, code, words):
+    status, out, err = check(text)
+    assert status == 2, f"bad input {number}"
+    assert f"[{code}]" in err and "case.toml" in err
+    assert words in err and "allowed:" in err and "remedy:" in err
+    assert out == "" and "Traceback" not in err
+
+
+def test_not_coaxial(check):  # bad input 46: 27 + 2 x 40 is not 108, and no shift makes up for it
+    text = TEXT.replace('centre_distance = "51 mm"\n', "").replace("0.52681", "0.0")
+    status, _, err = check(text)
+    assert status == 2 and "E-COAXIAL" in err and "50.25" in err and "51.0" in err
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "empty"),
+        ("a = [", "E-TOML"),
+        (TEXT.replace("module", "modul"), "module?"),
+        (TEXT.replace("planets = 3", "planets = 0"), "set.planets"),  # 47
+        (TEXT.replace('fixed = "ring"', 'fixed = "sun"'), "E-MECHANISM"),  # 49
+        (TEXT + "\n[set.pins]\nradial_error = '1 mm'\n", "set.pins"),  # 50: there is nothing silently ignored
+    ],
+)
+def test_bad_files_end_with_exit_code_2(check, text, words):
+    status, out, err = check(text)
+    assert status == 2 and words in err and out == "" and "Traceback" not in err
+
+
+# --- the program as started by a shell --------------------------------------------------------------
+
+
+def test_the_installed_program(tmp_path):
+    program = Path(sys.executable).with_name("femgear")
+
+    def started(*arguments):
+        return subprocess.run([program, *arguments], capture_output=True, text=True, timeout=60, check=False)
+
+    run = started("--help")
+    assert run.returncode == 0
+    for command in ("check", "run", "report", "validate"):
+        assert command in run.stdout
+    run = subprocess.run(
+        [program, "check", "absent.toml"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert run.returncode == 2 and "E-FILE" in run.stderr and run.stdout == ""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["chek"], ["run"], ["run", "x.toml"], ["run", "x.toml", "-o", "y", "--only", "all"], ["check"]],
+)
+def test_wrong_arguments(arguments, capsys):
+    assert cli.main(arguments) == 2
+    assert capsys.readouterr().err != ""
+
+
+def test_no_arguments_and_version(capsys):
+    assert cli.main([]) == 0
+    assert "Usage" in capsys.readouterr().out
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == "0.1.0"
+
+
+def test_schema_is_json(capsys):
+    assert cli.main(["schema"]) == 0
+    assert "properties" in json.loads(capsys.readouterr().out)
+
+
+# --- run -------------------------------------------------------------------------------------------
+
+
+def fake_run(case, out, *, only=None, pictures=True, progress=None):
+    """Write synthetic results as the pipeline would."""
+    data = synthetic()
+    names = ["case.toml"]
+    write_text(case.source, out / "case.toml")
+    for step, stage in enumerate(("static", "modes", "dynamics", "housing")):
+        progress(stage, step + 1, 4)
+        dataset = getattr(data, stage)()
+        for name in dataset.coords:
+            dataset[name].attrs.setdefault("units", "1")
+            dataset[name].attrs.setdefault("long_name", str(name))
+        write_dataset(dataset, out / f"{stage}.nc")
+        names.append(f"{stage}.nc")
+        if stage == only:
+            break
+    finish(out, names, timings={"static": 0.25}, convergence={})
+
+
+@pytest.fixture
+def pipeline(monkeypatch):
+    def use(function):
+        monkeypatch.setattr(analysis, "run_case", function, raising=False)
+
+    use(fake_run)
+    return use
+
+
+def test_run_writes_and_sums_up(tmp_path, capsys, pipeline):
+    out = tmp_path / "out"
+    assert cli.main(["run", str(CASE), "-o", str(out)]) == 0
+    printed = capsys.readouterr()
+    for title in ("Static", "Modes", "Dynamics", "Housing", "Time", "load share"):
+        assert title in printed.out
+    assert "static" in printed.err
+    assert open_results(out).stages == ("static", "modes", "dynamics", "housing")
+    assert (out / "case.toml").read_text(encoding="utf-8") == TEXT
+
+
+def test_run_of_one_stage(tmp_path, capsys, pipeline):
+    out = tmp_path / "out"
+    assert cli.main(["run", str(CASE), "--output", str(out), "--only", "static", "--no-pictures"]) == 0
+    assert open_results(out).stages == ("static",)
+    assert "Dynamics" not in capsys.readouterr().out
+
+
+def test_run_again_needs_force(tmp_path, capsys, pipeline):
+    out = tmp_path / "out"
+    assert cli.main(["run", str(CASE), "-o", str(out)]) == 0
+    assert cli.main(["run", str(CASE), "-o", str(out)]) == 4
+    assert "--force" in capsys.readouterr().err
+    assert cli.main(["run", str(CASE), "-o", str(out), "--force"]) == 0
+
+
+def test_run_into_somebody_elses_folder(tmp_path, capsys, pipeline):
+    (tmp_path / "mine.txt").write_text("mine")
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path), "--force"]) == 4
+    assert "E-OUTPUT" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_bad_case_makes_no_folder(tmp_path, capsys, pipeline):
+    path = tmp_path / "bad.toml"
+    path.write_text(edited(("set.planets", 5)))
+    assert cli.main(["run", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "E-NEIGHBOURS" in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+def _diverge(*_, **__):
+    raise ConvergenceError("no solution at 1 rpm", code="E-CONVERGENCE")
+
+
+def _interrupt(*_, **__):
+    raise KeyboardInterrupt
+
+
+def _fill(*_, **__):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "static.nc")
+
+
+@pytest.mark.parametrize(
+    ("function", "code", "words"),
+    [(_diverge, 3, "no solution"), (_interrupt, 130, "interrupted"), (_fill, 4, "E-DISK-FULL")],
+)
+def test_exit_codes(tmp_path, capsys, pipeline, function, code, words):
+    pipeline(function)
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out")]) == code
+    printed = capsys.readouterr()
+    assert words in printed.err and "Traceback" not in printed.err
+    # what an interrupted run leaves behind does not stand in the way of the next
+    pipeline(fake_run)
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out")]) == 0
+
+
+def test_report_of_no_results(tmp_path, capsys):
+    assert cli.main(["report", str(tmp_path / "absent")]) == 4
+    assert "E-RESULTS-MISSING" in capsys.readouterr().err
