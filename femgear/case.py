@@ -88,7 +88,11 @@ def with_value(case: Case, key: str, value: object) -> Case:
         table.pop(last, None)
     else:
         table[last] = value.tolist() if hasattr(value, "tolist") else value
-    text = tomlfile.write(data)
+    try:
+        text = tomlfile.write(data)
+    except CaseError as error:
+        error.key, error.file = key, case.name or None
+        raise
     return _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
 
 

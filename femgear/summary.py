@@ -262,7 +262,7 @@ def _dynamics(data: xr.Dataset) -> Block:
         "converged",
     )
     notes = (
-        "DTE rms: the largest of all meshes, without its mean; steps, radius: of the fixed point,",
+        "DTE rms: the largest of all meshes, without its mean; iterations, radius: of the fixed point,",
         "which contracts below 1; Floquet: largest multiplier, stable below 1",
         f"{int(data.converged.sum())} of {len(stable)} speeds converged, {int(stable.sum())} stable",
     )

@@ -8,12 +8,17 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 python="${PYTHON:-python3}"
 stamp=.venv/.femgear_installed
 check_only=no
-if [ "${1:-}" = "--check" ]; then check_only=yes; fi
 
 fail() {
     printf 'femgear: %s\n' "$@" >&2
     exit 1
 }
+
+case "${1:-}" in
+    "") ;;
+    --check) check_only=yes ;;
+    *) fail "unknown argument '$1'; usage: setup_environment.sh [--check]" ;;
+esac
 
 # Prints "old <version>" or the Debian packages of what is missing, one a line; must run on any Python 3.
 look() {

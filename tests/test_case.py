@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from femgear.case import case_schema, parse_case, read_case, to_toml, with_value
+from femgear.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value
 from femgear.casefile import tomlfile
 from femgear.errors import CaseError
 
@@ -67,6 +68,16 @@ def test_optional_sections_have_defaults_and_motor_and_brake_may_be_left_out():
     assert case.motor is None and case.brake is None
     assert (case.static.positions, case.static.contact, case.housing.points) == (64, "profile", 54)
     assert case.response_harmonics == 2 * case.dynamics.mesh_harmonics
+
+
+def test_the_commented_entries_of_the_reference_case_are_valid():
+    text, count = re.subn(r"(?m)^# ([a-z_]+ = )", r"\1", TEXT)
+    case = parse_case(text)
+    assert count == 7 and case != parse_case(TEXT)
+    gears = planetary_set(case)
+    assert gears.sun.tip_diameter == 0.045 and gears.sun.rack.root_radius == 0.3
+    # half of 0.1 mm from either gear, along the line of action
+    assert gears.backlash_planet_ring == pytest.approx(1e-4 * math.cos(math.pi / 9), rel=1e-6)
 
 
 def test_the_case_cannot_be_changed():
@@ -220,7 +231,7 @@ def test_a_key_in_the_wrong_section_is_told_where_it_belongs(tmp_path):  # bad i
 
 def test_all_missing_keys_are_listed_at_once(tmp_path):  # bad input 5
     text = TEXT
-    for line in ('module = "1.5 mm"\n', 'mass = "3 kg"\n', 'torque = "100 N m"\n', "planets = 3\n"):
+    for line in ('module = "1.5 mm"\n', 'mass = "3 kg"\n', 'torque = "100 N m"', "planets = 3\n"):
         text = replaced(line, "", text)
     error = refused(text, tmp_path)
     missing = {problem.key for problem in error.problems}
@@ -428,7 +439,7 @@ def test_fixed_member_must_be_named(tmp_path):  # bad input 49
 
 
 def test_centre_distance_and_both_shifts_cannot_be_left_out(tmp_path):
-    text = replaced('centre_distance = "51 mm"\n', "")
+    text = replaced('centre_distance = "51 mm"', "")
     assert parse_case(text).set.centre_distance is None
     start, end = text.index("[ring]"), text.index("[carrier]")
     text = text[:start] + replaced("profile_shift = 0.0", "#", text[start:end]) + text[end:]

@@ -91,7 +91,7 @@ def test_check_finds_the_shifts_that_are_left_out(check):
 
 
 def test_check_finds_the_centre_distance_that_is_left_out(check):
-    text = TEXT.replace('centre_distance = "51 mm"\n', "").replace("profile_shift = 0.52681\n", "")
+    text = TEXT.replace('centre_distance = "51 mm"', "").replace("profile_shift = 0.52681\n", "")
     code, out, _ = check(text)
     assert code == 0 and "centre distance 51 mm" in out
 
@@ -156,7 +156,7 @@ def test_gears_that_cannot_be_are_refused_with_numbers(check, number, text, code
 
 
 def test_not_coaxial(check):  # bad input 46: 27 + 2 x 40 is not 108, and no shift makes up for it
-    text = TEXT.replace('centre_distance = "51 mm"\n', "").replace("0.52681", "0.0")
+    text = TEXT.replace('centre_distance = "51 mm"', "").replace("0.52681", "0.0")
     status, _, err = check(text)
     assert status == 2 and "E-COAXIAL" in err and "50.25" in err and "51.0" in err
 

@@ -23,8 +23,13 @@ HEAVY = {"gmsh", "pyvista", "vtk", "matplotlib", "dask", "skfem", "pint"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
+def family(name: str) -> str:
+    """``scene`` for ``scene_drawing``: a module split in two keeps its first name and its layer."""
+    return name if name in RANK else name.split("_")[0] or name
+
+
 def part_of(path: Path) -> str:
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    return family(path.relative_to(PACKAGE).parts[0].removesuffix(".py"))
 
 
 def imports(path: Path):
@@ -43,13 +48,15 @@ def imported_parts(path: Path) -> set[str]:
     found = set()
     for node in imports(path):
         if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("femgear.")}
+            found |= {
+                family(alias.name.split(".")[1]) for alias in node.names if alias.name.startswith("femgear.")
+            }
             continue
         assert node.level == 0, f"{path}:{node.lineno}: relative import"
         if node.module == "femgear":
-            found |= {alias.name for alias in node.names} - {"__version__"}
+            found |= {family(alias.name) for alias in node.names if alias.name != "__version__"}
         elif node.module.startswith("femgear."):
-            found.add(node.module.split(".")[1])
+            found.add(family(node.module.split(".")[1]))
     return found
 
 

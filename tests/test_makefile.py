@@ -69,6 +69,13 @@ def test_old_python_is_named(tmp_path):
     assert "Python 3.9.2; femgear needs 3.11 or newer" in done.stderr
 
 
+def test_an_unknown_argument_changes_nothing(tmp_path):
+    done = _setup(tmp_path, report="", arguments=("--help",))
+    assert done.returncode == 1
+    assert "usage: setup_environment.sh [--check]" in done.stderr
+    assert not (tmp_path / ".venv").exists()
+
+
 def test_this_system_has_what_is_needed():
     done = subprocess.run([BASH, SCRIPT, "--check"], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr

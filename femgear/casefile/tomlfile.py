@@ -229,7 +229,7 @@ def _value(value: object) -> str:
         return '"' + "".join(_escape(character) for character in value) + '"'
     if isinstance(value, int):
         if abs(value).bit_length() > 4096:
-            raise CaseError("the integer is too long", code="E-RANGE", value=shown(value))
+            raise CaseError("the integer is too long", code="E-RANGE", value=shown(value), limit="4096 bits")
         return str(value)
     if isinstance(value, float):
         return repr(value)

@@ -33,6 +33,8 @@ class MeshWindows:
 
     Parameters
     ----------
+    zeta : array
+        Path coordinates [m].
     near : bool array
         Candidate pairs.
     smallest_gap : array
@@ -54,6 +56,7 @@ class MeshWindows:
     n_planets: int
     positions: int
     pairs: int
+    zeta: np.ndarray
     near: np.ndarray
     smallest_gap: np.ndarray
     gap: np.ndarray
@@ -135,6 +138,38 @@ def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.nd
     return rounded
 
 
+def tooth_zero_angles(planetary_set: PlanetarySet, position: float = 0.0):
+    """Angles of the centre of tooth number 0 of every gear, as `tooth_numbers` counts them [rad].
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    position : float
+        Fraction of one mesh period.
+
+    Returns
+    -------
+    sun : float
+    planets : (N,) array
+        In the frame of the set, about each planet's own centre.
+    ring : float
+    """
+    from femgear.gears import half_thickness_angle
+
+    s = planetary_set
+    N, psi = s.n_planets, np.asarray(s.planet_angles)
+    turned = position + np.asarray(s.mesh_phases)
+
+    def half_angle(gear, pressure_angle):
+        return float(half_thickness_angle(gear, gear.base_radius / np.cos(pressure_angle)))
+
+    sun_angle, ring_angle = s.working_pressure_angle_sun_planet, s.working_pressure_angle_planet_ring
+    sun = psi[0] - half_angle(s.sun, sun_angle) + turned[0] * s.sun.pitch_angle
+    planets = psi + np.pi - half_angle(s.planet, sun_angle) - turned[:N] * s.planet.pitch_angle
+    ring = psi[0] - half_angle(s.ring, ring_angle) - turned[N] * s.ring.pitch_angle
+    return float(sun), planets, float(ring)
+
+
 def mesh_windows(
     planetary_set: PlanetarySet, bodies: Bodies, *, share, positions, cells, nearest, contact
 ) -> MeshWindows:
@@ -198,6 +233,7 @@ def _gather(found: list[Windows], used, tooth, N, positions, areas, local) -> Me
         n_planets=N,
         positions=positions,
         pairs=count,
+        zeta=join("zeta"),
         near=join("near"),
         smallest_gap=gap.min(axis=-1),
         gap=gap,
@@ -252,19 +288,19 @@ def _regular_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair) -> n
     sun_side = mesh < N
     everything = np.arange(n)
     sun = everything[sun_side]
-    _add_body(S, bodies.sun, setup, position, mesh, pair, sun, np.zeros(len(sun), int), LEFT, None)
+    _add_body(S, bodies.sun, setup, position, mesh, pair, sun, np.zeros(len(sun), int), LEFT)
     for planet in range(N):
         members = everything[mesh % N == planet]
         is_ring = mesh[members] >= N
         # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
         gear, side = np.where(is_ring, 0, 1), np.where(is_ring, RIGHT, LEFT)
-        _add_body(S, bodies.planet, setup, position, mesh, pair, members, gear, side, None)
+        _add_body(S, bodies.planet, setup, position, mesh, pair, members, gear, side)
     ring = everything[~sun_side]
-    _add_body(S, bodies.ring, setup, position, mesh, pair, ring, np.ones(len(ring), int), LEFT, None)
+    _add_body(S, bodies.ring, setup, position, mesh, pair, ring, np.ones(len(ring), int), LEFT)
     return S
 
 
-def _add_body(S, body: FlankCompliance, setup, position, mesh, pair, members, gear, side, _):
+def _add_body(S, body: FlankCompliance, setup, position, mesh, pair, members, gear, side):
     """Add the compliance of one body between the windows `members` that lie on it."""
     if not len(members):
         return

@@ -32,6 +32,10 @@ class MeshCycle:
         Tangent mesh stiffness dF/d delta at constant loads of the other meshes [N/m].
     tooth_load : (2N, T, P) array
         Load of each simultaneous tooth pair, in the order of the path coordinate [N].
+    path : (2N, T, P) array
+        Path coordinate of each tooth pair, from the pitch point in the direction of motion [m].
+    tooth : (2, 2N, T) int array
+        Tooth numbers of the pairs on gear 1 and gear 2, see `tooth_zero_angles`.
     max_pressure : (2N, P) array
         [Pa].
     open_planets : (N, P) bool array
@@ -51,6 +55,8 @@ class MeshCycle:
     force: np.ndarray
     stiffness: np.ndarray
     tooth_load: np.ndarray
+    path: np.ndarray
+    tooth: np.ndarray
     max_pressure: np.ndarray
     open_planets: np.ndarray
     residual: np.ndarray
@@ -160,6 +166,8 @@ def _unloaded(N: int, positions: int, contact: str) -> MeshCycle:
         force=zero,
         stiffness=zero,
         tooth_load=np.zeros((2 * N, 1, positions)),
+        path=np.zeros((2 * N, 1, positions)),
+        tooth=np.zeros((2, 2 * N, 1), int),
         max_pressure=zero,
         open_planets=np.ones((N, positions), bool),
         residual=np.zeros(positions),
@@ -198,6 +206,8 @@ def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, gaps, contact, 
     cycle = MeshCycle(
         position=np.arange(P) / P,
         tooth_load=tooth_load,
+        path=np.moveaxis(setup.zeta, 2, 1),
+        tooth=np.stack(setup.tooth),
         open_planets=open_planets,
         residual=residual,
         iterations=iterations,

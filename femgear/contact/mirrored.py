@@ -46,6 +46,8 @@ def walk_either_flank(planetary_set, bodies, *, sun_torque, progress=None, **opt
         stiffness=cycle.stiffness[mesh][:, position],
         # the pair that comes first along the path leaves first when the rotation is seen from behind
         tooth_load=cycle.tooth_load[mesh][:, ::-1][:, :, position],
+        path=-cycle.path[mesh][:, ::-1][:, :, position],
+        tooth=-cycle.tooth[:, mesh][:, :, ::-1],
         max_pressure=cycle.max_pressure[mesh][:, position],
         open_planets=cycle.open_planets[back][:, position],
         residual=cycle.residual[position],

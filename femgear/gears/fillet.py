@@ -96,8 +96,8 @@ class CutterTip:
 
 
 def default_cutter(teeth: int) -> PinionCutter:
-    """Cutter used when none is named: 30 unshifted teeth, at most a third of the gear's, at least 5."""
-    return PinionCutter(teeth=max(5, min(30, teeth // 3)))
+    """Cutter used when none is named: 30 unshifted teeth, or 12 fewer than the gear's if that is less."""
+    return PinionCutter(teeth=max(5, min(30, teeth - 12)))
 
 
 def cutter_of(gear: Gear) -> PinionCutter:

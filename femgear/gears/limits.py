@@ -193,7 +193,7 @@ def _check_cutter(gear: Gear) -> None:
             code="E-CUTTER",
             value=cutter.teeth,
             limit=f"whole number 5 .. {gear.teeth - 5}",
-            remedy="choose a smaller cutter, about a third of the gear's teeth",
+            remedy="choose a smaller cutter; 30 teeth, or 12 fewer than the gear, is the default",
         )
     tool = gear.tool
     if not tool.centre_radius > tool.cutter_base_radius:

@@ -71,7 +71,7 @@ def nrel_set() -> PlanetarySet:
 def reference_geometry() -> tuple[Row, ...]:
     """Working pressure angles, contact ratios, speeds and phases of the reference set."""
     s = reference_set()
-    source = "geometry fixed with the reference case"
+    source = "cos(alpha_w) = a_0 cos(alpha)/a, path of contact over base pitch; evaluated independently"
     name = "27/40/108 at 51 mm: "
     rows = [
         printed(

@@ -1,4 +1,8 @@
-"""The tables of docs/validation.md, in their order."""
+"""The tables of docs/validation.md, in their order.
+
+A row is added in a function without arguments that returns rows, named here under the parts of a theme, or
+under its slow parts when it takes more than a few seconds.
+"""
 
 from __future__ import annotations
 

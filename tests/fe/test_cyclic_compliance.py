@@ -185,3 +185,26 @@ def test_reduced_ring_is_statically_complete(gear, sector):
         ours = np.bincount(modes.nodal_diameter, weights=terms)
         # the foundation is 1e3 times softer than the tooth: rounding costs that much of the double precision
         assert np.abs(ours / exact - 1).max() < 1e-8
+
+
+def test_displacement_field_of_the_whole_gear(gear, sector, whole):
+    """Loads on three teeth: the field from one sector is that of the whole gear."""
+    from femgear.fe.field import cyclic_displacement
+
+    K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
+    columns = flank_load_columns(sector, flank_stations(sector, gear))
+    loads = np.zeros((gear.teeth, columns.shape[0]))
+    loads[0], loads[1], loads[7] = columns[:, 2], 0.5 * columns[:, 6], -0.2 * columns[:, 4]
+    field = cyclic_displacement(sector, K, loads, held="rim")
+    nodes = copy_nodes(sector, gear.teeth)
+    force = sum(
+        _on_tooth(loads[t][:, None], nodes[t], t * gear.pitch_angle, 2 * len(whole.points)) for t in range(18)
+    )
+    K_whole = stiffness(whole, STEEL, state="plane strain", thickness=THICKNESS)
+    free = np.setdiff1d(np.arange(K_whole.shape[0]), dof_pairs(np.unique(whole.boundaries["rim"])))
+    u = np.zeros(K_whole.shape[0])
+    u[free] = symmetric_factor(K_whole[free][:, free]).solve(force[free, 0])
+    for t in (0, 3, 7):
+        a = t * gear.pitch_angle
+        turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+        assert np.abs(field[t] @ turn.T - u.reshape(-1, 2)[nodes[t]]).max() < 1e-10 * np.abs(u).max()

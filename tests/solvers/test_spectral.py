@@ -207,6 +207,19 @@ def test_reduction_to_one_planet_equals_the_full_equations(planet_set, planet_ex
         assert response.residual.max() < 1e-11
 
 
+def test_nearly_identical_planets_meet_the_full_equations(planet_set, planet_excitation):
+    """A difference too small to break the symmetry does not keep a tight tolerance from being met."""
+    system = planet_set()
+    mass = system.M.copy()
+    mass[6, 6] *= 1.0 + 1e-9
+    excitation = planet_excitation(np.zeros(6))
+    modes = solve_modes(replace(system, M=mass), excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    frequency = np.linspace(0.05, 0.5, 5)
+    for method in ("auto", "direct"):
+        response = solve_spectral(modes, excitation, frequency, method=method, tolerance=1e-12)
+        assert np.all(response.converged) and response.residual.max() < 1e-12
+
+
 def test_arnoldi_finds_the_spectral_radius(planet_set, planet_excitation):
     excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
     modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)

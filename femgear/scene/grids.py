@@ -1,18 +1,17 @@
-"""PyVista scenes: the whole set and the ring's modes as VTK grids, pictures of them, and an animation."""
+"""VTK grids of whole bodies: the set with its displacements, the modes of the ring, curves around a circle."""
 
 from __future__ import annotations
 
-import ctypes
 import os
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from femgear.errors import CaseError, FemgearError
+from femgear.errors import CaseError
 from femgear.files import replace_file
+from femgear.scene.library import load_pyvista
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from femgear.fe.reduction import CyclicModes
 
 _QUADRATIC_TRIANGLE = 22  # VTK_QUADRATIC_TRIANGLE: corners, then the middles of 01, 12, 20
-_BODY_COLOURS = ("#D55E00", "#0072B2", "#999999")
 
 
 class Body(NamedTuple):
@@ -42,42 +40,6 @@ class Body(NamedTuple):
     points: np.ndarray
     triangles: np.ndarray
     displacement: np.ndarray | None = None
-
-
-def load_pyvista():
-    """PyVista, ready to draw without a screen.
-
-    Returns
-    -------
-    module
-
-    Raises
-    ------
-    FemgearError
-        ``E-SYSTEM-LIBRARY`` where the machine lacks the OpenGL library that drawing needs: VTK would
-        end the process without a word.
-    """
-    if sys.platform.startswith("linux"):
-        if _loads("libEGL.so.1"):
-            os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        else:
-            raise FemgearError(
-                "pictures of grids need the system library libEGL.so.1, which is not installed",
-                code="E-SYSTEM-LIBRARY",
-                value="libEGL.so.1",
-                remedy="apt-get install -y --no-install-recommends libegl1 libgl1 (Debian, Ubuntu)",
-            )
-    import pyvista
-
-    return pyvista
-
-
-def _loads(library: str) -> bool:
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
 
 
 def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, displacement=None) -> Body:
@@ -159,9 +121,7 @@ def _check_body(body: Body) -> None:
         )
 
 
-def ring_modes_grid(
-    sector: Grid, modes: CyclicModes, shown: Sequence[int], *, boundary_names=("cut_right", "cut_left")
-) -> pv.UnstructuredGrid:
+def ring_modes_grid(sector: Grid, modes: CyclicModes, shown: Sequence[int]) -> pv.UnstructuredGrid:
     """The whole ring with one displacement field a mode.
 
     Parameters
@@ -228,7 +188,9 @@ def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
     """
     if Path(path).suffix != ".vtu":
         raise CaseError("fields are written as VTU", code="E-SUFFIX", value=str(path), limit=".vtu")
-    replace_file(path, lambda temporary: grid.save(temporary, binary=True), size=grid.actual_memory_size * 1024)
+    replace_file(
+        path, lambda temporary: grid.save(temporary, binary=True), size=grid.actual_memory_size * 1024
+    )
 
 
 def polar_curve(values, *, radius: float, height: float) -> pv.PolyData:
@@ -255,43 +217,3 @@ def polar_curve(values, *, radius: float, height: float) -> pv.PolyData:
     curve = pv.PolyData(points, lines=np.concatenate([[len(values) + 1], np.arange(len(values)), [0]]))
     curve.point_data["value"] = values
     return curve
-
-
-def deformed_picture(
-    grid: pv.UnstructuredGrid,
-    path: str | os.PathLike,
-    *,
-    field: str = "displacement",
-    scale: float | None = None,
-    title: str = "",
-    size: int = 900,
-) -> float:
-    """Picture of a deformed grid seen from above, coloured by the size of the displacement.
-
-    Parameters
-    ----------
-    grid : pyvista.UnstructuredGrid
-        As `assemble_set` makes it.
-    path : path-like
-        PNG file.
-    field : str
-        Point data of the displacement.
-    scale : float, optional
-        Magnification; when omitted, the largest displacement takes 3 % of the largest radius.
-    title : str
-    size : int
-        Width and height in pixels.
-
-    Returns
-    -------
-    float
-        The magnification.
-
-    Raises
-    ------
-    FemgearError
-        See `load_pyvista`.
-    """
-    from femgear.scene_drawing import picture
-
-    return picture(grid, path, field=field, scale=scale, title=title, size=size)

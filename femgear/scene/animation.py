@@ -1,0 +1,296 @@
+"""Animation of the ring's operating deflection while the carrier turns past a fixed sensor."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import CaseError, FemgearError
+from femgear.files import replace_file
+from femgear.scene.drawing import add_text, colour_bar, look_down
+from femgear.scene.library import load_pyvista
+
+if TYPE_CHECKING:
+    from femgear.gears.planetary import PlanetarySet
+
+_SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
+
+
+@dataclass(frozen=True)
+class _Field:
+    """Deflection of the ring in the frame of the carrier, sampled by angle and instant."""
+
+    radial: np.ndarray
+    tangential: np.ndarray
+    turn: float
+    teeth: int
+    mean: bool
+
+    def at(self, angle: np.ndarray, carrier_angle: float) -> tuple[np.ndarray, np.ndarray]:
+        """Radial and tangential displacement [m] at housing angles, the carrier at `carrier_angle`."""
+        harmonics, n_max = self.radial.shape[0], self.radial.shape[1] // 2
+        h = np.arange(harmonics)
+        # the mesh frequency is the ring's number of teeth times the carrier's, whichever way it turns
+        time = np.exp(1j * h * self.teeth * carrier_angle * self.turn) * ((h > 0) | self.mean)
+        wave = np.exp(1j * np.outer(angle - carrier_angle, np.arange(-n_max, n_max + 1)))
+        return (wave @ (time @ self.radial)).real, (wave @ (time @ self.tangential)).real
+
+
+def animate_operating_deflection(
+    path: str | os.PathLike,
+    planetary_set: PlanetarySet,
+    *,
+    radial: np.ndarray,
+    tangential: np.ndarray | None = None,
+    sensor_angle: float = 0.0,
+    clockwise: bool = False,
+    mean: bool = False,
+    scale: float | None = None,
+    title: str = "",
+    frames: int = 48,
+    seconds: float = 6.0,
+    size: int = 480,
+) -> int:
+    """Animate one revolution of the carrier; every frame is a true instant of the periodic motion.
+
+    The number of frames is adjusted so that the meshes, seen frame by frame, pass slowly through a few
+    cycles, as under a stroboscope (see `strobe_frames`).
+
+    Parameters
+    ----------
+    path : path-like
+        ``.gif`` (or ``.mp4`` where imageio-ffmpeg is installed).
+    planetary_set : PlanetarySet
+    radial, tangential : (H + 1, 2 n_max + 1) complex arrays
+        Components of the outer surface's displacement [m]:
+        ``u(phi, t) = Re sum U[h, n] e^{i n phi} e^{i h omega t}``, phi in the frame of the carrier.
+    sensor_angle : float
+        Place of the fixed sensor on the housing [rad].
+    clockwise : bool
+        Whether the carrier turns clockwise.
+    mean : bool
+        Whether to show the mean deflection that turns with the carrier as well.
+    scale : float, optional
+        Magnification; when omitted, the largest displacement takes 9 % of the outer radius.
+    title : str
+    frames : int
+        Number of frames wished for.
+    seconds : float
+        Length of the animation.
+    size : int
+        Width and height in pixels.
+
+    Returns
+    -------
+    int
+        Number of frames written.
+
+    Raises
+    ------
+    CaseError
+        Components of unequal or even-sized shape, or a suffix that is neither .gif nor .mp4.
+    FemgearError
+        Without the OpenGL library, or without imageio-ffmpeg for .mp4.
+    StorageError
+        When the file cannot be written.
+    """
+    radial = np.asarray(radial, complex)
+    tangential = np.zeros_like(radial) if tangential is None else np.asarray(tangential, complex)
+    if radial.ndim != 2 or radial.shape[1] % 2 == 0 or radial.shape != tangential.shape:
+        raise CaseError(
+            f"components of shape {radial.shape} and {tangential.shape}",
+            code="E-SCENE",
+            limit="(H + 1, 2 n_max + 1), equal for both directions",
+        )
+    _check_suffix(path)
+    field = _Field(radial, tangential, -1.0 if clockwise else 1.0, planetary_set.ring.teeth, mean)
+    count = strobe_frames(planetary_set.ring.teeth, frames)
+    carrier = field.turn * 2 * np.pi * np.arange(count) / count
+    images = _draw(planetary_set, field, carrier, sensor_angle, scale, title, size)
+    _write(path, images, seconds)
+    return count
+
+
+def strobe_frames(ring_teeth: int, wished: int) -> int:
+    """Number of frames a revolution, near the one wished for, that shows the mesh cycle in slow motion.
+
+    With ``F`` frames the mesh passes ``ring_teeth / F`` cycles from one frame to the next, of which the
+    eye sees the fraction: ``ring_teeth mod F`` apparent cycles a revolution, of about twelve frames each.
+    """
+    around = range(max(3 * wished // 4, 2), max(5 * wished // 4, 3) + 1)
+    moving = [count for count in around if ring_teeth % count]
+    if not moving:
+        return wished
+    return min(moving, key=lambda count: (abs(count / (ring_teeth % count) - 12.0), abs(count - wished)))
+
+
+def _check_suffix(path) -> None:
+    suffix = Path(path).suffix
+    if suffix not in (".gif", ".mp4"):
+        raise CaseError("unknown kind of animation", code="E-SUFFIX", value=str(path), limit=".gif or .mp4")
+    if suffix == ".mp4":
+        try:
+            import imageio_ffmpeg  # noqa: F401
+        except ImportError:
+            raise FemgearError(
+                "MP4 needs the package imageio-ffmpeg, which is not installed",
+                code="E-PACKAGE",
+                remedy="pip install imageio-ffmpeg, or write a .gif",
+            ) from None
+
+
+def _draw(planetary_set, field, carrier, sensor_angle, scale, title, size):
+    """Frames as arrays (size, size, 3)."""
+    pv = load_pyvista()
+    outer = planetary_set.ring.rim_radius
+    corners = _ring_corners(planetary_set)
+    ring_angle = np.angle(corners)
+    around = np.linspace(0.0, 2 * np.pi, 181)
+    largest = max(np.hypot(*field.at(around, c)).max() for c in carrier)
+    colour = max(np.abs(field.at(around, c)[0]).max() for c in carrier) * 1e6 or 1.0
+    scale = scale if scale is not None else (0.09 * outer / largest if largest > 0 else 1.0)
+    text = "radial displacement [µm]"
+    ring = pv.PolyData.from_regular_faces(_plane(corners.ravel()), _strip_faces(*corners.shape))
+    ring.point_data[text] = np.zeros(corners.size)
+    plotter = pv.Plotter(off_screen=True, window_size=(size, size))
+    plotter.add_mesh(_circle(pv, outer), color="#808080", line_width=1.0, lighting=False)
+    bar = colour_bar(text, size)
+    plotter.add_mesh(
+        ring, scalars=text, clim=(-colour, colour), cmap="RdBu_r", lighting=False, scalar_bar_args=bar
+    )
+    discs = _discs(pv, plotter, planetary_set)
+    _add_sensor(pv, plotter, sensor_angle, outer * 1.1, outer)
+    add_text(plotter, f"{title}\nring displacement x {_rounded(scale)}".strip(), size)
+    look_down(plotter, outer * 1.26)
+    images = []
+    try:
+        for angle in carrier:
+            radial, tangential = (u.reshape(corners.shape) for u in field.at(ring_angle.ravel(), angle))
+            moved = corners + scale * (radial + 1j * tangential) * np.exp(1j * ring_angle)
+            ring.points = _plane(moved.ravel())
+            ring.point_data[text] = 1e6 * radial.ravel()
+            for disc, outline, (centre, turn) in zip(discs[0], discs[1], _places(planetary_set, angle)):
+                disc.points = _plane(centre + outline * np.exp(1j * turn))
+            plotter.render()
+            images.append(plotter.screenshot(filename=None, return_img=True)[..., :3])
+    finally:
+        plotter.close()
+    return images
+
+
+def gear_outline(teeth: int, root: float, tip: float) -> np.ndarray:
+    """Trapezoidal teeth around a circle, the first centred on angle 0, as complex points; for drawing only.
+
+    Parameters
+    ----------
+    teeth : int
+    root, tip : float
+        Radii [m]; for an internal gear the tip radius is the smaller one.
+
+    Returns
+    -------
+    (4 teeth,) complex array
+    """
+    pitch = 2 * np.pi / teeth
+    part = np.array([-0.36, -0.14, 0.14, 0.36]) * pitch
+    angle = np.arange(teeth)[:, None] * pitch + part
+    return (np.array([root, tip, tip, root]) * np.exp(1j * angle)).ravel()
+
+
+def _ring_corners(planetary_set):
+    """Points of the ring (around, across) from the teeth to the outer circle, complex."""
+    ring = planetary_set.ring
+    inner = gear_outline(ring.teeth, ring.root_radius, ring.tip_radius) * np.exp(
+        1j * _ring_turn(planetary_set)
+    )
+    # the flanks of the drawn teeth are not radial, so each inner point has its outer one at its own angle
+    outer = ring.rim_radius * np.exp(1j * np.angle(inner))
+    across = np.linspace(0.0, 1.0, 3)
+    return inner[:, None] * (1 - across) + outer[:, None] * across
+
+
+def _ring_turn(planetary_set) -> float:
+    """Angle of a ring tooth that stands in a gap of the first planet when the carrier is at angle 0."""
+    s, psi = planetary_set, float(planetary_set.planet_angles[0])
+    planet = _places(s, 0.0)[1][1]
+    phase = (psi - planet) * s.planet.teeth / (2 * np.pi)
+    return psi - (phase - 0.5) * 2 * np.pi / s.ring.teeth
+
+
+def _places(planetary_set, carrier_angle):
+    """Centre and rotation of the sun and of every planet when the carrier has turned, ring held."""
+    s = planetary_set
+    sun = carrier_angle * (1 + s.ring.teeth / s.sun.teeth)
+    places = [(0j, sun)]
+    for psi in s.planet_angles:
+        at = float(psi) + carrier_angle
+        # a gap of the planet stands where a tooth of the sun passes
+        phase = (at - sun) * s.sun.teeth / (2 * np.pi)
+        turn = at + np.pi + (phase + 0.5) * 2 * np.pi / s.planet.teeth
+        places.append((s.centre_distance * np.exp(1j * at), turn))
+    return places
+
+
+def _discs(pv, plotter, planetary_set):
+    """Sun and planets with a mark each; returns the meshes and their points in their own frames."""
+    meshes, outlines = [], []
+    sun, planet = planetary_set.sun, planetary_set.planet
+    for gear, colour in ((sun, _SUN), *((planet, _PLANET) for _ in planetary_set.planet_angles)):
+        edge = gear_outline(gear.teeth, gear.root_radius, gear.tip_radius)
+        mark = gear.root_radius * 0.8 + 0.07 * gear.root_radius * np.exp(2j * np.pi * np.arange(12) / 12)
+        for outline, tint in ((edge, colour), (mark, _MARK)):
+            points = np.append(outline, outline.mean())
+            n = len(outline)
+            fan = np.column_stack([np.arange(n), (np.arange(n) + 1) % n, np.full(n, n)])
+            mesh = pv.PolyData.from_regular_faces(_plane(points), fan)
+            plotter.add_mesh(mesh, color=tint, lighting=False)
+            meshes.append(mesh)
+            outlines.append(points)
+    return meshes, outlines
+
+
+def _add_sensor(pv, plotter, angle, radius, size):
+    direction = np.exp(1j * angle)
+    tip = radius * direction
+    points = tip + size * direction * np.array([0.0, 0.09 + 0.045j, 0.09 - 0.045j])
+    mesh = pv.PolyData.from_regular_faces(_plane(points), [[0, 1, 2]])
+    plotter.add_mesh(mesh, color=_SENSOR, lighting=False)
+
+
+def _circle(pv, radius):
+    angle = np.linspace(0.0, 2 * np.pi, 361)
+    return pv.lines_from_points(_plane(radius * np.exp(1j * angle)))
+
+
+def _strip_faces(around: int, across: int) -> np.ndarray:
+    """Triangles of a closed strip of points numbered around first, across second."""
+    i, j = np.meshgrid(np.arange(around), np.arange(across - 1), indexing="ij")
+    a, b = i * across + j, ((i + 1) % around) * across + j
+    return np.concatenate([np.stack([a, b, a + 1], -1), np.stack([a + 1, b, b + 1], -1)]).reshape(-1, 3)
+
+
+def _plane(points) -> np.ndarray:
+    return np.column_stack([points.real, points.imag, np.zeros(len(points))])
+
+
+def _rounded(value: float) -> str:
+    """Two significant figures, without an exponent."""
+    return f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
+
+
+def _write(path, images, seconds):
+    import imageio.v3 as iio
+
+    size = sum(image.nbytes for image in images) // 20
+    if Path(path).suffix == ".gif":
+        duration = 1000.0 * seconds / len(images)
+        replace_file(
+            path, lambda temporary: iio.imwrite(temporary, images, duration=duration, loop=0), size=size
+        )
+    else:
+        fps = max(round(len(images) / seconds), 1)
+        replace_file(path, lambda temporary: iio.imwrite(temporary, images, fps=fps), size=size)

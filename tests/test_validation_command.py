@@ -1,0 +1,147 @@
+"""femgear validate: verdicts, the page, exit codes, and every row that does not take long."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from femgear.cli import main
+from femgear.errors import GridError, StorageError
+from femgear.validation import themes as registry
+from femgear.validation.page import markdown, summary, write_page
+from femgear.validation.rows import at_most, counted, information, printed, within
+from femgear.validation.run import Theme, run_validation
+
+
+def validation(*rows, quick=False):
+    """Validation of one theme with the given rows."""
+    return run_validation((Theme("sample", "Sample", "Introduction.", (lambda: rows,)),), quick=quick)
+
+
+GOOD = within("A1", "closed form", "length [m]", 2.0, 2.0002, 1e-3)
+BAD = within("A2", "closed form", "width [m]", 2.0, 2.1, 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("row", "verdict"),
+    [
+        (GOOD, "passes"),
+        (BAD, "FAILS"),
+        (within("x", "s", "q", 2.0, 2.1, 1e-3, explanation="misprint"), "differs"),
+        (within("x", "s", "q", 2.0, 2.001, 1e-3, relative=False), "passes"),
+        (within("x", "s", "q", 2.0, float("nan"), 1e-3), "FAILS"),
+        (printed("x", "s", "q", "1.55", 1.5549), "passes"),
+        (printed("x", "s", "q", "1.55", 1.5551), "FAILS"),
+        (printed("x", "s", "q", "1.55", 1.5551, digits=2), "passes"),
+        (printed("x", "s", "q", "4.5825e-3", 4.58254e-3), "passes"),
+        (printed("x", "s", "q", "4.5825e-3", 4.58256e-3), "FAILS"),
+        (at_most("x", "s", "q", 1e-9, -2e-9), "FAILS"),
+        (at_most("x", "s", "q", 0.0, 0.0), "passes"),
+        (counted("x", "s", "q", 6, 6.0), "passes"),
+        (counted("x", "s", "q", 6, 5), "FAILS"),
+        (information("x", "s", "q", 6.0, 5), "information"),
+    ],
+)
+def test_verdicts(row, verdict):
+    assert row.verdict == verdict
+
+
+def test_error_is_relative_where_the_row_says_so():
+    assert GOOD.error == pytest.approx(1e-4)
+    assert within("x", "s", "q", -2.0, -2.1, 1.0).error == pytest.approx(-0.05)
+    assert within("x", "s", "q", 2.0, 2.1, 1.0, relative=False).error == pytest.approx(0.1)
+
+
+def test_page_shows_every_row_and_its_verdict():
+    differs = within("B|1", "paper", "height [m]", 1.0, 1.5, 0.1, explanation="the paper has a misprint")
+    text = markdown(validation(GOOD, BAD, differs, at_most("C", "s", "rest", 1e-6, 3e-8)))
+    assert "4 rows: 2 passes, 1 FAILS, 1 differs." in text
+    assert "| A1 | length [m] | 2 | 2.0002 | +0.01 % | 0.1 % | passes | closed form. |" in text
+    assert (
+        "| B\\|1 | height [m] | 1 | 1.5 | +50 % | 10 % | differs | paper. the paper has a misprint. |" in text
+    )
+    assert "| C | rest | 0 | < 1e-7 |  | <= 1e-06 | passes | s. |" in text
+
+
+def test_page_has_no_dates_paths_or_machine():
+    text = markdown(validation(GOOD))
+    assert text == markdown(validation(GOOD))
+    assert not re.search(r"20\d\d-\d\d-\d\d|/home|/tmp|/work", text)
+
+
+def test_quick_page_says_so_and_leaves_slow_parts_out():
+    def never():
+        raise AssertionError
+
+    theme = Theme("sample", "Sample", "", (lambda: (GOOD,),), (never,))
+    assert "Quick validation" in markdown(run_validation((theme,), quick=True))
+    with pytest.raises(AssertionError):
+        run_validation((theme,))
+
+
+def test_a_refusal_becomes_a_failed_row():
+    def no_grid():
+        raise GridError("no elements", code="E-GRID-EMPTY")
+
+    result = run_validation((Theme("sample", "Sample", "", (no_grid, lambda: (GOOD,))),))
+    assert [row.verdict for row in result.rows] == ["FAILS", "passes"]
+    assert "no grid could not be computed" in summary(result)
+    assert "E-GRID-EMPTY" in markdown(result)
+
+
+def test_progress_counts_the_parts():
+    seen = []
+    theme = Theme("sample", "Sample", "", (lambda: (GOOD,), lambda: (BAD,)))
+    run_validation((theme,), progress=lambda *step: seen.append(step))
+    assert seen == [("sample", 0, 2), ("sample", 1, 2), ("sample", 2, 2)]
+
+
+@pytest.mark.parametrize(("row", "code"), [(GOOD, 0), (BAD, 3)])
+def test_exit_code_and_page_of_the_command(tmp_path, monkeypatch, capsys, row, code):
+    monkeypatch.setattr(registry, "THEMES", (Theme("sample", "Sample", "", (lambda: (row,),)),))
+    page = tmp_path / "new" / "validation.md"
+    assert main(["validate", "-o", str(page)]) == code
+    assert row.quantity in page.read_text(encoding="utf-8")
+    out = capsys.readouterr().out
+    assert ("FAILS A2: width [m]" in out) == (code == 3)
+    assert "1 rows" in out
+
+
+def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("old")
+    with pytest.raises(StorageError):
+        write_page(validation(GOOD), blocked / "validation.md")
+    assert blocked.read_text() == "old"
+
+
+PARTS = [(theme, part) for theme in registry.THEMES for part in theme.parts]
+SLOW = [(theme, part) for theme in registry.THEMES for part in theme.slow_parts]
+
+
+def _name(value):
+    return getattr(value, "name", None) or value.__name__
+
+
+def _check(theme, part):
+    rows = run_validation((Theme(theme.name, theme.title, "", (part,)),)).rows
+    assert rows
+    assert [row for row in rows if row.verdict == "FAILS"] == []
+    assert all(row.source for row in rows)
+
+
+@pytest.mark.parametrize(("theme", "part"), PARTS, ids=_name)
+def test_rows_pass(theme, part):
+    _check(theme, part)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("theme", "part"), SLOW, ids=_name)
+def test_slow_rows_pass(theme, part):
+    _check(theme, part)
+
+
+def test_the_page_in_the_repository_belongs_to_these_themes():
+    page = Path(__file__).parents[1] / "docs" / "validation.md"
+    titles = re.findall(r"^## (.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert titles == [theme.title for theme in registry.THEMES]
