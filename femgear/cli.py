@@ -121,6 +121,7 @@ def run(
     """
     from femgear import analysis
     from femgear.case import planetary_set, read_case
+    from femgear.run import run_case
     from femgear.storage import open_results, prepare_output
     from femgear.summary import describe_results
 
@@ -128,7 +129,7 @@ def run(
     planetary_set(data)  # refuse before the folder is touched
     folder = prepare_output(output, force=force)
     with _Progress() as progress:
-        analysis.run_case(data, folder, only=only, pictures=pictures, progress=progress)
+        run_case(data, folder, only=only, pictures=pictures, progress=progress)
     results = open_results(folder)
     _print(describe_results(results))
     print(f"results: {folder}")

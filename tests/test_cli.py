@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from femgear import analysis, cli
+from femgear import cli
+from femgear import run as run_module
 from femgear.case import parse_case, with_value
 from femgear.errors import ConvergenceError
 from femgear.storage import finish, open_results, write_dataset, write_text
@@ -241,7 +242,7 @@ def fake_run(case, out, *, only=None, pictures=True, progress=None):
 @pytest.fixture
 def pipeline(monkeypatch):
     def use(function):
-        monkeypatch.setattr(analysis, "run_case", function, raising=False)
+        monkeypatch.setattr(run_module, "run_case", function, raising=False)
 
     use(fake_run)
     return use

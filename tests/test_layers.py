@@ -15,7 +15,8 @@ LAYERS = (
     ("contact", "models", "solvers", "housing", "case"),
     ("storage", "datasets", "plots", "scene"),
     ("analysis",),
-    ("report", "sweep", "summary", "validation"),
+    ("report", "sweep", "summary", "validation", "pictures"),
+    ("run",),
     ("cli",),
 )
 RANK = {part: rank for rank, parts in enumerate(LAYERS) for part in parts}

@@ -131,7 +131,26 @@ def flank_compliance(
     GridError
         When the depth reaches out of the tooth or the sector can move freely.
     """
-    from femgear.fe.compliance import condense_sector, directional, interpolation, tooth_compliance
+    from femgear.fe.compliance import tooth_compliance
+
+    stations, depths, schur = _condensed(grid, gear, stiffness, held, depth)
+    return _without_half_plane(gear, material, stations, depths, tooth_compliance(schur), len(grid.points))
+
+
+def held_sector_compliance(
+    grid: Grid, gear: Gear, material: Material, stiffness, *, held: str, depth: float | None = None
+) -> FlankCompliance:
+    """Regular flank compliance of a body that is one sector, held at both cuts as well as at `held`.
+
+    Parameters and errors are those of `flank_compliance`; the result counts one tooth.
+    """
+    stations, depths, schur = _condensed(grid, gear, stiffness, held, depth)
+    return _without_half_plane(gear, material, stations, depths, schur.C[None], len(grid.points))
+
+
+def _condensed(grid, gear, stiffness, held, depth):
+    """Stations, joining depths (n, 1) and the condensed sector that observes at one and two depths."""
+    from femgear.fe.compliance import condense_sector, directional, interpolation
 
     stations = flank_stations(grid, gear)
     if depth is not None and not depth > 0:
@@ -149,15 +168,19 @@ def flank_compliance(
         loads=flank_load_columns(grid, stations),
         observations=np.hstack(observations),
     )
-    n = len(stations.roll)
-    compliance = tooth_compliance(schur).reshape(gear.teeth, 2, 2, n, 2 * n)
+    return stations, depths, schur
+
+
+def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:
+    """Take the half plane out of the compliance (teeth, 4n, 2n) at both depths and go on to the surface."""
+    n, teeth = len(stations.roll), len(compliance)
+    compliance = compliance.reshape(teeth, 2, 2, n, 2 * n)
     arc = stations.roll**2 / (2 * gear.base_radius)
     offset = arc[:, None] - arc[None, :]
-    regular = np.empty((gear.teeth, 2 * n, 2 * n))
     parts = []
     for level, factor in enumerate((1.0, 2.0)):
-        # columns of `observations` are mirrored as one block: (side, level, station)
-        at_depth = compliance[:, :, level].reshape(gear.teeth, 2 * n, 2 * n).copy()
+        # columns of the observations are mirrored as one block: (side, level, station)
+        at_depth = compliance[:, :, level].reshape(teeth, 2 * n, 2 * n).copy()
         local = depth_displacement(offset, factor * depths, material.shear_modulus, material.poisson_ratio)
         for side in (LEFT, RIGHT):
             block = slice(side * n, (side + 1) * n)
@@ -171,7 +194,7 @@ def flank_compliance(
         base_radius=gear.base_radius,
         regular=regular,
         depth=depths[:, 0],
-        unknowns=gear.teeth * 2 * len(grid.points),
+        unknowns=teeth * 2 * nodes,
     )
 
 

@@ -16,6 +16,7 @@ FILLET_SIZE = 0.05
 FINEST_SIZE = 0.02
 INNER_SIZE = 0.1
 LARGEST_SIZE = 0.5
+SHORTEST_ROOT = 0.025
 GROWTH = 0.11  # increase of the spacing per unit length along a curve
 
 
@@ -73,25 +74,50 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     """
     _check_sizes(flank_elements, refine)
     count = max(2, round(flank_elements * refine))
-    unit = gear.module / refine
+    sizes = _Sizes(unit=gear.module / refine, growth=GROWTH / refine)
     rolls = np.linspace(gear.tip_roll, flank_end_roll(gear, count), 2 * count + 1)
     flank = flank_points(gear, rolls)
-    fillet, split = _fillet(gear, flank, rolls[-1], unit)
-    root = _root(gear, fillet, unit)
-    tip = _tip(gear, flank, unit)
-    base = _tooth_base(fillet[split], unit)
+    fillet, split = _fillet(gear, flank, rolls[-1], sizes)
+    root = _root(gear, fillet, sizes)
+    tip = _tip(gear, flank, sizes)
+    base = _tooth_base(fillet[split], sizes)
     last = _last_edge(root if root is not None else fillet)
-    cut = _cut(gear, unit, start=last)
-    rim = _rim(gear, unit)
-    symmetry = _symmetry(gear, base[0, 0], unit, tip=_last_edge(tip[::-1]), base=_last_edge(base[::-1]))
+    cut = _cut(gear, sizes, start=last)
+    rim = _rim(gear, sizes)
+    symmetry = _symmetry(gear, base[0, 0], sizes, tip=_last_edge(tip[::-1]), base=_last_edge(base[::-1]))
     parts = [("symmetry", symmetry), ("tip", tip), ("flank", flank), ("fillet", fillet)]
     parts += ([] if root is None else [("root", root)]) + [("cut", cut), ("rim", rim)]
-    if gear.internal:  # built from tip to rim with the tooth outwards; an internal gear runs the other way
+    if gear.internal:  # built as if the tooth pointed outwards; that of an internal gear runs the other way
         parts = [(name, points[::-1]) for name, points in reversed(parts)]
         rolls = rolls[::-1]
     inside = _inside(gear, fillet[split])
     arrays = tuple((name, _read_only(points)) for name, points in _joined(parts))
     return HalfSector(arrays, (("tooth_base", _read_only(base)),), inside, _read_only(rolls))
+
+
+@dataclass(frozen=True)
+class _Sizes:
+    """Refined module [m], the unit of all sizes, and growth of the spacing per length."""
+
+    unit: float
+    growth: float
+
+    def spacing(self, length: float, start: float, end: float, *, largest: float) -> np.ndarray:
+        """Positions (2 k + 1,) in 0 .. 1 of vertices and mid points; edges grow from both ends (sizes in m).
+
+        The number of edges is the integral of 1/size; the vertices divide that integral equally.
+        """
+        s = np.linspace(0.0, length, 2001)
+        grown = np.minimum(start + self.growth * s, end + self.growth * (length - s))
+        density = 1.0 / np.minimum(grown, largest)
+        integral = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
+        count = max(1, math.ceil(integral[-1] - 0.2))
+        vertices = np.interp(np.linspace(0.0, integral[-1], count + 1), integral, s) / length
+        vertices[0], vertices[-1] = 0.0, 1.0
+        out = np.empty(2 * count + 1)
+        out[0::2] = vertices
+        out[1::2] = 0.5 * (vertices[1:] + vertices[:-1])
+        return out
 
 
 def _check_sizes(flank_elements: int, refine: float) -> None:
@@ -104,28 +130,6 @@ def _check_sizes(flank_elements: int, refine: float) -> None:
             limit="at least 2 elements, refinement 0.05 .. 100",
             remedy="24 elements and refinement 1 are the default",
         )
-
-
-def _spacing(length: float, start: float, end: float, *, largest: float) -> np.ndarray:
-    """Positions (2 k + 1,) in 0 .. 1 of vertices and mid points; edges grow from both ends (sizes in m).
-
-    The number of edges is the integral of 1/size; the vertices divide that integral equally.
-    """
-    s = np.linspace(0.0, length, 2001)
-    size = np.minimum(np.minimum(start + GROWTH * s, end + GROWTH * (length - s)), largest)
-    density = 1.0 / size
-    integral = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
-    count = max(1, math.ceil(integral[-1] - 0.2))
-    vertices = np.interp(np.linspace(0.0, integral[-1], count + 1), integral, s) / length
-    vertices[0], vertices[-1] = 0.0, 1.0
-    return _with_middles(vertices)
-
-
-def _with_middles(vertices: np.ndarray) -> np.ndarray:
-    out = np.empty(2 * len(vertices) - 1)
-    out[0::2] = vertices
-    out[1::2] = 0.5 * (vertices[1:] + vertices[:-1])
-    return out
 
 
 def _arc(radius: float, start: float, end: float, fractions: np.ndarray) -> np.ndarray:
@@ -147,34 +151,41 @@ def flank_end_roll(gear: Gear, flank_elements: int) -> float:
     return max(gear.form_roll, gear.tip_roll / (flank_elements + 1))
 
 
-def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, unit: float) -> tuple[np.ndarray, int]:
-    """Fillet from the flank's end to the root circle, spaced by arc length; row where the tooth base ends."""
+def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tuple[np.ndarray, int]:
+    """Fillet from the flank's end to the root circle, spaced by arc length; row where the tooth base ends.
+
+    Bits of involute or root arc that are too short for an edge of their own belong to it.
+    """
+    corner = float(fillet_point(gear.tool, 0.0)[1])
+    land = math.pi / gear.teeth - corner
 
     def point(p):
-        # p in -1 .. 0: rest of the involute, 0 .. 1: generated fillet
-        radius, angle = fillet_point(gear.tool, gear.fillet_end * (1.0 - np.maximum(p, 0.0)))
-        trochoid = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+        # p in -1 .. 0: rest of the involute, 0 .. 1: generated fillet, 1 .. 2: short root arc
+        radius, angle = fillet_point(gear.tool, gear.fillet_end * (1.0 - np.clip(p, 0.0, 1.0)))
+        angle = np.where(p > 1.0, corner + land * (p - 1.0), angle)
+        generated = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
         involute = flank_points(gear, gear.form_roll + (end_roll - gear.form_roll) * np.maximum(-p, 0.0))
-        return np.where(p[:, None] < 0.0, involute, trochoid)
+        return np.where(p[:, None] < 0.0, involute, generated)
 
     p = np.linspace(0.0, 1.0, 2001)
     if end_roll > gear.form_roll:
         p = np.concatenate([np.linspace(-1.0, 0.0, 200, endpoint=False), p])
+    if land * gear.root_radius < SHORTEST_ROOT * gear.module:
+        p = np.concatenate([p, np.linspace(1.0, 2.0, 20)[1:]])
     dense = point(p)
-    edges = np.linalg.norm(np.diff(dense, axis=0), axis=1)
-    length = np.concatenate([[0.0], np.cumsum(edges)])
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
     split = length[_base_row(dense)]
-    size = FILLET_SIZE * unit
-    start = min(max(_last_edge(flank), FINEST_SIZE * unit), size)
-    upper = split * _spacing(split, start, size, largest=size)
-    lower = split + (length[-1] - split) * _spacing(length[-1] - split, size, size, largest=size)
+    size = FILLET_SIZE * sizes.unit
+    start = min(max(_last_edge(flank), FINEST_SIZE * sizes.unit), size)
+    upper = split * sizes.spacing(split, start, size, largest=size)
+    lower = split + (length[-1] - split) * sizes.spacing(length[-1] - split, size, size, largest=size)
     points = point(np.interp(np.concatenate([upper, lower[1:]]), length, p))
     points[0] = flank[-1]
     return points, len(upper) - 1
 
 
 def _base_row(points: np.ndarray) -> int:
-    """Row of a finely sampled fillet, first from the root, that leaves the circles at 45 deg (else its middle)."""
+    """Row of a finely sampled fillet, first from the root, at 45 deg to the circles; its middle if none is."""
     tangent = points[2:] - points[:-2]
     radial = points[1:-1] / np.linalg.norm(points[1:-1], axis=1)[:, None]
     slope = np.abs(np.sum(tangent * radial, axis=1)) / np.linalg.norm(tangent, axis=1)
@@ -182,77 +193,70 @@ def _base_row(points: np.ndarray) -> int:
     return 1 + int(steep[-1]) if len(steep) else len(points) // 2
 
 
-def _root(gear: Gear, fillet: np.ndarray, unit: float) -> np.ndarray | None:
+def _root(gear: Gear, fillet: np.ndarray, sizes: _Sizes) -> np.ndarray | None:
     """Root arc from the fillet to the cut, absent when the fillet reaches it."""
     start, end = math.atan2(fillet[-1, 1], fillet[-1, 0]), math.pi / gear.teeth
     length = gear.root_radius * (end - start)
-    if length < 1e-6 * gear.module:
-        fillet[-1] = gear.root_radius * math.cos(end), gear.root_radius * math.sin(end)
+    if length < 0.5 * SHORTEST_ROOT * gear.module:
         return None
-    fractions = _spacing(length, _last_edge(fillet), 2.0 * _last_edge(fillet), largest=INNER_SIZE * unit)
-    points = _arc(gear.root_radius, start, end, fractions)
+    edge, largest = _last_edge(fillet), INNER_SIZE * sizes.unit
+    points = _arc(gear.root_radius, start, end, sizes.spacing(length, edge, 2.0 * edge, largest=largest))
     points[0] = fillet[-1]
     return points
 
 
-def _tip(gear: Gear, flank: np.ndarray, unit: float) -> np.ndarray:
+def _tip(gear: Gear, flank: np.ndarray, sizes: _Sizes) -> np.ndarray:
     """Tip arc from the symmetry line to the flank."""
-    end = math.atan2(flank[0, 1], flank[0, 0])
-    edge = _last_edge(flank[::-1])
-    points = _arc(
-        gear.tip_radius,
-        0.0,
-        end,
-        _spacing(gear.tip_radius * end, INNER_SIZE * unit, edge, largest=INNER_SIZE * unit),
-    )
+    end, largest = math.atan2(flank[0, 1], flank[0, 0]), INNER_SIZE * sizes.unit
+    spacing = sizes.spacing(gear.tip_radius * end, largest, _last_edge(flank[::-1]), largest=largest)
+    points = _arc(gear.tip_radius, 0.0, end, spacing)
     points[0, 1] = 0.0
     points[-1] = flank[0]
     return points
 
 
-def _tooth_base(end: np.ndarray, unit: float) -> np.ndarray:
+def _tooth_base(end: np.ndarray, sizes: _Sizes) -> np.ndarray:
     """Arc about the gear centre from the symmetry line to a fillet point."""
-    radius, angle, edge = math.hypot(*end), math.atan2(end[1], end[0]), FILLET_SIZE * unit
-    spacing = _spacing(radius * angle, INNER_SIZE * unit, edge, largest=INNER_SIZE * unit)
+    radius, angle, largest = math.hypot(*end), math.atan2(end[1], end[0]), INNER_SIZE * sizes.unit
+    spacing = sizes.spacing(radius * angle, largest, FILLET_SIZE * sizes.unit, largest=largest)
     points = _arc(radius, 0.0, angle, spacing)
     points[0, 1] = 0.0
     points[-1] = end
     return points
 
 
-def _rim_size(gear: Gear, unit: float) -> float:
-    """Element size at the rim [m]: at least three across the half sector."""
-    return min(LARGEST_SIZE * unit, 0.35 * math.pi / gear.teeth * gear.rim_radius)
+def _rim_size(gear: Gear, sizes: _Sizes) -> float:
+    """Element size at the rim [m]: a third of the half sector at most."""
+    return min(LARGEST_SIZE, 0.35 * math.pi / gear.teeth * gear.rim_radius / gear.module) * sizes.unit
 
 
-def _cut(gear: Gear, unit: float, *, start: float) -> np.ndarray:
+def _cut(gear: Gear, sizes: _Sizes, *, start: float) -> np.ndarray:
     """Radial line at pi/z from the root circle to the rim."""
-    length = abs(gear.root_radius - gear.rim_radius)
-    size = _rim_size(gear, unit)
-    fractions = _spacing(length, min(start, size), size, largest=LARGEST_SIZE * unit)
+    length, size = abs(gear.root_radius - gear.rim_radius), _rim_size(gear, sizes)
+    fractions = sizes.spacing(length, min(start, size), size, largest=LARGEST_SIZE * sizes.unit)
     radius = gear.root_radius + (gear.rim_radius - gear.root_radius) * fractions
     radius[-1] = gear.rim_radius
     angle = math.pi / gear.teeth
     return np.column_stack([radius * math.cos(angle), radius * math.sin(angle)])
 
 
-def _rim(gear: Gear, unit: float) -> np.ndarray:
+def _rim(gear: Gear, sizes: _Sizes) -> np.ndarray:
     """Rim arc from the cut to the symmetry line."""
     angle = math.pi / gear.teeth
-    count = max(1, math.ceil(angle * gear.rim_radius / _rim_size(gear, unit) - 1e-9))
+    count = max(1, math.ceil(angle * gear.rim_radius / _rim_size(gear, sizes) - 1e-9))
     points = _arc(gear.rim_radius, angle, 0.0, np.linspace(0.0, 1.0, 2 * count + 1))
     points[-1, 1] = 0.0
     return points
 
 
-def _symmetry(gear: Gear, base_radius: float, unit: float, *, tip: float, base: float) -> np.ndarray:
+def _symmetry(gear: Gear, base_radius: float, sizes: _Sizes, *, tip: float, base: float) -> np.ndarray:
     """Line on the x axis from the rim to the tip with a vertex where the tooth base begins."""
     rim, top = gear.rim_radius, gear.tip_radius
-    size = _rim_size(gear, unit)
-    inner = _spacing(abs(base_radius - rim), size, base, largest=LARGEST_SIZE * unit)
-    outer = _spacing(abs(top - base_radius), base, tip, largest=INNER_SIZE * unit)
+    largest = LARGEST_SIZE * sizes.unit
+    inner = sizes.spacing(abs(base_radius - rim), _rim_size(gear, sizes), base, largest=largest)
+    outer = sizes.spacing(abs(top - base_radius), base, tip, largest=INNER_SIZE * sizes.unit)
     x = np.concatenate([rim + (base_radius - rim) * inner, (base_radius + (top - base_radius) * outer)[1:]])
-    x[0], x[2 * (len(inner) // 2)], x[-1] = rim, base_radius, top
+    x[0], x[len(inner) - 1], x[-1] = rim, base_radius, top
     return np.column_stack([x, np.zeros_like(x)])
 
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band
+from femgear.housing.orders import BandAnalysis, analyse_band
 from femgear.housing.orders import order_spectrum as _spectrum
 from femgear.plots.style import (
     BLACK,
     BLUE,
     COLOURS,
+    ORANGE,
     SIZE,
     VERMILION,
     label,
@@ -72,7 +73,9 @@ def housing_signal(
         rows=1 + len(harmonics), width=9.5, height=1.0 + 2.5 * (1 + len(harmonics)), sharex=True
     )
     signal = housing["acceleration"].values[speed_index]
-    _draw_signal(axes[0], signal, _envelope(housing, speed_index), f"{speed}: all orders")
+    peaks = _peaks(signal, ring_teeth)
+    text = "largest within a mesh period"
+    _draw_signal(axes[0], signal, peaks, f"{speed}: all orders", text=text, colour=ORANGE)
     for ax, harmonic in zip(axes[1:], harmonics):
         found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
         _draw_signal(ax, found.signal, found.envelope, _band_title(speed, found))
@@ -84,21 +87,20 @@ def housing_signal(
     return figure
 
 
-def _draw_signal(ax, signal, around, title):
+def _draw_signal(ax, signal, around, title, *, text="envelope", colour=VERMILION):
     at = np.arange(len(signal)) / len(signal)
     ax.plot(at, signal, color=BLUE, linewidth=0.5, label="acceleration of the fixed point")
     at = np.append(np.arange(len(around)) / len(around), 1.0)
     for sign in (1, -1):
-        ax.plot(at, sign * np.append(around, around[0]), color=VERMILION, linewidth=1.3, label="envelope")
+        ax.plot(at, sign * np.append(around, around[0]), color=colour, linewidth=1.3, label=text)
     label(ax, y=ACCELERATION, title=title)
 
 
-def _envelope(housing, speed_index):
-    from femgear.housing.orders import envelope
+def _peaks(signal, ring_teeth):
+    """Largest absolute value within one mesh period around every sample."""
+    from scipy.ndimage import maximum_filter1d
 
-    spectrum = _spectrum(housing["acceleration"].values[speed_index])
-    moving = OrderSpectrum(spectrum.order, np.where(spectrum.order > 0, spectrum.value, 0), 1)
-    return envelope(moving)
+    return maximum_filter1d(np.abs(signal), max(len(signal) // ring_teeth, 1), mode="wrap")
 
 
 def _band_title(speed: str, found: BandAnalysis) -> str:
@@ -145,7 +147,7 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     label(axes[0], "carrier order [1]", ACCELERATION)
     axes[0].set_ylim(floor, 2.5 * largest)
     for ax, harmonic in zip(axes[1:], bands):
-        _draw_band(ax, order, linear, exact, ring_teeth, harmonic, floor)
+        _draw_band(ax, order, linear, exact, ring_teeth, harmonic)
     label(axes[-1], "carrier order [1]")
     figure.suptitle(
         f"Order spectrum of the fixed sensor, {rpm(housing['speed'].values[speed_index])}", fontsize=12
@@ -168,11 +170,13 @@ def _stems(ax, order, amplitude, floor, *, text="Heaviside, linear interpolation
     ax.set_yscale("log")
 
 
-def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, floor):
+def _draw_band(ax, order, linear, exact, ring_teeth, harmonic):
     centre = harmonic * ring_teeth
-    loud = (np.maximum(linear, exact) > floor) & (np.rint(order / ring_teeth) == harmonic)
-    reach = int(np.abs(order[loud] - centre).max(initial=3.0)) + 2
-    reach = min(max(reach, 6), ring_teeth // 2)
+    own = np.rint(order / ring_teeth) == harmonic
+    largest = max(linear[own].max(initial=0.0), exact[own].max(initial=0.0)) or 1.0
+    floor = 3e-4 * largest
+    # the images that the interpolation makes far from the centre are left to the upper diagram
+    reach = int(np.abs(order[own & (exact > floor)] - centre).max(initial=4.0)) + 2
     inside = np.abs(order - centre) <= reach
     _stems(ax, order[inside], linear[inside], floor, width=2.5)
     shown = inside & (exact > floor)

@@ -11,7 +11,7 @@ import numpy as np
 
 from femgear.errors import CaseError, FemgearError
 from femgear.files import replace_file
-from femgear.scene.drawing import add_text, colour_bar, look_down
+from femgear.scene.drawing import add_coloured, add_text, look_down
 from femgear.scene.library import load_pyvista
 
 if TYPE_CHECKING:
@@ -157,14 +157,17 @@ def _draw(planetary_set, field, carrier, sensor_angle, scale, title, size):
     ring = pv.PolyData.from_regular_faces(_plane(corners.ravel()), _strip_faces(*corners.shape))
     ring.point_data[text] = np.zeros(corners.size)
     plotter = pv.Plotter(off_screen=True, window_size=(size, size))
-    plotter.add_mesh(_circle(pv, outer), color="#808080", line_width=1.0, lighting=False)
-    bar = colour_bar(text, size)
+    plotter.enable_anti_aliasing("ssaa")
     plotter.add_mesh(
-        ring, scalars=text, clim=(-colour, colour), cmap="RdBu_r", lighting=False, scalar_bar_args=bar
+        _closed_line(pv, outer * np.exp(1j * around[:-1])), color="#808080", line_width=1.0, lighting=False
     )
+    add_coloured(plotter, ring, text, size, cmap="RdBu_r", limits=(-colour, colour), colours=21)
+    edges = [_closed_line(pv, corners[:, column]) for column in (0, -1)]
+    for edge in edges:
+        plotter.add_mesh(edge, color="#404040", line_width=1.0, lighting=False)
     discs = _discs(pv, plotter, planetary_set)
     _add_sensor(pv, plotter, sensor_angle, outer * 1.1, outer)
-    add_text(plotter, f"{title}\nring displacement x {_rounded(scale)}".strip(), size)
+    add_text(plotter, f"{title}\nring deflection × {_rounded(scale)}, triangle: fixed sensor".strip(), size)
     look_down(plotter, outer * 1.26)
     images = []
     try:
@@ -173,8 +176,11 @@ def _draw(planetary_set, field, carrier, sensor_angle, scale, title, size):
             moved = corners + scale * (radial + 1j * tangential) * np.exp(1j * ring_angle)
             ring.points = _plane(moved.ravel())
             ring.point_data[text] = 1e6 * radial.ravel()
-            for disc, outline, (centre, turn) in zip(discs[0], discs[1], _places(planetary_set, angle)):
-                disc.points = _plane(centre + outline * np.exp(1j * turn))
+            for edge, column in zip(edges, (0, -1)):
+                edge.points = _plane(moved[:, column])
+            for (centre, turn), pairs in zip(_places(planetary_set, angle), discs):
+                for mesh, outline in pairs:
+                    mesh.points = _plane(centre + outline * np.exp(1j * turn))
             plotter.render()
             images.append(plotter.screenshot(filename=None, return_img=True)[..., :3])
     finally:
@@ -204,9 +210,8 @@ def gear_outline(teeth: int, root: float, tip: float) -> np.ndarray:
 def _ring_corners(planetary_set):
     """Points of the ring (around, across) from the teeth to the outer circle, complex."""
     ring = planetary_set.ring
-    inner = gear_outline(ring.teeth, ring.root_radius, ring.tip_radius) * np.exp(
-        1j * _ring_turn(planetary_set)
-    )
+    teeth = gear_outline(ring.teeth, ring.root_radius, ring.tip_radius)
+    inner = teeth * np.exp(1j * _ring_turn(planetary_set))
     # the flanks of the drawn teeth are not radial, so each inner point has its outer one at its own angle
     outer = ring.rim_radius * np.exp(1j * np.angle(inner))
     across = np.linspace(0.0, 1.0, 3)
@@ -236,34 +241,33 @@ def _places(planetary_set, carrier_angle):
 
 
 def _discs(pv, plotter, planetary_set):
-    """Sun and planets with a mark each; returns the meshes and their points in their own frames."""
-    meshes, outlines = [], []
+    """Sun and planets, with a mark each: for every body its meshes and their points in its own frame."""
+    discs = []
     sun, planet = planetary_set.sun, planetary_set.planet
     for gear, colour in ((sun, _SUN), *((planet, _PLANET) for _ in planetary_set.planet_angles)):
         edge = gear_outline(gear.teeth, gear.root_radius, gear.tip_radius)
         mark = gear.root_radius * 0.8 + 0.07 * gear.root_radius * np.exp(2j * np.pi * np.arange(12) / 12)
+        discs.append([])
         for outline, tint in ((edge, colour), (mark, _MARK)):
             points = np.append(outline, outline.mean())
             n = len(outline)
             fan = np.column_stack([np.arange(n), (np.arange(n) + 1) % n, np.full(n, n)])
             mesh = pv.PolyData.from_regular_faces(_plane(points), fan)
             plotter.add_mesh(mesh, color=tint, lighting=False)
-            meshes.append(mesh)
-            outlines.append(points)
-    return meshes, outlines
+            discs[-1].append((mesh, points))
+    return discs
 
 
 def _add_sensor(pv, plotter, angle, radius, size):
     direction = np.exp(1j * angle)
     tip = radius * direction
-    points = tip + size * direction * np.array([0.0, 0.09 + 0.045j, 0.09 - 0.045j])
+    points = tip + size * direction * np.array([0.0, 0.12 + 0.035j, 0.12 - 0.035j])
     mesh = pv.PolyData.from_regular_faces(_plane(points), [[0, 1, 2]])
     plotter.add_mesh(mesh, color=_SENSOR, lighting=False)
 
 
-def _circle(pv, radius):
-    angle = np.linspace(0.0, 2 * np.pi, 361)
-    return pv.lines_from_points(_plane(radius * np.exp(1j * angle)))
+def _closed_line(pv, points):
+    return pv.PolyData(_plane(points), lines=[len(points) + 1, *range(len(points)), 0])
 
 
 def _strip_faces(around: int, across: int) -> np.ndarray:
@@ -285,12 +289,8 @@ def _rounded(value: float) -> str:
 def _write(path, images, seconds):
     import imageio.v3 as iio
 
-    size = sum(image.nbytes for image in images) // 20
+    pace = {"fps": max(round(len(images) / seconds), 1)}
     if Path(path).suffix == ".gif":
-        duration = 1000.0 * seconds / len(images)
-        replace_file(
-            path, lambda temporary: iio.imwrite(temporary, images, duration=duration, loop=0), size=size
-        )
-    else:
-        fps = max(round(len(images) / seconds), 1)
-        replace_file(path, lambda temporary: iio.imwrite(temporary, images, fps=fps), size=size)
+        pace = {"duration": 1000.0 * seconds / len(images), "loop": 0}
+    size = sum(image.nbytes for image in images) // 20
+    replace_file(path, lambda temporary: iio.imwrite(temporary, images, **pace), size=size)

@@ -79,14 +79,9 @@ def deformed_picture(
     surface.point_data.clear()
     surface.point_data[colour_label] = colour_factor * length
     plotter = pv.Plotter(off_screen=True, window_size=(size, size))
+    plotter.enable_anti_aliasing("ssaa")
     plotter.add_mesh(rest, color="#A0A0A0", line_width=1.0, lighting=False)
-    plotter.add_mesh(
-        surface,
-        scalars=colour_label,
-        cmap="cividis",
-        lighting=False,
-        scalar_bar_args=colour_bar(colour_label, size),
-    )
+    add_coloured(plotter, surface, colour_label, size, cmap="cividis")
     plotter.add_mesh(surface.extract_feature_edges(**_OUTLINE), color="black", line_width=1.2, lighting=False)
     if title:
         add_text(plotter, title, size)
@@ -110,28 +105,53 @@ def linear_surface(grid: pv.UnstructuredGrid) -> pv.PolyData:
     return pv.PolyData.from_regular_faces(np.array(grid.points), cells[:, _SPLIT].reshape(-1, 3))
 
 
-def colour_bar(text: str, size: int) -> dict:
-    """Horizontal colour bar under the scene."""
-    return {
-        "title": text,
-        "vertical": False,
-        "position_x": 0.2,
-        "position_y": 0.025,
-        "width": 0.6,
-        "height": 0.075,
-        "title_font_size": max(size // 42, 12),
-        "label_font_size": max(size // 50, 11),
-        "n_labels": 5,
-        "fmt": "%.3g",
-        "color": "black",
-    }
+def add_coloured(
+    plotter: pv.Plotter,
+    mesh: pv.PolyData,
+    text: str,
+    size: int,
+    *,
+    cmap: str,
+    limits=None,
+    colours: int = 256,
+) -> None:
+    """A mesh coloured by its point data `text`, with a colour bar of that title under the scene."""
+    plotter.add_mesh(
+        mesh,
+        scalars=text,
+        cmap=cmap,
+        clim=limits,
+        n_colors=colours,
+        lighting=False,
+        scalar_bar_args={
+            # the title of a horizontal bar runs into its labels: it is set apart below
+            "title": " ",
+            "vertical": False,
+            "position_x": 0.2,
+            "position_y": 0.045,
+            "width": 0.6,
+            "height": 0.07,
+            "label_font_size": max(size // 45, 11),
+            "n_labels": 5,
+            "fmt": "%.3g",
+            "color": "black",
+        },
+    )
+    points = _font(size)
+    # Arial is about half as wide as high; text is placed by its lower left corner in pixels
+    left = 0.5 * size - 0.42 * points * len(text)
+    plotter.add_text(text, position=(left, 0.012 * size), font_size=points, color="black", name="bar title")
 
 
 def add_text(plotter: pv.Plotter, text: str, size: int, *, name: str = "title") -> None:
     """Text in the upper left corner; a second call with the same name replaces it."""
-    plotter.add_text(
-        text, position=(0.02 * size, 0.955 * size), font_size=max(size / 75, 7.5), color="black", name=name
-    )
+    points = _font(size)
+    top = size - 2.6 * points * (1 + text.count("\n")) - 0.01 * size
+    plotter.add_text(text, position=(0.02 * size, top), font_size=points, color="black", name=name)
+
+
+def _font(size: int) -> float:
+    return max(size / 75, 7.0)
 
 
 def look_down(plotter: pv.Plotter, half_height: float) -> None:

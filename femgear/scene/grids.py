@@ -1,4 +1,4 @@
-"""VTK grids of whole bodies: the set with its displacements, the modes of the ring, curves around a circle."""
+"""VTK grids of whole bodies: the set with its displacements, the ring's modes, curves around a circle."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
     for body in bodies:
         _check_body(body)
     start = np.cumsum([0] + [len(body.points) for body in bodies])
-    points, displacement = np.zeros((start[-1], 3)), np.zeros((start[-1], 3))
+    points, displacement = np.zeros((start[-1], 3)), np.zeros((start[-1], 3), np.float32)
     for body, first in zip(bodies, start):
         points[first : first + len(body.points), :2] = body.points
         if body.displacement is not None:
@@ -143,7 +143,7 @@ def ring_modes_grid(sector: Grid, modes: CyclicModes, shown: Sequence[int]) -> p
     grid = assemble_set([Body("ring", whole.points, whole.triangles)])
     del grid.point_data["displacement"]
     for mode in shown:
-        field = np.zeros((whole.n_nodes, 3))
+        field = np.zeros((whole.n_nodes, 3), np.float32)
         field[:, :2] = cyclic_field(modes.shape[:, mode], int(modes.nodal_diameter[mode]), numbers)
         name = f"mode {mode}, n = {modes.nodal_diameter[mode]}, {modes.frequency[mode]:.0f} Hz"
         grid.point_data[name] = field / (np.abs(field).max() or 1.0)

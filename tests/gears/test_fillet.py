@@ -1,8 +1,8 @@
 """Fillets against a brute-force simulation of the cutting: the tool is moved, the gear must just touch it.
 
 The tool's geometry and motion are built here from the definitions of rack and cutter, not from the code: the
-distance of a gear point from every position of the tool is minimised numerically. It must be zero on flank and
-fillet (the tool has cut them) and never negative (the tool has not cut deeper).
+distance of a gear point from every position of the tool is minimised numerically. It must be zero on flank
+and fillet (the tool has cut them) and never negative (the tool has not cut deeper).
 """
 
 import math
@@ -63,14 +63,12 @@ def rack_distance(gear, point, travel):
     flank = dy * math.cos(alpha) + dd * math.sin(alpha)
     along = dy * math.sin(alpha) - dd * math.cos(alpha)
     beyond = np.hypot(dy, dd)
-    outside = np.minimum(
-        np.where(along > 0, np.abs(flank), beyond), np.where(dy < 0, np.abs(dd), beyond)
-    )
+    outside = np.minimum(np.where(along > 0, np.abs(flank), beyond), np.where(dy < 0, np.abs(dd), beyond))
     return np.where((flank < 0) & (dd < 0), -outside, outside) - rho
 
 
 def cutter_profile(gear):
-    """Left half of a cutter tooth around the x axis as dense points, tip centre to base circle, and its motion."""
+    """Rounding and left flank (dense points) of a cutter tooth on the x axis, and its centre distance."""
     cutter, m, alpha = cutter_of(gear), gear.module, gear.pressure_angle
     rho = m * (gear.rack.root_radius if cutter.tip_radius is None else cutter.tip_radius)
     base = m * cutter.teeth * math.cos(alpha) / 2
@@ -79,7 +77,9 @@ def cutter_profile(gear):
     angle = arcinv(inv(alpha) + 2 * math.tan(alpha) * shift / (gear.teeth - cutter.teeth))
     distance = m * (gear.teeth - cutter.teeth) * math.cos(alpha) / math.cos(angle) / 2
     tip = gear.root_radius - distance
-    half = math.pi / (2 * cutter.teeth) + 2 * cutter.profile_shift * math.tan(alpha) / cutter.teeth + inv(alpha)
+    half = (
+        math.pi / (2 * cutter.teeth) + 2 * cutter.profile_shift * math.tan(alpha) / cutter.teeth + inv(alpha)
+    )
     rolls = np.linspace(0.0, math.sqrt(tip**2 - base**2), 40001)
     polar = half - rolls / base + np.arctan2(rolls, base)
     flank = np.column_stack([np.hypot(base, rolls) * np.cos(polar), np.hypot(base, rolls) * np.sin(polar)])

@@ -1,0 +1,205 @@
+"""All pictures and fields of a run: figures as PNG, grids as VTU, the turning carrier as GIF."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.analysis import DynamicsResult, ModesResult, Progress, StaticResult
+    from femgear.case import Case
+    from femgear.gears import PlanetarySet
+
+# pictures need no converged stresses: a sector of some thousand nodes keeps the files small
+PICTURE_FLANK_ELEMENTS = 6
+PICTURE_REFINE = 0.35
+
+
+def write_figures(folder: Path, gears: PlanetarySet, data: dict[str, xr.Dataset]) -> list[str]:
+    """Figures of the stages in `data`, by stage name.
+
+    Parameters
+    ----------
+    folder : path
+    gears : PlanetarySet
+    data : dict of str to Dataset
+        Contents of static.nc, modes.nc, dynamics.nc and housing.nc, as far as computed.
+
+    Returns
+    -------
+    list of str
+        Names of the files.
+    """
+    from femgear import plots
+
+    figures = {}
+    if (static := data.get("static")) is not None:
+        figures["static_transmission_error"] = plots.static_transmission_error(static)
+        figures["mesh_stiffness"] = plots.mesh_stiffness(static, face_width=gears.sun.face_width)
+        figures["load_sharing"] = plots.load_sharing(static)
+        figures["tooth_loads"] = plots.tooth_loads(static)
+    if (modes := data.get("modes")) is not None:
+        figures["mode_shapes"] = plots.mode_shapes(modes, gears)
+        figures["natural_frequencies"] = plots.natural_frequencies(modes)
+    if (dynamics := data.get("dynamics")) is not None:
+        figures["dynamic_transmission_error"] = plots.transmission_error_period(dynamics, static)
+        figures["dynamic_spectrum"] = plots.transmission_error_spectrum(dynamics)
+        figures["ring_static_deflection"] = plots.ring_mean_deflection(dynamics, gears)
+        if dynamics.sizes["speed"] > 3:
+            figures["speed_sweep"] = plots.speed_sweep(dynamics)
+    if (housing := data.get("housing")) is not None:
+        teeth = gears.ring.teeth
+        for s in shown_speeds(housing):
+            name = f"{round(float(housing['speed'][s]))}_rpm"
+            figures[f"housing_signal_{name}"] = plots.housing_signal(housing, speed_index=s, ring_teeth=teeth)
+            figures[f"order_spectrum_{name}"] = plots.order_spectrum(housing, speed_index=s, ring_teeth=teeth)
+            figures[f"modulation_{name}"] = plots.modulation_polar(housing, speed_index=s, ring_teeth=teeth)
+    for name, figure in figures.items():
+        plots.save_figure(figure, folder / f"{name}.png")
+    return [f"{name}.png" for name in figures]
+
+
+def shown_speeds(data: xr.Dataset) -> list[int]:
+    """Indices of the speeds that get pictures of their own: all of a few, else first, middle and last."""
+    n = data.sizes["speed"]
+    return list(range(n)) if n <= 3 else [0, n // 2, n - 1]
+
+
+def write_deformed_set(folder: Path, case: Case, static: StaticResult, *, cache: Path | None) -> list[str]:
+    """The whole set deformed by the static loads of position zero, as VTU and picture."""
+    from femgear.contact.bodies import make_sectors
+    from femgear.contact.cycle import walk_mesh_cycle
+    from femgear.contact.deformed import deformed_set
+    from femgear.contact.mirrored import mirrored_set
+    from femgear.fe.elasticity import Material
+    from femgear.fe.grid import copy_nodes, rotated_copies
+    from femgear.scene import assemble_set, deformed_picture, placed, write_vtu
+
+    gears, cycle, side = static.planetary_set, static.cycle, 1.0
+    if static.sun_torque < 0:
+        gears, side = mirrored_set(gears)[0], -1.0
+        cycle = walk_mesh_cycle(
+            gears, static.bodies, sun_torque=-static.sun_torque, positions=1, contact=case.static.contact
+        )
+    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    sectors = make_sectors(
+        gears, material, flank_elements=PICTURE_FLANK_ELEMENTS, refine=PICTURE_REFINE, cache=cache
+    )
+    bodies = []
+    for body in deformed_set(gears, sectors, cycle):
+        sector = getattr(sectors, body.kind)
+        count = sector.gear.teeth
+        numbers, whole = copy_nodes(sector.grid, count), rotated_copies(sector.grid, count)
+        displacement = np.zeros((len(whole.points), 2))
+        for k in range(count):
+            angle = 2 * np.pi * k / count
+            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            displacement[numbers[k]] = body.displacement[k] @ turn.T
+        bodies.append(
+            placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=displacement)
+        )
+    if side < 0:
+        bodies = [_reflected(body) for body in bodies]
+    grid = assemble_set(bodies)
+    write_vtu(grid, folder / "deformed_set.vtu")
+    title = "static deflection, position 0"
+    deformed_picture(grid, folder / "deformed_set.png", title=title)
+    return ["deformed_set.vtu", "deformed_set.png"]
+
+
+def _reflected(body):
+    """A body seen from behind: y reversed, and the triangles turned round with it."""
+    flip = np.array([1.0, -1.0])
+    return replace(
+        body,
+        points=body.points * flip,
+        displacement=body.displacement * flip,
+        triangles=body.triangles[:, [0, 2, 1, 5, 4, 3]],
+    )
+
+
+def write_ring_modes(folder: Path, case: Case, static: StaticResult, *, cache: Path | None) -> list[str]:
+    """Modes of the toothed ring on its foundation for 0 to 6 nodal diameters, as VTU and picture."""
+    from femgear.contact.bodies import active_flank_load, make_sectors
+    from femgear.fe.elasticity import Material, foundation, mass
+    from femgear.fe.reduction import cyclic_modes, sector_basis
+    from femgear.scene import deformed_picture, ring_modes_grid, write_vtu
+
+    gears = static.planetary_set
+    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    sector = make_sectors(
+        gears, material, flank_elements=PICTURE_FLANK_ELEMENTS, refine=PICTURE_REFINE, cache=cache
+    ).ring
+    width = gears.ring.face_width
+    support = foundation(
+        sector.grid, "rim", case.ring.foundation_radial, case.ring.foundation_tangential, thickness=width
+    )
+    load = active_flank_load(sector.grid, gears, 1.0)
+    basis = sector_basis(
+        sector.grid, sector.stiffness + support, mass(sector.grid, material, width), count=gears.ring.teeth, loads=load
+    )
+    modes = cyclic_modes(
+        basis, count=gears.ring.teeth, nodal_diameters=range(7), loads=load, outputs=load, max_frequency=0.0,
+        static_correction=False,
+    )
+    grid = ring_modes_grid(sector.grid, modes, range(len(modes.frequency)))
+    write_vtu(grid, folder / "ring_modes.vtu")
+    shown = int(np.flatnonzero(modes.nodal_diameter == 3)[0])
+    field = [name for name in grid.point_data if name.startswith(f"mode {shown},")][0]
+    deformed_picture(
+        grid, folder / "ring_mode.png", field=field, title=f"toothed ring, {field}",
+        colour_label="relative displacement", colour_factor=1.0,
+    )
+    return ["ring_modes.vtu", "ring_mode.png"]
+
+
+def write_animation(folder: Path, case: Case, static: StaticResult, dynamics: DynamicsResult) -> list[str]:
+    """The ring's operating deflection while the carrier turns, at the last speed."""
+    from femgear.scene import animate_operating_deflection
+
+    last = dynamics.speeds[-1]
+    rpm = case.operation.speeds[-1] * 30 / np.pi
+    animate_operating_deflection(
+        folder / "operating_deflection.gif",
+        static.planetary_set,
+        radial=dynamics.ring_radial[-1],
+        tangential=dynamics.ring_tangential[-1],
+        sensor_angle=case.housing.sensor_angle,
+        clockwise=last.carrier < 0,
+        title=f"{case.operation.input} at {rpm:.0f} rpm",
+    )
+    return ["operating_deflection.gif"]
+
+
+def write_pictures(
+    folder: Path,
+    case: Case,
+    *,
+    static: StaticResult,
+    modes: ModesResult | None,
+    dynamics: DynamicsResult | None,
+    data: dict[str, xr.Dataset],
+    cache: Path | None,
+    progress: Progress | None = None,
+) -> list[str]:
+    """Everything that a run shows; returns the names of the files."""
+    steps = [lambda: write_figures(folder, static.planetary_set, data)]
+    if static.cycle.force.any():
+        steps.append(lambda: write_deformed_set(folder, case, static, cache=cache))
+    if modes is not None:
+        steps.append(lambda: write_ring_modes(folder, case, static, cache=cache))
+    if dynamics is not None:
+        steps.append(lambda: write_animation(folder, case, static, dynamics))
+    names = []
+    for done, step in enumerate(steps):
+        if progress is not None:
+            progress("pictures", done, len(steps))
+        names += step()
+    if progress is not None:
+        progress("pictures", len(steps), len(steps))
+    return names

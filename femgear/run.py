@@ -1,0 +1,122 @@
+"""A whole run: every stage computed, written, drawn and reported in one folder."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear import analysis
+from femgear.storage import finish, write_dataset, write_text
+
+if TYPE_CHECKING:
+    from femgear.case import Case
+
+STAGES = ("static", "modes", "dynamics", "housing")
+
+
+def grid_cache() -> Path:
+    """Folder of generated grids: FEMGEAR_MESHES, else meshes/ of a source tree, else the user's cache."""
+    if given := os.environ.get("FEMGEAR_MESHES"):
+        return Path(given)
+    beside = Path(__file__).parents[1] / "meshes"
+    if beside.is_dir() and (beside.parent / "pyproject.toml").is_file():
+        return beside
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "femgear" / "meshes"
+
+
+def run_case(
+    case: Case,
+    folder: Path,
+    *,
+    only: str | None = None,
+    pictures: bool = True,
+    progress: analysis.Progress | None = None,
+) -> None:
+    """Compute a case and write its results.
+
+    Parameters
+    ----------
+    case : Case
+    folder : path
+        Made ready by `storage.prepare_output`.
+    only : {"static", "modes", "dynamics", "housing"}, optional
+        Last stage to compute.
+    pictures : bool
+        Draw figures, fields and report.
+    progress : callable, optional
+        Called with (stage, done, total).
+    """
+    from threadpoolctl import threadpool_limits
+
+    cache = grid_cache()
+    last = STAGES.index(only) if only else len(STAGES) - 1
+    write_text(case.source, folder / "case.toml")
+    names, timings, convergence = ["case.toml"], {}, {}
+    results, data = {}, {}
+    # two BLAS threads on these small matrices cost more than they gain
+    with threadpool_limits(1):
+        for stage in STAGES[: last + 1]:
+            if progress is not None:
+                progress(stage, 0, 1)
+            start = time.perf_counter()
+            results[stage] = _compute(stage, case, results, cache, progress)
+            timings[stage] = time.perf_counter() - start
+            data[stage] = results[stage].dataset()
+            write_dataset(data[stage], folder / f"{stage}.nc")
+            names.append(f"{stage}.nc")
+            convergence[stage] = _convergence(stage, results[stage])
+            if progress is not None:
+                progress(stage, 1, 1)
+    if pictures:
+        from femgear.pictures import write_pictures
+
+        start = time.perf_counter()
+        names += write_pictures(
+            folder,
+            case,
+            static=results["static"],
+            modes=results.get("modes"),
+            dynamics=results.get("dynamics"),
+            data=data,
+            cache=cache,
+            progress=progress,
+        )
+        timings["pictures"] = time.perf_counter() - start
+    finish(folder, names, timings=timings, convergence=convergence)
+    if pictures:
+        from femgear.report import write_report
+
+        write_report(folder)
+        finish(folder, [*names, "report.html"], timings=timings, convergence=convergence)
+
+
+def _compute(stage, case, results, cache, progress):
+    """One stage from those before it."""
+    if stage == "static":
+        return analysis.solve_static(case, cache=cache, progress=progress)
+    if stage == "modes":
+        return analysis.solve_modes(case, results["static"])
+    if stage == "dynamics":
+        return analysis.solve_dynamics(case, results["static"], results["modes"], progress=progress)
+    return analysis.solve_housing(case, results["dynamics"])
+
+
+def _convergence(stage, result) -> dict:
+    """What a stage says about its own trustworthiness, for the manifest."""
+    if stage == "static":
+        cycle = result.cycle
+        return {"residual": float(cycle.residual.max()), "message": cycle.message, "contact": cycle.contact}
+    if stage == "modes":
+        return {"modes": len(result.modes.frequency), "degrees_of_freedom": len(result.model.system.M)}
+    if stage == "dynamics":
+        return {
+            "converged": bool(np.all(result.response.converged)),
+            "stable": bool(np.all(result.stability.stable)),
+            "residual": float(np.max(result.response.residual)),
+            "message": result.response.message,
+        }
+    return {"points": result.points}
