@@ -74,6 +74,7 @@ class DynamicsResult:
     ``ring_tangential`` (speeds, H + 1, 2 n_max + 1) are circumferential components [m].
     """
 
+    input_speed: np.ndarray
     speeds: tuple[Speeds, ...]
     response: Response
     stability: Stability
@@ -172,7 +173,11 @@ def solve_modes(case: Case, static: StaticResult) -> ModesResult:
         sector.stiffness,
         mass(sector.grid, material, thickness),
         foundation(
-            sector.grid, "rim", case.ring.foundation_radial, case.ring.foundation_tangential, thickness=thickness
+            sector.grid,
+            "rim",
+            case.ring.foundation_radial,
+            case.ring.foundation_tangential,
+            thickness=thickness,
         ),
         active_flank_load(sector.grid, gears, side),
         max_diameter=diameter,
@@ -205,13 +210,10 @@ def solve_dynamics(
     ConvergenceError
     """
     from femgear.gears import speeds
-    from femgear.models.elastic import ring_field
-    from femgear.models.ring import RADIAL, TANGENTIAL
     from femgear.solvers.floquet import stability as floquet_verdict
-    from femgear.solvers.modal import output_load, output_response, residual_output
     from femgear.solvers.spectral import solve_spectral
 
-    gears, model, basis = static.planetary_set, modes.model, modes.modes
+    gears, basis = static.planetary_set, modes.modes
     all_speeds = tuple(
         speeds(gears, input=case.operation.input, fixed="ring", speed=s) for s in case.operation.speeds
     )
@@ -231,6 +233,27 @@ def solve_dynamics(
     )
     if progress is not None:
         progress("dynamics", 2, 2)
+    dte, field = _outputs(modes, response)
+    return DynamicsResult(
+        input_speed=np.array(case.operation.speeds),
+        speeds=all_speeds,
+        response=response,
+        stability=stability,
+        dte=dte,
+        ring_radial=field[0],
+        ring_tangential=field[1],
+        mesh_names=gears.mesh_names,
+        ring_teeth=gears.ring.teeth,
+    )
+
+
+def _outputs(result: ModesResult, response: Response):
+    """Dynamic transmission error of every mesh, and radial and tangential field of the ring."""
+    from femgear.models.elastic import ring_field
+    from femgear.models.ring import RADIAL, TANGENTIAL
+    from femgear.solvers.modal import output_load, output_response, residual_output
+
+    model, basis = result.model, result.modes
     ring_rows = np.eye(len(model.system.M))[model.ring_slice]
     outputs = np.vstack([model.rigid_directions.T, ring_rows])
     values = output_response(
@@ -242,17 +265,11 @@ def solve_dynamics(
     )
     n_meshes = model.rigid_directions.shape[1]
     coordinates = np.swapaxes(values[:, n_meshes:], 1, 2)
-    field = [ring_field(model, modes.ring.modes, coordinates, o, modes.max_diameter) for o in (RADIAL, TANGENTIAL)]
-    return DynamicsResult(
-        speeds=all_speeds,
-        response=response,
-        stability=stability,
-        dte=values[:, :n_meshes],
-        ring_radial=field[0],
-        ring_tangential=field[1],
-        mesh_names=gears.mesh_names,
-        ring_teeth=gears.ring.teeth,
-    )
+    field = [
+        ring_field(model, result.ring.modes, coordinates, output, result.max_diameter)
+        for output in (RADIAL, TANGENTIAL)
+    ]
+    return values[:, :n_meshes], field
 
 
 def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
@@ -294,7 +311,7 @@ def _need_fixed_ring(case: Case) -> None:
             key="operation.fixed",
             value=case.operation.fixed,
             limit='"ring"',
-            remedy='run with --only static, or fix the ring',
+            remedy="run with --only static, or fix the ring",
         )
 
 

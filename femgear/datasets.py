@@ -28,14 +28,28 @@ def static_dataset(result: StaticResult) -> xr.Dataset:
     variables = {
         "ste": (mesh_position, cycle.deflection, "m", "static transmission error of the mesh"),
         "ste_overall": (
-            ("planet", "position"), cycle.overall_deflection, "m", "static transmission error from sun to ring",
+            ("planet", "position"),
+            cycle.overall_deflection,
+            "m",
+            "static transmission error from sun to ring",
         ),
         "mesh_force": (mesh_position, cycle.force, "N", "mesh force along the line of action"),
         "mesh_stiffness": (mesh_position, cycle.stiffness, "N/m", "tangent mesh stiffness"),
         "mesh_stiffness_secant": (mesh_position, cycle.secant_stiffness, "N/m", "secant mesh stiffness"),
         "tooth_load": (("mesh", "tooth", "position"), cycle.tooth_load, "N", "load of a tooth pair"),
         "load_share": (("planet", "position"), cycle.load_share, "1", "share of the planet in the torque"),
-        "max_pressure": (mesh_position, cycle.max_pressure, "Pa", "largest contact pressure"),
+        "max_pressure": (
+            mesh_position,
+            cycle.max_pressure,
+            "Pa",
+            "largest contact pressure away from flank ends",
+        ),
+        "edge_contact": (
+            mesh_position,
+            cycle.edge_contact,
+            "1",
+            "whether a contact reaches the end of a flank",
+        ),
         "residual": (("position",), cycle.residual, "1", "residual of contact conditions and equilibrium"),
         "iterations": (("position",), cycle.iterations, "1", "steps of the active set"),
     }
@@ -61,7 +75,9 @@ def static_dataset(result: StaticResult) -> xr.Dataset:
             "sun_torque": result.sun_torque,
             "contact": cycle.contact,
             "pressure_cells": cycle.unknowns,
-            "unknowns": np.array([b.unknowns for b in (result.bodies.sun, result.bodies.planet, result.bodies.ring)]),
+            "unknowns": np.array(
+                [b.unknowns for b in (result.bodies.sun, result.bodies.planet, result.bodies.ring)]
+            ),
             "message": cycle.message,
         },
     )
@@ -83,7 +99,12 @@ def modes_dataset(result: ModesResult) -> xr.Dataset:
         "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "dominant nodal diameter of the ring"),
         "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
         "mesh_stiffness": (("mesh",), modes.mesh_stiffness, "N/m", "mean mesh stiffness, ring taken out"),
-        "mesh_deflection": (("mesh", "mode"), modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
+        "mesh_deflection": (
+            ("mesh", "mode"),
+            modes.mesh_deflection,
+            "kg^-1/2",
+            "mesh deflection of the mode",
+        ),
     }
     for name, output in (("ring_shape", RADIAL), ("ring_tangential_shape", TANGENTIAL)):
         field = ring_field(model, result.ring.modes, coordinates, output, n_max)
@@ -139,7 +160,7 @@ def dynamics_dataset(result: DynamicsResult) -> xr.Dataset:
     ):
         variables[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
         variables[f"{name}_imag"] = (dims, values.imag, units, f"{words}, imaginary part")
-    rpm = np.array([s.sun if s.sun else s.carrier for s in result.speeds]) / RPM
+    rpm = result.input_speed / RPM
     return xr.Dataset(
         {name: _variable(*entry) for name, entry in variables.items()},
         coords={
@@ -169,13 +190,31 @@ def housing_dataset(result: HousingResult) -> xr.Dataset:
     order = ("speed", "order")
     variables = {
         "seconds": (("speed", "time"), signal.seconds, "s", "time"),
-        "acceleration": (("speed", "time"), signal.acceleration, "m/s^2", "radial acceleration at the sensor"),
+        "acceleration": (
+            ("speed", "time"),
+            signal.acceleration,
+            "m/s^2",
+            "radial acceleration at the sensor",
+        ),
         "displacement": (("speed", "time"), signal.displacement, "m", "radial displacement at the sensor"),
         "order_amplitude": (
-            order, np.abs(result.linear.acceleration), "m/s^2", f"acceleration, linear over {result.points} points",
+            order,
+            np.abs(result.linear.acceleration),
+            "m/s^2",
+            f"acceleration, linear over {result.points} points",
         ),
-        "order_amplitude_exact": (order, np.abs(result.exact.acceleration), "m/s^2", "acceleration, exact lines"),
-        "order_phase_exact": (order, np.angle(result.exact.displacement), "rad", "displacement phase, exact lines"),
+        "order_amplitude_exact": (
+            order,
+            np.abs(result.exact.acceleration),
+            "m/s^2",
+            "acceleration, exact lines",
+        ),
+        "order_phase_exact": (
+            order,
+            np.angle(result.exact.displacement),
+            "rad",
+            "displacement phase, exact lines",
+        ),
     }
     return xr.Dataset(
         {name: _variable(*entry) for name, entry in variables.items()},

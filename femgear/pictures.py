@@ -141,10 +141,19 @@ def write_ring_modes(folder: Path, case: Case, static: StaticResult, *, cache: P
     )
     load = active_flank_load(sector.grid, gears, 1.0)
     basis = sector_basis(
-        sector.grid, sector.stiffness + support, mass(sector.grid, material, width), count=gears.ring.teeth, loads=load
+        sector.grid,
+        sector.stiffness + support,
+        mass(sector.grid, material, width),
+        count=gears.ring.teeth,
+        loads=load,
     )
     modes = cyclic_modes(
-        basis, count=gears.ring.teeth, nodal_diameters=range(7), loads=load, outputs=load, max_frequency=0.0,
+        basis,
+        count=gears.ring.teeth,
+        nodal_diameters=range(7),
+        loads=load,
+        outputs=load,
+        max_frequency=0.0,
         static_correction=False,
     )
     grid = ring_modes_grid(sector.grid, modes, range(len(modes.frequency)))
@@ -152,8 +161,12 @@ def write_ring_modes(folder: Path, case: Case, static: StaticResult, *, cache: P
     shown = int(np.flatnonzero(modes.nodal_diameter == 3)[0])
     field = [name for name in grid.point_data if name.startswith(f"mode {shown},")][0]
     deformed_picture(
-        grid, folder / "ring_mode.png", field=field, title=f"toothed ring, {field}",
-        colour_label="relative displacement", colour_factor=1.0,
+        grid,
+        folder / "ring_mode.png",
+        field=field,
+        title=f"toothed ring, {field}",
+        colour_label="relative displacement",
+        colour_factor=1.0,
     )
     return ["ring_modes.vtu", "ring_mode.png"]
 

@@ -92,6 +92,17 @@ class ContactProblem:
         last = setup.gap.shape[-1] - 1
         return bool(np.any(active & (((self.cell == 0) & ~low) | ((self.cell == last) & ~high))))
 
+    def at_flank_end(self, active: np.ndarray, setup: MeshWindows) -> np.ndarray:
+        """Whether each candidate belongs to a contact that reaches the end of a flank, shape (n,)."""
+        low, high = (edge[self.mesh, self.position, self.pair] for edge in setup.edge)
+        window = self.mesh * setup.pairs + self.pair
+        last = np.zeros(int(window.max()) + 1, int)
+        np.maximum.at(last, window, self.cell)
+        ends = active & (((self.cell == 0) & low) | ((self.cell == last[window]) & high))
+        reached = np.zeros(len(last), bool)
+        reached[window[ends]] = True
+        return reached[window]
+
 
 def mesh_pairs(planetary_set: PlanetarySet) -> tuple[FlankPair, FlankPair]:
     """The flank pairs sun-planet and planet-ring."""

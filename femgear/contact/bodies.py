@@ -110,8 +110,6 @@ def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> n
     stations = flank_stations(grid, planetary_set.ring)
     pair = mesh_pairs(planetary_set)[1]
     active = pair.pitch_roll_2 - pair.sign * np.asarray(pair.path)
-    weight = np.gradient(stations.roll) * (
-        (stations.roll >= active.min()) & (stations.roll <= active.max())
-    )
+    weight = np.gradient(stations.roll) * ((stations.roll >= active.min()) & (stations.roll <= active.max()))
     load = flank_load_columns(grid, stations) @ (weight / weight.sum())[:, None]
     return load if side > 0 else mirrored_columns(load, mirror_nodes(grid))

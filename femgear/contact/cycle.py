@@ -37,7 +37,10 @@ class MeshCycle:
     tooth : (2, 2N, T) int array
         Tooth numbers of the pairs on gear 1 and gear 2, see `tooth_zero_angles`.
     max_pressure : (2N, P) array
-        [Pa].
+        Largest pressure of the contacts that do not reach the end of a flank [Pa]: under a sharp edge the
+        pressure has no limit, it grows with every halving of the cells.
+    edge_contact : (2N, P) bool array
+        Whether a contact of the mesh reaches a tip corner or the start of the involute.
     open_planets : (N, P) bool array
         Planets that carry nothing.
     residual : (P,) array
@@ -58,6 +61,7 @@ class MeshCycle:
     path: np.ndarray
     tooth: np.ndarray
     max_pressure: np.ndarray
+    edge_contact: np.ndarray
     open_planets: np.ndarray
     residual: np.ndarray
     iterations: np.ndarray
@@ -169,6 +173,7 @@ def _unloaded(N: int, positions: int, contact: str) -> MeshCycle:
         path=np.zeros((2 * N, 1, positions)),
         tooth=np.zeros((2, 2 * N, 1), int),
         max_pressure=zero,
+        edge_contact=np.zeros((2 * N, positions), bool),
         open_planets=np.ones((N, positions), bool),
         residual=np.zeros(positions),
         iterations=np.zeros(positions, int),
@@ -182,9 +187,8 @@ def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, gaps, contact, 
     """All positions with one set of windows; also whether a contact ran into the end of its window."""
     N, P = planetary_set.n_planets, setup.positions
     load = np.append(np.zeros(N), sun_torque / planetary_set.sun.base_radius)
-    out = {
-        name: np.zeros((2 * N, P)) for name in ("deflection", "force", "stiffness", "max_pressure")
-    }
+    out = {name: np.zeros((2 * N, P)) for name in ("deflection", "force", "stiffness", "max_pressure")}
+    out["edge_contact"] = np.zeros((2 * N, P), bool)
     tooth_load = np.zeros((2 * N, setup.pairs, P))
     open_planets = np.zeros((N, P), bool)
     residual, iterations = np.zeros(P), np.zeros(P, int)
@@ -228,7 +232,9 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, out, tooth_load
     out["deflection"][:, p] = np.concatenate([sun - planets, planets])
     out["stiffness"][:, p] = tangent_stiffness(problem.H, state.active, problem.mesh, n_meshes)
     np.add.at(tooth_load[:, :, p], (problem.mesh, problem.pair), loads)
-    pressure = loads / setup.cell_area[problem.mesh]
+    at_edge = problem.at_flank_end(state.active, setup)
+    np.logical_or.at(out["edge_contact"][:, p], problem.mesh, at_edge)
+    pressure = np.where(at_edge, 0.0, loads / setup.cell_area[problem.mesh])
     np.maximum.at(out["max_pressure"][:, p], problem.mesh, pressure)
 
 

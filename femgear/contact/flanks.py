@@ -157,7 +157,9 @@ def _condensed(grid, gear, stiffness, held, depth):
         raise GridError(f"the joining depth is {depth} m", code="E-DEPTH", limit="above zero")
     depths = joining_depth(gear, np.hypot(*stations.points.T), depth)[:, None]
     observations = [
-        directional(interpolation(grid, stations.points + factor * depths * stations.normals), stations.normals)
+        directional(
+            interpolation(grid, stations.points + factor * depths * stations.normals), stations.normals
+        )
         for factor in (1.0, 2.0)
     ]
     schur = condense_sector(

@@ -49,6 +49,7 @@ def walk_either_flank(planetary_set, bodies, *, sun_torque, progress=None, **opt
         path=-cycle.path[mesh][:, ::-1][:, :, position],
         tooth=-cycle.tooth[:, mesh][:, :, ::-1],
         max_pressure=cycle.max_pressure[mesh][:, position],
+        edge_contact=cycle.edge_contact[mesh][:, position],
         open_planets=cycle.open_planets[back][:, position],
         residual=cycle.residual[position],
         iterations=cycle.iterations[position],

@@ -238,35 +238,72 @@ def condense_sector(grid, stiffness, *, count, held, loads, observations):
     """
     interior, right, left = split_sector(grid, held)
     image = mirror_nodes(grid)
-    both = np.hstack([loads, mirrored_columns(loads, image)])
-    adjoint = np.hstack([observations, mirrored_columns(observations, image)])
+    adjoint = np.hstack([observations, mirrored_columns(observations, image)])[interior]
     cut = np.concatenate([right, left])
-    _check_interior(both, cut)
-    stiffness = stiffness.tocsc()
-    K_ii, K_ib = stiffness[interior][:, interior], stiffness[interior][:, cut]
-    K_il = stiffness[interior][:, left].toarray()
-    rhs = np.hstack([K_il, loads[interior]])
-    solution = symmetric_factor(K_ii).solve(rhs)
-    _check_residual(K_ii, solution, rhs)
-
-    full = np.zeros((stiffness.shape[0], rhs.shape[1]))
-    full[interior] = solution
-    reflected = mirrored_columns(full, image)[interior]
-    nl = len(left)
-    # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
-    sign = np.tile([1.0, -1.0], nl // 2)
-    X_b = np.hstack([reflected[:, :nl] * sign, solution[:, :nl]])
-    X_f = np.hstack([solution[:, nl:], reflected[:, nl:]])
-    S = stiffness[cut][:, cut].toarray() - K_ib.T @ X_b
+    solution = solve_interior(grid, stiffness, (interior, right, left), loads)
+    K_ib, X_b = solution.coupling, solution.cut
+    full = np.zeros((stiffness.shape[0], loads.shape[1]))
+    full[interior] = solution.loads
+    X_f = np.hstack([solution.loads, mirrored_columns(full, image)[interior]])
+    S = stiffness.tocsc()[cut][:, cut].toarray() - K_ib.T @ X_b
     S = 0.5 * (S + S.T)
+    nl = len(left)
     return SectorSchur(
         count=count,
         S=S.reshape(2, nl, 2, nl).transpose(0, 2, 1, 3),
-        C=adjoint[interior].T @ X_f,
+        C=adjoint.T @ X_f,
         load_cut=-(K_ib.T @ X_f).reshape(2, nl, -1),
-        observation_cut=-(X_b.T @ adjoint[interior]).reshape(2, nl, -1),
+        observation_cut=-(X_b.T @ adjoint).reshape(2, nl, -1),
         rotation=cut_rotation(count, nl),
     )
+
+
+@dataclass(frozen=True)
+class InteriorSolution:
+    """Interior of a sector with its cuts held: ``K_ii^-1`` applied to unit cut displacements and loads.
+
+    Parameters
+    ----------
+    factor : object
+        Sparse factor of ``K_ii`` with a method ``solve``.
+    coupling : sparse matrix (ni, 2 nb)
+        ``K_ib``, right cut first.
+    cut, loads : (ni, 2 nb), (ni, m) arrays
+    """
+
+    factor: object
+    coupling: object
+    cut: np.ndarray
+    loads: np.ndarray
+
+
+def solve_interior(grid, stiffness, parts, loads) -> InteriorSolution:
+    """Factor the interior of a mirror-symmetric sector; the right cut is the mirror image of the left.
+
+    Parameters
+    ----------
+    grid : Grid
+    stiffness : (2n, 2n) sparse matrix
+    parts : tuple of three arrays
+        Interior, right and left degrees of freedom, see `split_sector`.
+    loads : (2n, m) array
+        They must not act on the cuts.
+    """
+    interior, right, left = parts
+    cut = np.concatenate([right, left])
+    _check_interior(loads, cut)
+    rows = stiffness.tocsc()[interior]
+    K_ii, K_ib = rows[:, interior], rows[:, cut]
+    nl = len(left)
+    rhs = np.hstack([K_ib[:, nl:].toarray(), loads[interior]])
+    factor = symmetric_factor(K_ii)
+    solution = factor.solve(rhs)
+    _check_residual(K_ii, solution, rhs)
+    full = np.zeros((stiffness.shape[0], nl))
+    full[interior] = solution[:, :nl]
+    # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
+    reflected = mirrored_columns(full, mirror_nodes(grid))[interior] * np.tile([1.0, -1.0], nl // 2)
+    return InteriorSolution(factor, K_ib, np.hstack([reflected, solution[:, :nl]]), solution[:, nl:])
 
 
 def _check_interior(loads, cut):
@@ -294,9 +331,21 @@ def cyclic_harmonics(schur, harmonics):
     Q, S = schur.rotation, schur.S
     RL = S[0, 1] @ Q
     A = S[0, 0] + Q.T @ S[1, 1] @ Q + phase * RL + np.conj(phase) * RL.T
+    _check_held(A)
     P_f = schur.load_cut[0] + np.conj(phase) * (Q.T @ schur.load_cut[1])
     P_d = schur.observation_cut[0] + np.conj(phase) * (Q.T @ schur.observation_cut[1])
     return schur.C + np.conj(P_d.transpose(0, 2, 1)) @ np.linalg.solve(A, P_f)
+
+
+def _check_held(tied):
+    """Refuse a body that can move as a whole: a tied sector without stiffness in some direction."""
+    values = np.linalg.eigvalsh(tied)
+    if (values[:, 0] < 1e-13 * values[:, -1]).any():
+        raise GridError(
+            "the body can move without straining: nothing holds it",
+            code="E-GRID-FREE",
+            remedy="hold its bore or its rim, or put it on a foundation",
+        )
 
 
 def tooth_compliance(schur):

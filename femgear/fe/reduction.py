@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.fe.compliance import cut_rotation, split_sector, symmetric_factor
+from femgear.fe.compliance import cut_rotation, solve_interior, split_sector
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,10 @@ class CyclicModes:
     load : (m, n_loads) complex array
         Displacement of each load functional, ``f^T U``.
     output : (m, n_outputs) complex array
-    shape : (2 n_nodes, m) complex array
-        ``U`` at all nodes of the sector.
+    reduced : (k, m) complex array
+        ``U`` in the basis of the sector.
+    recovery : (2 n_nodes, k) array
+        Basis of the sector.
     """
 
     count: int
@@ -41,7 +43,13 @@ class CyclicModes:
     frequency: np.ndarray
     load: np.ndarray
     output: np.ndarray
-    shape: np.ndarray
+    reduced: np.ndarray
+    recovery: np.ndarray
+
+    @property
+    def shape(self) -> np.ndarray:
+        """``U`` at all nodes of the sector, shape (2 n_nodes, m), complex."""
+        return self.recovery @ self.reduced
 
     @property
     def norm(self) -> np.ndarray:
@@ -67,7 +75,7 @@ class SectorBasis:
     rotation: np.ndarray
 
 
-def sector_basis(grid, stiffness, mass, *, count, loads, interior_modes=24) -> SectorBasis:
+def sector_basis(grid, stiffness, mass, *, count, loads, interior_modes=16) -> SectorBasis:
     """Reduce one sector to its cuts, `interior_modes` fixed-interface modes and the static load shapes.
 
     Parameters
@@ -86,13 +94,11 @@ def sector_basis(grid, stiffness, mass, *, count, loads, interior_modes=24) -> S
     cut = np.concatenate([right, left])
     stiffness, mass = stiffness.tocsc(), mass.tocsc()
     K_ii, M_ii = stiffness[inner][:, inner], mass[inner][:, inner]
-    K_ib, M_ib = stiffness[inner][:, cut].toarray(), mass[inner][:, cut].toarray()
-    factor = symmetric_factor(K_ii)
-    solved = factor.solve(np.hstack([K_ib, loads[inner]]))
-    constraint, static = -solved[:, : len(cut)], solved[:, len(cut) :]
-    inverse = LinearOperator(K_ii.shape, matvec=factor.solve, dtype=float)
+    solution = solve_interior(grid, stiffness, (inner, right, left), loads)
+    constraint, static = -solution.cut, solution.loads
+    inverse = LinearOperator(K_ii.shape, matvec=solution.factor.solve, dtype=float)
     start = np.cos(np.arange(len(inner)) + 1.0)
-    values, modes = eigsh(K_ii, k=interior_modes, M=M_ii, sigma=0.0, OPinv=inverse, v0=start)
+    _, modes = eigsh(K_ii, k=interior_modes, M=M_ii, sigma=0.0, OPinv=inverse, v0=start)
     static = static - modes @ (modes.T @ (M_ii @ static))
     static /= np.sqrt(np.einsum("ij,ij->j", static, M_ii @ static))
     interior = np.hstack([modes, static])
@@ -100,7 +106,7 @@ def sector_basis(grid, stiffness, mass, *, count, loads, interior_modes=24) -> S
     full_c[inner], full_c[cut] = constraint, np.eye(len(cut))
     full_i = np.zeros((stiffness.shape[0], interior.shape[1]))
     full_i[inner] = interior
-    S = stiffness[cut][:, cut].toarray() + K_ib.T @ constraint
+    S = stiffness[cut][:, cut].toarray() + solution.coupling.T @ constraint
     basis = np.hstack([full_c, full_i])
     reduced_mass = basis.T @ (mass @ basis)
     return SectorBasis(
@@ -134,18 +140,21 @@ def cyclic_modes(
     -------
     CyclicModes
     """
+    recovery = np.hstack([basis.constraint, basis.interior])
+    on_basis = recovery.T @ loads
     found = [
-        _one_diameter(basis, count, int(n), loads, max_frequency, static_correction) for n in nodal_diameters
+        _one_diameter(basis, count, int(n), on_basis, max_frequency, static_correction)
+        for n in nodal_diameters
     ]
-    diameters = np.concatenate([np.full(len(f), n) for (f, _), n in zip(found, nodal_diameters)])
-    shape = np.hstack([u for _, u in found])
+    reduced = np.hstack([vectors for _, vectors in found])
     return CyclicModes(
         count=count,
-        nodal_diameter=diameters,
+        nodal_diameter=np.concatenate([np.full(len(f), n) for (f, _), n in zip(found, nodal_diameters)]),
         frequency=np.concatenate([f for f, _ in found]),
-        load=shape.T @ loads,
-        output=shape.T @ outputs,
-        shape=shape,
+        load=reduced.T @ on_basis,
+        output=reduced.T @ (recovery.T @ outputs),
+        reduced=reduced,
+        recovery=recovery,
     )
 
 
@@ -164,17 +173,16 @@ def _one_diameter(basis: SectorBasis, count, n, loads, max_frequency, static_cor
     if n == 0 or 2 * n == count:
         K, M, T = K.real, M.real, T.real
     values, vectors = eigh(K, M)
-    recover = np.hstack([basis.constraint, basis.interior])
     kept = max(int(np.searchsorted(values, (2 * np.pi * max_frequency) ** 2)), 1)
     chosen = vectors[:, :kept]
     omega2 = np.maximum(values[:kept], 0.0)
     if static_correction and kept < len(values):
         # static response of the modes left out, made orthogonal and of unit mass like a mode
-        force = T.conj().T @ (recover.T @ loads)
+        force = T.conj().T @ loads
         rest = vectors[:, kept:] @ ((vectors[:, kept:].conj().T @ force) / values[kept:, None])
         small_M = rest.conj().T @ M @ rest
         small_K = rest.conj().T @ K @ rest
         extra_values, extra = eigh(small_K, small_M)
         chosen = np.hstack([chosen, rest @ extra])
         omega2 = np.concatenate([omega2, extra_values])
-    return np.sqrt(omega2) / (2 * np.pi), recover @ (T @ chosen)
+    return np.sqrt(omega2) / (2 * np.pi), T @ chosen

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from femgear.errors import GeometryError
 from femgear.gears import involute
 from femgear.gears.gear import tooth_thickness
+from femgear.gears.interference import check_interference
+from femgear.gears.limits import GeometryWarning
 
 if TYPE_CHECKING:
-    from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
 
 BACKLASH_TOLERANCE = 1e-5
@@ -20,30 +20,6 @@ BACKLASH_TOLERANCE = 1e-5
 
 ASSEMBLY_TOLERANCE = 1e-6
 """Part of a tooth pitch by which planet angles may miss an assembly position."""
-
-
-@dataclass(frozen=True)
-class GeometryWarning:
-    """Something that works but deserves a look.
-
-    Parameters
-    ----------
-    code, key, message : str
-        Stable identifier, entry of the case file, and a sentence with the numbers.
-    value : float
-        The number that drew the warning.
-    limit : str
-        What would not be warned about.
-    """
-
-    code: str
-    key: str
-    message: str
-    value: float
-    limit: str
-
-    def __str__(self) -> str:
-        return f"[{self.code}] {self.key}: {self.message} (usual: {self.limit})"
 
 
 def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
@@ -56,8 +32,8 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
     Returns
     -------
     tuple of GeometryWarning
-        W-PLANETS (one or two planets), W-NEIGHBOURS, W-BACKLASH, W-CONTACT-RATIO, W-CLEARANCE, W-UNDERCUT,
-        W-TIP-THIN, W-RIM.
+        W-PLANETS (one or two planets), W-NEIGHBOURS, W-BACKLASH, W-FILLET, W-CONTACT-RATIO, W-CLEARANCE,
+        W-UNDERCUT, W-TIP-THIN, W-RIM.
 
     Raises
     ------
@@ -70,7 +46,7 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
         *_neighbours(planetary),
         *_assembly(planetary),
         *_backlash(planetary),
-        *_interference(planetary),
+        *check_interference(planetary),
         *_clearances(planetary),
         *_contact_ratios(planetary),
         *_single_gears(planetary),
@@ -192,79 +168,6 @@ def _backlash(s: PlanetarySet):
                 value,
                 "< 0.3 modules",
             )
-
-
-def _active_limits(s: PlanetarySet):
-    """Gear, partner, and roll length [m] on the gear that the partner's tip reaches."""
-    a_1 = s.centre_distance * math.sin(s.working_pressure_angle_sun_planet)
-    a_2 = s.centre_distance * math.sin(s.working_pressure_angle_planet_ring)
-    yield s.sun, s.planet, a_1 - s.planet.tip_roll
-    yield s.planet, s.sun, a_1 - s.sun.tip_roll
-    yield s.planet, s.ring, s.ring.tip_roll - a_2
-    yield s.ring, s.planet, s.planet.tip_roll + a_2
-
-
-def _interference(s: PlanetarySet):
-    for gear, partner, reach in _active_limits(s):
-        if reach < 0.0 and partner.internal:
-            _involute_interference(gear, partner, reach)
-        excess = reach - gear.form_roll if gear.internal else gear.form_roll - reach
-        # undercut has removed the flank that a partner's tip would reach: the path of contact is shorter
-        if excess > 1e-9 * gear.module and not gear.undercut:
-            _fillet_interference(gear, partner, reach)
-    margin = involute.trochoid_interference(
-        s.planet.teeth,
-        s.ring.teeth,
-        s.planet.tip_radius,
-        s.ring.tip_radius,
-        s.planet.base_radius,
-        s.ring.base_radius,
-        s.centre_distance,
-    )
-    if margin < 0.0:
-        raise GeometryError(
-            f"the tips of planet ({s.planet.teeth} teeth) and ring ({s.ring.teeth}) strike each other "
-            f"outside the path of contact: the corners overlap by {-margin * s.ring.tip_radius * 1e3:.4f} mm",
-            code="E-TROCHOID",
-            key="ring.teeth",
-            value=s.ring.teeth,
-            limit="corners of the tips pass each other",
-            remedy="increase the difference of the tooth numbers, or shorten the tips (tip_diameter)",
-        )
-    return ()
-
-
-def _involute_interference(gear: Gear, partner: Gear, reach: float):
-    raise GeometryError(
-        f"involute interference: the {partner.name}'s tip meets the {gear.name} {-reach * 1e3:.4f} mm beyond "
-        f"the end of the line of action, inside the {gear.name}'s base circle",
-        code="E-INTERFERENCE",
-        key=f"{partner.name}.tip_diameter",
-        value=2.0 * partner.tip_radius,
-        limit=f"tip diameter >= {2e3 * math.hypot(partner.base_radius, partner.tip_roll - reach):.4f} mm",
-        remedy=f"give that tip_diameter, more teeth to the {gear.name}, or profile shifts",
-    )
-
-
-def _fillet_interference(gear: Gear, partner: Gear, reach: float):
-    where = math.hypot(gear.base_radius, max(reach, 0.0))
-    below = "" if reach >= 0.0 else f" and {-reach * 1e3:.4f} mm beyond the end of the line of action"
-    # both rolls change by the same amount, with the sign of an external or internal partner
-    change = reach - gear.form_roll if not partner.internal else gear.form_roll - reach
-    allowed = math.hypot(partner.base_radius, partner.tip_roll + change)
-    if gear.internal:
-        allowed = math.hypot(partner.base_radius, partner.tip_roll - (reach - gear.form_roll))
-    raise GeometryError(
-        f"the {partner.name}'s tip runs into the {gear.name}'s root fillet: it reaches radius "
-        f"{where * 1e3:.4f} mm{below}; the involute {'ends' if gear.internal else 'begins'} at "
-        f"{gear.form_radius * 1e3:.4f} mm",
-        code="E-FILLET",
-        key="rack.root_radius",
-        value=round(gear.tool.rounding / gear.module, 9),
-        limit=f"active profile {'up' if gear.internal else 'down'} to {gear.form_radius * 1e3:.4f} mm",
-        remedy=f"reduce root_radius, or give the {partner.name} a tip_diameter "
-        f"{'>=' if partner.internal else '<='} {2e3 * allowed:.4f} mm",
-    )
 
 
 def _clearances(s: PlanetarySet):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,30 @@ if TYPE_CHECKING:
 TEETH_RANGE = (5, 5000)
 MODULE_RANGE = (0.05e-3, 0.1)
 PRESSURE_ANGLE_RANGE = (math.radians(5.0), math.radians(45.0))
+
+
+@dataclass(frozen=True)
+class GeometryWarning:
+    """Something that works but deserves a look.
+
+    Parameters
+    ----------
+    code, key, message : str
+        Stable identifier, entry of the case file, and a sentence with the numbers.
+    value : float
+        The number that drew the warning.
+    limit : str
+        What would not be warned about.
+    """
+
+    code: str
+    key: str
+    message: str
+    value: float
+    limit: str
+
+    def __str__(self) -> str:
+        return f"[{self.code}] {self.key}: {self.message} (usual: {self.limit})"
 
 
 def check_gear(gear: Gear) -> None:

@@ -185,7 +185,7 @@ def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tu
 
 
 def _base_row(points: np.ndarray) -> int:
-    """Row of a finely sampled fillet, first from the root, at 45 deg to the circles; its middle if none is."""
+    """Row of a finely sampled fillet, first from the root, at 45 deg to the circles; else its middle."""
     tangent = points[2:] - points[:-2]
     radial = points[1:-1] / np.linalg.norm(points[1:-1], axis=1)[:, None]
     slope = np.abs(np.sum(tangent * radial, axis=1)) / np.linalg.norm(tangent, axis=1)

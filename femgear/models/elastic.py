@@ -122,9 +122,7 @@ def elastic_set(
         f"ring: n={modes.nodal_diameter[m]} mode {m} {'sine' if p else 'cosine'}"
         for m, p in zip(ring_mode, ring_phase)
     )
-    system = MechanicalSystem(
-        M=np.diag(M), C=np.zeros((n, n)), K=K, W=W, load=load, dofs=names + ring_names
-    )
+    system = MechanicalSystem(M=np.diag(M), C=np.zeros((n, n)), K=K, W=W, load=load, dofs=names + ring_names)
     return ElasticSet(
         system=system,
         rigid_directions=rigid,
@@ -284,7 +282,9 @@ def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) 
     )
 
 
-def ring_field(model: ElasticSet, ring: CyclicModes, coordinates, output: int, max_diameter: int) -> np.ndarray:
+def ring_field(
+    model: ElasticSet, ring: CyclicModes, coordinates, output: int, max_diameter: int
+) -> np.ndarray:
     """Circumferential components of a ring output from complex harmonics of the ring's coordinates.
 
     ``u(phi, t) = Re sum_h sum_n U[h, n] e^{i n phi} e^{i h omega t}``.
@@ -313,7 +313,5 @@ def ring_field(model: ElasticSet, ring: CyclicModes, coordinates, output: int, m
     inside = n <= max_diameter
     np.add.at(columns, (row[inside], max_diameter + n[inside]), (half * turn * value)[inside])
     mirrored = inside & ~single
-    np.add.at(
-        columns, (row[mirrored], max_diameter - n[mirrored]), (half * np.conj(turn * value))[mirrored]
-    )
+    np.add.at(columns, (row[mirrored], max_diameter - n[mirrored]), (half * np.conj(turn * value))[mirrored])
     return np.asarray(coordinates) @ columns

@@ -34,7 +34,7 @@ def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, plane
         ``rigid``, ``rotational``, ``translational``, ``planet``; ``ring, ...`` where the ring holds more than
         half of the kinetic energy; ``mixed`` where no class holds 99 % of it.
     nodal_diameter : (m,) int array
-        The one with most of the ring's kinetic energy.
+        The one with most of the ring's kinetic energy; -1 where the ring holds less than a thousandth.
     """
     energy = mass[:, None] * np.asarray(shape) ** 2
     total = energy.sum(axis=0)
@@ -56,7 +56,8 @@ def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, plane
         if classes[best, m] < 0.99 * total[m]:
             name = "mixed"
         kinds.append(f"ring, {name}" if ring[:, m].sum() > 0.5 * total[m] else name)
-    return tuple(kinds), share.argmax(axis=0)
+    moves = share.sum(axis=0) > 1e-3 * total
+    return tuple(kinds), np.where(moves, share.argmax(axis=0), -1)
 
 
 def _class_energy(shape, mass, dofs, planet_angles):

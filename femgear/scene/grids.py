@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 _QUADRATIC_TRIANGLE = 22  # VTK_QUADRATIC_TRIANGLE: corners, then the middles of 01, 12, 20
 
 
-class Body(NamedTuple):
+@dataclass(frozen=True)
+class Body:
     """One body of a scene.
 
     Parameters
@@ -87,7 +89,7 @@ def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
         When there is no body, or arrays do not fit together.
     """
     pv = load_pyvista()
-    bodies = [Body(*body) for body in bodies]
+    bodies = [body if isinstance(body, Body) else Body(*body) for body in bodies]
     if not bodies:
         raise CaseError("a scene needs at least one body", code="E-SCENE")
     for body in bodies:

@@ -18,15 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.contact.assembly import (
-    Bodies,
-    MeshWindows,
-    assemble_contact,
-    contact_half_width,
-    local_compliance,
-    mesh_pairs,
-)
-from femgear.contact.candidates import windows
+from femgear.contact.assembly import Bodies, assemble_contact, mesh_pairs, mesh_windows
 from femgear.contact.flanks import held_sector_compliance
 from femgear.contact.halfplane import HertzLine, contact_modulus, hertz_line, relative_radius
 from femgear.contact.solve import solve_contact
@@ -104,35 +96,33 @@ def flank_bodies(*, flank_elements: int = 24, refine: float = 1.0) -> Bodies:
     return Bodies(sun=sun, planet=planet, ring=planet, material=STEEL, face_width=s.sun.face_width)
 
 
-def femgear_contact(bodies: Bodies, zeta: float, *, cells: int = 36) -> PairContact:
-    """The pair at a path coordinate [m], assembled and solved as in the walk through the mesh cycle."""
-    pair = mesh_pairs(reference_set())[0]
-    width = 3.2 * contact_half_width(pair, LINE_LOAD, STEEL)
-    w = windows(
-        pair, np.full((1, 1, 1), zeta), width=width, cells=cells, nearest=math.inf, line_of_action=False
+def femgear_contact(bodies: Bodies, fraction: float, *, cells: int = 36) -> PairContact:
+    """The pair at a path coordinate, assembled and solved as in the walk through the mesh cycle.
+
+    Parameters
+    ----------
+    bodies : Bodies
+    fraction : float
+        Path coordinate in base pitches, a multiple of 1/64.
+    cells : int
+        Pressure cells in the contact window.
+    """
+    s, force = reference_set(), LINE_LOAD * bodies.face_width
+    setup = mesh_windows(
+        s, bodies, share=force, positions=64, cells=cells, nearest=math.inf, contact="profile"
     )
-    setup = MeshWindows(
-        n_planets=1,
-        positions=1,
-        pairs=1,
-        near=w.near,
-        smallest_gap=w.gap.min(axis=-1),
-        gap=w.gap,
-        roll=(w.roll_1, w.roll_2),
-        edge=(w.at_low_edge, w.at_high_edge),
-        tooth=(np.zeros((1, 1), int), np.zeros((1, 1), int)),
-        local=local_compliance(w.cell, cells, bodies)[None],
-        cell_area=np.array([w.cell * bodies.face_width]),
-    )
-    problem = assemble_contact(setup, bodies, 0, np.zeros(1))
-    force = LINE_LOAD * bodies.face_width
-    # the planet is held, the sun turns: the other motion would be without restraint
-    state = solve_contact(problem.H, problem.gap, problem.G[:, 1:], [force])
+    only = np.zeros_like(setup.near)
+    only[0] = np.abs(setup.zeta[0] - fraction * s.sun.base_pitch) < 1e-9 * s.sun.base_pitch
+    position = int(np.flatnonzero(only[0].any(axis=1))[0])
+    problem = assemble_contact(replace(setup, near=only), bodies, position, np.zeros(s.n_planets))
+    # the planets are held, the sun turns: the other motions would be without restraint
+    state = solve_contact(problem.H, problem.gap, problem.G[:, -1:], [force])
     pressure = state.loads / setup.cell_area[0]
+    cell = setup.cell_area[0] / bodies.face_width
     return PairContact(
         approach=float(state.motions[0]),
         peak_pressure=float(pressure.max()),
-        half_width=half_width_of(problem.cell * w.cell, pressure),
+        half_width=half_width_of(problem.cell * cell, pressure),
         unknowns=bodies.sun.unknowns + bodies.planet.unknowns,
     )
 
@@ -210,7 +200,7 @@ class Surface:
 
     def compliance(self, forces):
         """``F^T K^-1 F`` of the columns of nodal forces."""
-        load = forces.toarray()[self.free]
+        load = forces[self.free]
         u = np.zeros((self.stiffness.shape[0], load.shape[1]))
         u[self.free] = self.factor.solve(load)
         check_solution(self.stiffness[self.free][:, self.free], u[self.free], load)
@@ -229,3 +219,121 @@ def place(grid: Grid, angle: float, centre: float) -> Surface:
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     points = grid.points[nodes] @ turn.T + [centre, 0.0]
     return Surface(points, nodes, turn, K, free, symmetric_factor(K[free][:, free]))
+
+
+def _gauss(edges):
+    """Six points on each half of some edges: edge, place 0 .. 1 on it and weight, all (q,)."""
+    x, weight = np.polynomial.legendre.leggauss(6)
+    t = np.concatenate([0.25 * (1 + x), 0.75 + 0.25 * x])
+    return np.repeat(edges, 12), np.tile(t, len(edges)), np.tile(0.25 * weight, 2 * len(edges))
+
+
+def _hats(edge, t):
+    """Piecewise linear functions of the nodes of consecutive edges at points of them, (q, 2 k + 1)."""
+    place = 2.0 * (edge - edge[0]) + 2.0 * t
+    return np.maximum(1.0 - np.abs(place[:, None] - np.arange(2 * (edge[-1] - edge[0]) + 3)), 0.0)
+
+
+def _project(master: Surface, x, along):
+    """Where lines through `x` (q, 2) across the unit tangents `along` meet the master: edge and place."""
+    corner = np.einsum("qkc,qc->qk", master.points[None, 0::2] - x[:, None], along)
+    crosses = corner[:, :-1] * corner[:, 1:] <= 0
+    if not crosses.any(axis=1).all():
+        raise ContactError("a point of the contact surface has no counterpart", code="E-CONTACT-INPUT")
+    edge, row = crosses.argmax(axis=1), np.arange(len(x))
+    start, end = corner[row, edge], corner[row, edge + 1]
+    t = start / (start - end)
+    for _ in range(8):
+        y, slope, _ = master.at(edge, t)
+        t = t - ((y - x) * along).sum(axis=1) / (slope * along).sum(axis=1)
+    return edge, t
+
+
+def mortar_contact(slave: Surface, master: Surface, near, *, centre: float, base_radius: float):
+    """Solve the contact of two surfaces; the master turns about (centre, 0) towards the slave.
+
+    Parameters
+    ----------
+    slave, master : Surface
+    near : (2,) integer sequence
+        First and last slave edge that may touch.
+    centre, base_radius : float
+        Of the master [m].
+
+    Returns
+    -------
+    approach : float
+        Turn of the master times its base radius [m].
+    place, pressure : (m,) arrays
+        Positions along the slave [m] and pressures [Pa] of its nodes.
+    """
+    edge, t, weight = _gauss(np.arange(near[0], near[1] + 1))
+    x, tangent, shape = slave.at(edge, t)
+    length = np.hypot(*tangent.T)
+    along = tangent / length[:, None]
+    normal = np.column_stack([along[:, 1], -along[:, 0]])  # the body lies on the left of its boundary
+    on_edge, on_t = _project(master, x, along)
+    y, _, on_shape = master.at(on_edge, on_t)
+    weighted = _hats(edge, t) * (weight * length)[:, None]
+    arm = (y[:, 1] * normal[:, 0] - (y[:, 0] - centre) * normal[:, 1]) / base_radius
+    gap = weighted.T @ ((y - x) * normal).sum(axis=1)
+    compliance = slave.compliance(slave.columns(edge, shape, -normal, weighted))
+    compliance += master.compliance(master.columns(on_edge, on_shape, normal, weighted))
+    approach, pressure = _active_set(compliance, gap, weighted.T @ arm, LINE_LOAD)
+    node = slave.points[2 * near[0] : 2 * near[1] + 3]
+    place = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(node, axis=0).T))])
+    return approach, place, pressure
+
+
+def _active_set(compliance, gap, arm, load):
+    """``gap + H p - arm q >= 0, p >= 0``, complementary, ``arm^T p = load``, from all nodes touching."""
+    active = np.ones(len(gap), bool)
+    for _ in range(100):
+        n = np.count_nonzero(active)
+        matrix = np.zeros((n + 1, n + 1))
+        matrix[:n, :n] = compliance[np.ix_(active, active)]
+        matrix[:n, n] = matrix[n, :n] = -arm[active]
+        scale = 1.0 / np.sqrt(np.append(np.diag(matrix)[:n], arm.max() ** 2 / compliance.max()))
+        solved = scale * np.linalg.solve(
+            scale[:, None] * matrix * scale, scale * np.append(-gap[active], -load)
+        )
+        pressure = np.zeros(len(gap))
+        pressure[active] = solved[:n]
+        rest = gap + compliance @ pressure - arm * solved[n]
+        following = np.where(active, pressure > 0, rest < 0)
+        if np.array_equal(following, active):
+            return float(solved[n]), pressure
+        active = following
+    raise ContactError("the active set of the two bodies does not settle", code="E-CONTACT-CONVERGENCE")
+
+
+def two_body_contact(zeta: float, *, level: float = 1.0, edges: int = 6) -> PairContact:
+    """The pair at a path coordinate [m] as two bodies in contact; see `graded_sector` for the sizes."""
+    s = reference_set()
+    pair, a = mesh_pairs(s)[0], hertz_of(zeta).half_width
+    rolls = (pair.pitch_roll_1 + zeta, pair.pitch_roll_2 - zeta)
+    gears, sign = (s.sun, s.planet), (1.0, -1.0)
+    grids = mesh_outlines(
+        [graded_sector(g, r, a, level=level, edges=edges) for g, r in zip(gears, rolls, strict=True)]
+    )
+    # at the pitch point both left flanks lie on the line of centres
+    surfaces = []
+    for gear, grid, start, turn in zip(gears, grids, (0.0, math.pi), sign, strict=True):
+        thickness = float(half_thickness_angle(gear, gear.base_radius / math.cos(pair.pressure_angle)))
+        centre = 0.0 if turn > 0 else pair.centre_distance
+        surfaces.append(place(grid, start - thickness + turn * zeta / gear.base_radius, centre))
+    sun, planet = surfaces
+    middle = flank_points(s.sun, [rolls[0]])
+    distance = np.hypot(*(grids[0].points[sun.nodes[1::2]] - middle).T)
+    near = np.flatnonzero(distance < SPREAD * a)[[0, -1]]
+    approach, position, pressure = mortar_contact(
+        sun, planet, near, centre=pair.centre_distance, base_radius=s.planet.base_radius
+    )
+    if pressure[0] > 0 and near[0] > 0 or pressure[-1] > 0:
+        raise ContactError("the contact runs out of its finely divided stretch", code="E-CONTACT-WINDOW")
+    return PairContact(
+        approach=approach,
+        peak_pressure=float(pressure.max()),
+        half_width=half_width_of(position, pressure),
+        unknowns=sun.stiffness.shape[0] + planet.stiffness.shape[0],
+    )

@@ -12,7 +12,12 @@ ALPHA = np.deg2rad(20)
 def make(teeth, internal=False, shift=0.0, module=2e-3):
     rim = module * (teeth / 2 + 5) if internal else module * (teeth / 2 - 4)
     return Gear(
-        teeth=teeth, module=module, pressure_angle=ALPHA, profile_shift=shift, face_width=0.02, rim_radius=rim,
+        teeth=teeth,
+        module=module,
+        pressure_angle=ALPHA,
+        profile_shift=shift,
+        face_width=0.02,
+        rim_radius=rim,
         internal=internal,
     )
 

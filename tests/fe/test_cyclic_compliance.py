@@ -113,6 +113,14 @@ def test_compliance_does_not_depend_on_the_scale(gear):
 def test_free_body_is_refused(gear, sector):
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))
+    free = condense_sector(sector, K, count=gear.teeth, held=None, loads=loads, observations=loads)
+    with pytest.raises(GridError, match="nothing holds it"):
+        tooth_compliance(free)
+
+
+def test_load_on_a_cut_is_refused(gear, sector):
+    K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
+    loads = flank_load_columns(sector, flank_stations(sector, gear))
     loads[dof_pairs(np.unique(sector.boundaries["cut_left"]))] = 1.0
     with pytest.raises(GridError, match="cut"):
         condense_sector(sector, K, count=18, held="rim", loads=loads, observations=loads)

@@ -1,0 +1,363 @@
+"""One self-contained HTML page of a run: tables, figures, warnings, provenance."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case import planetary_set
+from femgear.files import checksum, storage_errors, write_text
+from femgear.storage import Results, open_results
+from femgear.summary import Block, describe_case, describe_results
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_LARGEST_PICTURE = 8_000_000  # bytes
+_KINDS = {".png": "image/png", ".gif": "image/gif"}
+_FEW = 4
+
+# stem of a file, its section, its caption; {} stands for what follows the stem
+_CAPTIONS = (
+    (
+        "static_transmission_error",
+        "Static",
+        "Static transmission error over one mesh period: every mesh along its line of action, and from "
+        "sun to ring. Sun and planets held at their bores, ring at its outer surface.",
+    ),
+    (
+        "mesh_stiffness",
+        "Static",
+        "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (solid) and secant F/δ "
+        "(dotted).",
+    ),
+    (
+        "load_sharing",
+        "Static",
+        "Share of every planet in the torque of the sun.",
+    ),
+    (
+        "tooth_loads",
+        "Static",
+        "Load of one tooth pair from its first to its last contact.",
+    ),
+    (
+        "deformed_set",
+        "Static",
+        "Deformed set under the static load, magnified; at rest in grey.",
+    ),
+    (
+        "mode_shapes",
+        "Modes",
+        "Mode shapes with mean mesh stiffness: bodies with a mark of their rotation, and the outer "
+        "surface of the ring; at rest in grey.",
+    ),
+    (
+        "natural_frequencies",
+        "Modes",
+        "Natural frequencies over the nodal diameters of the ring.",
+    ),
+    (
+        "ring_mode",
+        "Modes",
+        "A mode of the toothed ring on its foundation, on the finite-element grid.",
+    ),
+    (
+        "dynamic_transmission_error",
+        "Dynamics",
+        "Dynamic transmission error over one mesh period, beside the static one; its harmonics end at "
+        "those of the mesh excitation.",
+    ),
+    (
+        "dynamic_spectrum",
+        "Dynamics",
+        "Harmonics of the dynamic transmission error.",
+    ),
+    (
+        "speed_sweep",
+        "Dynamics",
+        "Fluctuation of the transmission error over the speed, and the verdicts on the solution: the "
+        "fixed point contracts below 1, the motion is stable below 1.",
+    ),
+    (
+        "ring_static_deflection",
+        "Dynamics",
+        "Mean radial deflection of the ring's outer surface, which turns with the carrier.",
+    ),
+    (
+        "operating_deflection",
+        "Dynamics",
+        "Operating deflection of the ring, without its mean, during one revolution of the carrier. Every "
+        "frame is a true instant; the meshes appear slowed down as under a stroboscope.",
+    ),
+    (
+        "housing_signal",
+        "Housing",
+        "Acceleration at the fixed sensor during one carrier revolution: all orders, and the band around "
+        "a mesh harmonic with its envelope and lobes ({}).",
+    ),
+    (
+        "order_spectrum",
+        "Housing",
+        "Carrier orders at the fixed sensor ({}): a wave of n nodal diameters at mesh harmonic h is heard"
+        " at order h z − n, z the teeth of the ring, when the carrier turns counter-clockwise.",
+    ),
+    (
+        "modulation",
+        "Housing",
+        "Envelope around a mesh harmonic over the angle of the carrier ({}).",
+    ),
+)
+_SECTIONS = ("Static", "Modes", "Dynamics", "Housing", "Other pictures")
+
+_STYLE = """
+body { font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1b1b1b; background: #fff;
+  max-width: 62rem; margin: 2rem auto; padding: 0 1.2rem; }
+h1 { font-size: 1.7rem; margin-bottom: 0.2rem; }
+h2 { font-size: 1.25rem; margin-top: 2.4rem; border-bottom: 2px solid #0072b2; padding-bottom: 0.15rem; }
+h3 { font-size: 1.05rem; margin: 1.6rem 0 0.4rem; }
+p.lead { color: #555; margin-top: 0; }
+nav a { margin-right: 1rem; color: #0072b2; }
+div.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: 0.86rem; font-variant-numeric: tabular-nums; }
+th, td { padding: 0.2rem 0.7rem; border-bottom: 1px solid #ddd; text-align: right; white-space: nowrap; }
+th { border-bottom: 2px solid #888; font-weight: 600; }
+th:first-child, td:first-child { text-align: left; padding-left: 0; }
+p.note { font-size: 0.86rem; color: #444; margin: 0.3rem 0; }
+ul.warnings { border-left: 5px solid #d55e00; background: #fdf3ec; margin: 1rem 0;
+  padding: 0.6rem 1rem 0.6rem 2rem; }
+figure { margin: 1.4rem 0 2rem; }
+figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
+figcaption { font-size: 0.9rem; color: #333; margin-top: 0.4rem; }
+pre { font-size: 0.8rem; background: #f5f5f5; padding: 0.8rem; overflow-x: auto; }
+@media print { body { max-width: none; margin: 0; font-size: 11pt; } nav { display: none; }
+  figure, table { break-inside: avoid; } h2, h3 { break-after: avoid; } pre { white-space: pre-wrap; } }
+"""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of the page: its section, caption, kind (``"image/png"``) and bytes."""
+
+    section: str
+    caption: str
+    kind: str
+    data: bytes
+
+
+def write_report(folder: str | os.PathLike) -> Path:
+    """Write ``report.html`` from what a results folder holds.
+
+    Parameters
+    ----------
+    folder : path-like
+        Folder that a run wrote; the pictures that its manifest names are embedded.
+
+    Returns
+    -------
+    Path
+        The page: one file that loads nothing else. The same results give the same bytes.
+
+    Raises
+    ------
+    StorageError
+        When the folder holds no results, files were changed since the run, or the page cannot be written.
+    """
+    results = open_results(folder)
+    path = Path(folder) / "report.html"
+    write_text(page(results), path)
+    return path
+
+
+def page(results: Results) -> str:
+    """The page as text; see `write_report`."""
+    case = results.case
+    gears = planetary_set(case)
+    pictures, skipped = _pictures(results)
+    title, *geometry = describe_case(case, gears)
+    warnings = [note for block in geometry if block.title == "Warnings" for note in block.notes]
+    warnings = [text for text in warnings if text != "none"] + list(_verdicts(results)) + skipped
+    numbers = {block.title: block for block in describe_results(results)}
+    head = "".join(
+        (
+            f"<h1>{escape(title.title)}</h1>\n",
+            f'<p class="lead">{escape(_lead(results))}</p>\n',
+            _contents(numbers, pictures),
+            _warnings(warnings),
+            '<h2 id="gears">Gears and operation</h2>\n',
+            "".join(_table(block) for block in geometry if block.title != "Warnings"),
+        )
+    )
+    body = "".join(_section(name, numbers, pictures, results) for name in _SECTIONS)
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
+        "style-src 'unsafe-inline'\">\n"
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
+        f"{head}{body}{_provenance(results, numbers)}</body>\n</html>\n"
+    )
+
+
+def _lead(results: Results) -> str:
+    stages = ", ".join(results.stages) or "nothing"
+    state = "" if results.manifest.complete else "; the run did not come to its end"
+    return f"femgear {results.manifest.versions.get('femgear', '')}: {stages}{state}"
+
+
+def _contents(numbers, pictures) -> str:
+    shown = [name for name in _SECTIONS if name in numbers or any(p.section == name for p in pictures)]
+    links = [("gears", "Gears"), *((_anchor(name), name) for name in shown), ("provenance", "Provenance")]
+    return "<nav>" + " ".join(f'<a href="#{key}">{escape(text)}</a>' for key, text in links) + "</nav>\n"
+
+
+def _anchor(name: str) -> str:
+    return name.lower().replace(" ", "-")
+
+
+def _warnings(warnings) -> str:
+    if not warnings:
+        return ""
+    return '<ul class="warnings">\n' + "".join(f"<li>{escape(text)}</li>\n" for text in warnings) + "</ul>\n"
+
+
+def _verdicts(results: Results) -> Iterator[str]:
+    """What the solvers say against their own results."""
+    if "dynamics" not in results.stages:
+        return
+    data = results.dynamics
+    speed = data["speed"].values
+    for bad, text in (
+        (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),
+        (np.abs(data["floquet_multiplier"].values) >= 1.0, "the periodic solution is unstable at"),
+    ):
+        if bad.any():
+            shown = ", ".join(f"{value:.6g}" for value in speed[bad][:8])
+            more = f" and {np.count_nonzero(bad) - 8} more speeds" if np.count_nonzero(bad) > 8 else ""
+            yield f"{text} {shown} rpm{more}"
+
+
+def _section(name: str, numbers, pictures, results: Results) -> str:
+    blocks = [numbers[name]] if name in numbers else []
+    if name == "Housing" and "housing" in results.stages:
+        blocks.append(_bands(results.housing, results.case.dynamics.mesh_harmonics))
+    figures = [picture for picture in pictures if picture.section == name]
+    if not blocks and not figures:
+        return ""
+    tables = "".join(_table(block, heading=i > 0) for i, block in enumerate(blocks))
+    return f'<h2 id="{_anchor(name)}">{escape(name)}</h2>\n' + tables + "".join(map(_figure, figures))
+
+
+def _table(block: Block, *, heading: bool = True) -> str:
+    title = f"<h3>{escape(block.title)}</h3>\n" if heading else ""
+    header = "".join(f"<th>{escape(text)}</th>" for text in block.header)
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>\n" for row in block.rows
+    )
+    table = ""
+    if header or rows:
+        head = f"<thead><tr>{header}</tr></thead>\n" if header else ""
+        table = f'<div class="wide"><table>\n{head}<tbody>\n{rows}</tbody>\n</table></div>\n'
+    notes = "".join(f'<p class="note">{escape(note)}</p>\n' for note in block.notes)
+    return title + table + notes
+
+
+def _bands(housing: xr.Dataset, harmonics: int) -> Block:
+    """Dominant lines and lobes around every mesh harmonic of the excitation, at a few speeds."""
+    from femgear.housing.orders import analyse_band, order_spectrum
+
+    teeth = int(housing.attrs["ring_teeth"])
+    rows, threshold = [], 0.0
+    count = housing.sizes["speed"]
+    for s in sorted({round(i) for i in np.linspace(0, count - 1, min(count, _FEW))}):
+        spectrum = order_spectrum(housing["acceleration"].values[s])
+        for h in range(1, harmonics + 1):
+            if h * teeth + teeth // 2 > spectrum.order[-1]:
+                break
+            found = analyse_band(spectrum, teeth, h, count=3)
+            threshold = found.lobes.threshold
+            lines = [_line(line, h * teeth) for line in found.lines[:2]] + ["-", "-"]
+            third = f"{found.lines[2].level:.1f}" if len(found.lines) > 2 else "-"
+            speed = f"{float(housing['speed'][s]):.6g}"
+            rows.append((speed, str(h), str(h * teeth), *lines[:2], third, str(len(found.lobes.position))))
+    header = (
+        "speed [rpm]",
+        "harmonic",
+        "order",
+        "strongest line [m/s²]",
+        "second line [m/s²]",
+        "third [dB]",
+        "lobes",
+    )
+    notes = (
+        f"lobes of the envelope a carrier revolution that stand out by {threshold:.0%} of its largest value; "
+        "third: level of the third line below the strongest",
+    )
+    return Block("Around the mesh harmonics", header, tuple(rows), notes)
+
+
+def _line(line, centre: int) -> str:
+    order = round(line.order)
+    offset = f" = {centre} {'+' if order > centre else '−'} {abs(order - centre)}" if order != centre else ""
+    return f"{order}{offset}: {line.amplitude:.3g}"
+
+
+def _pictures(results: Results) -> tuple[list[Picture], list[str]]:
+    """Pictures that the manifest names, in the order of the captions, and remarks on those left out."""
+    found, skipped = [], []
+    for name, digest in results.manifest.files.items():
+        path = results.folder / name
+        kind = _KINDS.get(path.suffix)
+        if kind is None:
+            continue
+        if not path.is_file() or path.is_symlink() or checksum(path) != digest:
+            skipped.append(f"{name} is missing or was changed since the run, and is not shown")
+            continue
+        with storage_errors(path):
+            data = path.read_bytes()
+        if len(data) > _LARGEST_PICTURE:
+            skipped.append(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)")
+            continue
+        rank, section, caption = _caption(path.stem)
+        found.append((rank, Picture(section, caption, kind, data)))
+    found.sort(key=lambda item: item[0])
+    return [picture for _, picture in found], skipped
+
+
+def _caption(stem: str) -> tuple[int, str, str]:
+    """Place in the order, section and caption of a picture from its file name."""
+    for rank, (prefix, section, caption) in enumerate(_CAPTIONS):
+        if stem == prefix or stem.startswith(prefix + "_"):
+            what = stem[len(prefix) :].strip("_").replace("_", " ")
+            return rank, section, caption.replace(" ({})", f" ({what})" if what else "")
+    return len(_CAPTIONS), "Other pictures", re.sub("[_-]+", " ", stem)
+
+
+def _figure(picture: Picture) -> str:
+    data = base64.b64encode(picture.data).decode("ascii")
+    caption = escape(picture.caption)
+    return (
+        f'<figure>\n<img alt="{caption}" src="data:{picture.kind};base64,{data}">\n'
+        f"<figcaption>{caption}</figcaption>\n</figure>\n"
+    )
+
+
+def _provenance(results: Results, numbers) -> str:
+    manifest = results.manifest
+    versions = Block("Versions", ("", "version"), tuple(manifest.versions.items()))
+    files = tuple((name, digest) for name, digest in manifest.files.items() if name != "report.html")
+    blocks = [numbers["Time"]] if "Time" in numbers else []
+    blocks += [versions, Block("Files", ("file", "SHA-256"), files)]
+    tables = "".join(_table(block) for block in blocks)
+    return (
+        f'<h2 id="provenance">Provenance</h2>\n{tables}<h3>Case as run</h3>\n'
+        f"<pre>{escape(results.case.source)}</pre>\n"
+    )
