@@ -73,8 +73,8 @@ _CAPTIONS = (
     (
         "dynamic_transmission_error",
         "Dynamics",
-        "Dynamic transmission error over one mesh period, beside the static one; its harmonics end at "
-        "those of the mesh excitation.",
+        "Dynamic transmission error over one mesh period, beside the static one; both without "
+        "their mean.",
     ),
     (
         "dynamic_spectrum",

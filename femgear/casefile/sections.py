@@ -310,11 +310,11 @@ def _check_numbers(case: Case):
             value=positions,
             limit=f"more than 2 x {dynamics.mesh_harmonics}",
         )
-    if case.response_harmonics < dynamics.mesh_harmonics:
+    if case.response_harmonics < 2 * dynamics.mesh_harmonics:
         yield CaseError(
-            "fewer harmonics of the response than of the mesh",
+            "the response needs twice the harmonics of the mesh: the product of both reaches that far",
             code="E-RANGE",
             key="dynamics.response_harmonics",
             value=case.response_harmonics,
-            limit=f"{dynamics.mesh_harmonics} or more, {2 * dynamics.mesh_harmonics} advised",
+            limit=f"{2 * dynamics.mesh_harmonics} or more",
         )

@@ -10,6 +10,7 @@ import numpy as np
 from femgear.contact.candidates import FlankPair, Windows, flank_pair, window_polynomials, windows
 from femgear.contact.flanks import LEFT, RIGHT, FlankCompliance, station_weights
 from femgear.contact.halfplane import hertz_line, surface_displacement
+from femgear.errors import ContactError
 
 if TYPE_CHECKING:
     from femgear.fe.elasticity import Material
@@ -145,7 +146,11 @@ def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.nd
     exact = np.concatenate([sun, planet_ring]), np.concatenate([planet_sun, ring])
     rounded = tuple(np.rint(e).astype(int) for e in exact)
     if max(np.abs(e - r).max() for e, r in zip(exact, rounded)) > 1e-3:
-        raise AssertionError("mesh phases and tooth positions contradict one another")
+        raise ContactError(
+            "the phases of the meshes and the positions of the teeth contradict one another",
+            code="E-CONTACT-PHASE",
+            remedy="planet angles must be whole multiples of 360/(z_sun + z_ring) degrees from one another",
+        )
     return rounded
 
 

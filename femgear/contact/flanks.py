@@ -153,9 +153,8 @@ def _condensed(grid, gear, stiffness, held, depth):
     from femgear.fe.compliance import condense_sector, directional, interpolation
 
     stations = flank_stations(grid, gear)
-    if depth is not None and not depth > 0:
-        raise GridError(f"the joining depth is {depth} m", code="E-DEPTH", limit="above zero")
     depths = joining_depth(gear, np.hypot(*stations.points.T), depth)[:, None]
+    _check_depth(depth, stations)
     observations = [
         directional(
             interpolation(grid, stations.points + factor * depths * stations.normals), stations.normals
@@ -198,6 +197,20 @@ def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> 
         depth=depths[:, 0],
         unknowns=teeth * 2 * nodes,
     )
+
+
+def _check_depth(depth: float | None, stations: FlankStations) -> None:
+    """Under half an element below a nodal load the finite-element field is still that of the single node."""
+    spacing = float(np.linalg.norm(np.diff(stations.points, axis=0), axis=1).max())
+    if depth is not None and not depth >= 0.5 * spacing:
+        raise GridError(
+            f"a joining depth of {1e3 * depth:.4g} mm is within the elements at the flank",
+            code="E-DEPTH",
+            key="static.depth",
+            value=f"{1e3 * depth:.4g} mm",
+            limit=f"at least half an element of the flank, {500 * spacing:.4g} mm",
+            remedy="leave static.depth out, give a larger one, or raise static.flank_elements",
+        )
 
 
 def station_weights(roll, stations):

@@ -71,11 +71,11 @@ def fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
 
     def depth(turn):
         path = centre + partner.tip_radius * np.exp(1j * (corner + ratio * turn))
-        r = np.abs(path)
-        arc = r * (np.interp(r, radius[order], angle[order]) - (np.angle(path) - turn + eta_gear))
-        return np.where((r > radius.min()) & (r < radius.max()), arc, -np.inf), r
+        r, polar = np.abs(path), np.angle(path) - turn + eta_gear
+        arc = r * (np.interp(r, radius[order], angle[order]) - polar)
+        return np.where((r > radius.min()) & (r < radius.max()) & (polar > 0.0), arc, -np.inf), r
 
-    turn, step = np.linspace(-gear.pitch_angle, gear.pitch_angle, 2001, retstep=True)
+    turn, step = np.linspace(-2.0 * gear.pitch_angle, 2.0 * gear.pitch_angle, 4001, retstep=True)
     for _ in range(3):
         arc, r = depth(turn)
         deepest = np.argmax(r) if gear.internal else np.argmin(r)

@@ -134,7 +134,7 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
         housing[name].values[speed_index] for name in ("order_amplitude", "order_amplitude_exact")
     )
     bands = _strongest_bands(order, linear, ring_teeth, zooms)
-    figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.3 * len(bands))
+    figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.8 * len(bands))
     largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
     floor = 1e-4 * largest
     _stems(axes[0], order, linear, floor)
@@ -148,7 +148,6 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     axes[0].set_ylim(floor, 2.5 * largest)
     for ax, harmonic in zip(axes[1:], bands):
         _draw_band(ax, order, linear, exact, ring_teeth, harmonic)
-    label(axes[-1], "carrier order [1]")
     figure.suptitle(
         f"Order spectrum of the fixed sensor, {rpm(housing['speed'].values[speed_index])}", fontsize=12
     )
@@ -211,9 +210,9 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic):
     ax.set_yticks(10.0**decades)
     ax.minorticks_off()
     # room above the strongest line for its label on the logarithmic axis
-    ax.set_ylim(floor, limit * (limit / floor) ** 0.8 if limit > floor else 10 * floor)
+    ax.set_ylim(floor, limit * (limit / floor) ** 0.85 if limit > floor else 10 * floor)
     ax.set_xlim(centre - reach, centre + reach)
-    label(ax, y=ACCELERATION, title=f"around mesh harmonic {harmonic} (order {centre})")
+    label(ax, "carrier order [1]", ACCELERATION, f"around mesh harmonic {harmonic} (order {centre})")
 
 
 def _multiple(harmonic, ring_teeth):

@@ -51,7 +51,7 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
         right.plot(position, overall[row], label=text, **line_style(i + len(drawn)))
     label(right, POSITION, "sum of both meshes [µm]", "sun to ring")
     right.set_xlim(0, 1)
-    legend_below(figure)
+    legend_below(figure, columns=2)
     return figure
 
 

@@ -229,9 +229,9 @@ def _gauss(edges):
 
 
 def _hats(edge, t):
-    """Piecewise linear functions of the nodes of consecutive edges at points of them, (q, 2 k + 1)."""
-    place = 2.0 * (edge - edge[0]) + 2.0 * t
-    return np.maximum(1.0 - np.abs(place[:, None] - np.arange(2 * (edge[-1] - edge[0]) + 3)), 0.0)
+    """Piecewise linear functions of the corners of consecutive edges at points of them, (q, k + 1)."""
+    place = edge - edge[0] + t
+    return np.maximum(1.0 - np.abs(place[:, None] - np.arange(edge[-1] - edge[0] + 2)), 0.0)
 
 
 def _project(master: Surface, x, along):
@@ -265,7 +265,7 @@ def mortar_contact(slave: Surface, master: Surface, near, *, centre: float, base
     approach : float
         Turn of the master times its base radius [m].
     place, pressure : (m,) arrays
-        Positions along the slave [m] and pressures [Pa] of its nodes.
+        Positions along the slave [m] and pressures [Pa] of its corners.
     """
     edge, t, weight = _gauss(np.arange(near[0], near[1] + 1))
     x, tangent, shape = slave.at(edge, t)
@@ -280,7 +280,7 @@ def mortar_contact(slave: Surface, master: Surface, near, *, centre: float, base
     compliance = slave.compliance(slave.columns(edge, shape, -normal, weighted))
     compliance += master.compliance(master.columns(on_edge, on_shape, normal, weighted))
     approach, pressure = _active_set(compliance, gap, weighted.T @ arm, LINE_LOAD)
-    node = slave.points[2 * near[0] : 2 * near[1] + 3]
+    node = slave.points[2 * near[0] : 2 * near[1] + 3 : 2]
     place = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(node, axis=0).T))])
     return approach, place, pressure
 
@@ -307,7 +307,7 @@ def _active_set(compliance, gap, arm, load):
     raise ContactError("the active set of the two bodies does not settle", code="E-CONTACT-CONVERGENCE")
 
 
-def two_body_contact(zeta: float, *, level: float = 1.0, edges: int = 6) -> PairContact:
+def two_body_contact(zeta: float, *, level: float = 1.0, edges: int = 10) -> PairContact:
     """The pair at a path coordinate [m] as two bodies in contact; see `graded_sector` for the sizes."""
     s = reference_set()
     pair, a = mesh_pairs(s)[0], hertz_of(zeta).half_width

@@ -1,0 +1,254 @@
+"""Figures: what they draw, that nothing hides anything, and that every axis says its unit."""
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from femgear import plots
+from femgear.errors import StorageError
+from femgear.plots.style import COLOURS, distinct_lines
+
+_HERE = Path(__file__).parent
+_SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
+synthetic = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(synthetic)
+TEETH = synthetic.RING
+
+
+def all_figures():
+    static, modes, dynamics, housing = (
+        getattr(synthetic, n)() for n in ("static", "modes", "dynamics", "housing")
+    )
+    gears = synthetic.planetary_set()
+    unequal = synthetic.static(defect=0.2)
+    return {
+        "ste": plots.static_transmission_error(static),
+        "ste unequal": plots.static_transmission_error(unequal),
+        "stiffness": plots.mesh_stiffness(static, face_width=synthetic.FACE_WIDTH),
+        "sharing": plots.load_sharing(static),
+        "sharing unequal": plots.load_sharing(unequal),
+        "teeth": plots.tooth_loads(static),
+        "shapes": plots.mode_shapes(modes, gears),
+        "frequencies": plots.natural_frequencies(modes, mesh_frequencies=[("mesh at 250 rpm", 90.0)]),
+        "dte": plots.transmission_error_period(dynamics, static),
+        "dte spectrum": plots.transmission_error_spectrum(dynamics),
+        "sweep": plots.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
+        "deflection": plots.ring_mean_deflection(dynamics, gears),
+        "signal": plots.housing_signal(housing, speed_index=1, ring_teeth=TEETH),
+        "orders": plots.order_spectrum(housing, speed_index=1, ring_teeth=TEETH),
+        "modulation": plots.modulation_polar(housing, speed_index=1, ring_teeth=TEETH),
+    }
+
+
+@pytest.fixture(scope="module")
+def figures():
+    return all_figures()
+
+
+def drawn(figure):
+    """Renderer of a figure that was just laid out."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return canvas.renderer
+
+
+def test_every_figure_is_a_picture(figures):
+    for name, figure in figures.items():
+        data = plots.png_bytes(figure)
+        assert data.startswith(b"\x89PNG"), name
+        assert 10_000 < len(data) < 600_000, name
+
+
+def test_every_axis_has_a_unit(figures):
+    for name, figure in figures.items():
+        for ax in figure.axes:
+            if ax.name == "polar":
+                assert "[" in ax.get_title() and "]" in ax.get_title(), name
+            elif ax.axison:
+                # axes that share a scale say it once, at the edge of the figure
+                for group, text in (
+                    (ax.get_shared_x_axes(), "get_xlabel"),
+                    (ax.get_shared_y_axes(), "get_ylabel"),
+                ):
+                    siblings = group.get_siblings(ax)
+                    assert any("[" in getattr(one, text)() for one in siblings), (name, text)
+
+
+def test_legends_stand_outside_the_axes(figures):
+    for name, figure in figures.items():
+        renderer = drawn(figure)
+        for legend in figure.legends:
+            box = legend.get_window_extent(renderer)
+            assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1 + 1, name
+            for ax in figure.axes:
+                assert not box.overlaps(ax.get_window_extent(renderer)), name
+        assert all(ax.get_legend() is None for ax in figure.axes), name
+
+
+def test_texts_of_the_order_spectrum_do_not_overlap(figures):
+    figure = figures["orders"]
+    renderer = drawn(figure)
+    for ax in figure.axes:
+        boxes = [text.get_window_extent(renderer) for text in ax.texts]
+        for i, box in enumerate(boxes):
+            assert not any(box.overlaps(other) for other in boxes[:i])
+            assert box.y1 <= ax.get_window_extent(renderer).y1 + 2
+
+
+def test_order_labels_name_harmonic_and_nodal_diameter(figures):
+    texts = [text.get_text() for ax in figures["orders"].axes for text in ax.texts]
+    assert "537 = 5·108 −3" in texts and "543 = 5·108 +3" in texts and "540" in texts
+
+
+def test_identical_meshes_are_drawn_once():
+    values = np.ones((6, 8))
+    names = synthetic.MESHES
+    assert distinct_lines(names, values) == [
+        ("all sun-planet meshes (identical)", 0),
+        ("all planet-ring meshes (identical)", 3),
+    ]
+    values[1, 3] = 1.1
+    assert [text for text, _ in distinct_lines(names, values)] == [
+        *synthetic.MESHES[:3],
+        "all planet-ring meshes (identical)",
+    ]
+    alone = distinct_lines(["sun-planet 1", "planet 1-ring"], values[:2])
+    assert alone == [("sun-planet 1", 0), ("planet 1-ring", 1)]
+
+
+def line_of(figure, text):
+    return next(line for ax in figure.axes for line in ax.get_lines() if line.get_label() == text)
+
+
+def test_transmission_error_is_drawn_in_micrometres_over_a_closed_period(figures):
+    ste = synthetic.static()["ste"].values
+    line = line_of(figures["ste"], "all sun-planet meshes (identical)")
+    np.testing.assert_allclose(line.get_ydata(), np.append(ste[0], ste[0, 0]) * 1e6, rtol=1e-14)
+    assert line.get_xdata()[0] == 0 and line.get_xdata()[-1] == 1
+
+
+def test_stiffness_axes_agree(figures):
+    """500 N/µm on 25 mm are 20 N/(mm µm)."""
+    ax = figures["stiffness"].axes[0]
+    second = next(child for child in ax.child_axes)
+    low, high = ax.get_ylim()
+    np.testing.assert_allclose(second.get_ylim(), (low / 25, high / 25), rtol=1e-12)
+
+
+def test_one_tooth_pair_carries_over_the_contact_ratio(figures):
+    for ax, ratio in zip(figures["teeth"].axes, (1.5507, 1.9301)):
+        line = ax.get_lines()[0]
+        carrying = line.get_xdata()[line.get_ydata() > 0]
+        assert np.ptp(carrying) == pytest.approx(ratio, abs=2 / 64)
+
+
+def test_dynamic_error_over_the_period_is_the_fourier_sum(figures):
+    x = synthetic.dynamics()
+    dte = (x["dte_real"] + 1j * x["dte_imag"]).values[0, 0]
+    line = line_of(figures["dte"], "dynamic, all sun-planet meshes (identical)")
+    tau = line.get_xdata()[37]
+    expected = sum((dte[h] * np.exp(2j * np.pi * h * tau)).real for h in range(1, 13)) * 1e6
+    assert line.get_ydata()[37] == pytest.approx(expected, rel=1e-12)
+
+
+def test_ring_deflection_of_two_nodal_diameters():
+    dynamics = synthetic.dynamics()
+    for part in ("real", "imag"):
+        dynamics[f"ring_{part}"].values[:] = 0
+    n = dynamics["circumferential"].values
+    dynamics["ring_real"].values[0, 0, np.abs(n) == 2] = 1e-6
+    figure = plots.ring_mean_deflection(dynamics, synthetic.planetary_set())
+    line = line_of(figure, "outer surface, outwards positive")
+    np.testing.assert_allclose(line.get_ydata(), 2 * np.cos(2 * line.get_xdata()), atol=1e-12)
+
+
+def test_ring_mode_of_three_nodal_diameters():
+    modes = synthetic.modes()
+    mode = int(np.flatnonzero(modes["nodal_diameter"].values == 3)[0])
+    figure = plots.mode_shapes(modes, synthetic.planetary_set(), shown=[mode], scale=0.1)
+    x, y = line_of(figure, "ring, outer surface").get_data()
+    angle = np.arctan2(y, x)
+    np.testing.assert_allclose(np.hypot(x, y), 0.1 * (1 + 0.1 * np.cos(3 * angle)), rtol=1e-12)
+
+
+def test_rigid_modes_are_left_out(figures):
+    titles = [ax.get_title() for ax in figures["shapes"].axes]
+    assert titles[0].startswith("mode 2: 310 Hz")
+    assert len([title for title in titles if title]) == 12
+
+
+def modulated(depth: float, lobes: int):
+    """Housing data of an amplitude-modulated carrier at order 5 z."""
+    housing = synthetic.housing()
+    angle = 2 * np.pi * housing["time"].values
+    housing["acceleration"].values[:] = (1 + depth * np.cos(lobes * angle)) * np.cos(5 * TEETH * angle)
+    amplitude = np.zeros(housing["order_amplitude"].shape)
+    amplitude[:, 5 * TEETH] = 1.0
+    amplitude[:, [5 * TEETH - lobes, 5 * TEETH + lobes]] = depth / 2
+    housing["order_amplitude"].values[:] = amplitude
+    return housing
+
+
+def test_polar_modulation_of_an_amplitude_modulated_signal():
+    figure = plots.modulation_polar(modulated(0.8, 4), ring_teeth=TEETH)
+    ax = figure.axes[1]
+    assert "mesh harmonic 5: 4 lobes" in ax.get_title()
+    line = ax.get_lines()[0]
+    np.testing.assert_allclose(line.get_ydata(), 1 + 0.8 * np.cos(4 * line.get_xdata()), atol=1e-9)
+
+
+def test_envelope_of_the_housing_signal():
+    figure = plots.housing_signal(modulated(0.5, 6), ring_teeth=TEETH, harmonics=[5])
+    line = line_of(figure, "envelope")
+    angle = 2 * np.pi * line.get_xdata()
+    np.testing.assert_allclose(line.get_ydata(), 1 + 0.5 * np.cos(6 * angle), atol=1e-9)
+    assert "6 lobes (prominence above 10% of the largest value)" in figure.axes[1].get_title(loc="left")
+
+
+def test_sweep_marks_speeds_without_convergence():
+    dynamics = synthetic.dynamics(speeds=np.linspace(100, 6000, 30))
+    dynamics["converged"].values[[3, 7]] = False
+    line = line_of(plots.speed_sweep(dynamics), "not converged")
+    np.testing.assert_allclose(line.get_xdata(), dynamics["speed"].values[[3, 7]])
+
+
+def test_sweep_draws_the_rms_of_the_fluctuation(figures):
+    x = synthetic.dynamics(speeds=np.linspace(100, 6000, 60))
+    tau = np.arange(64) / 64
+    dte = (x["dte_real"] + 1j * x["dte_imag"]).values[11, 0]
+    signal = (dte[1:, None] * np.exp(2j * np.pi * np.arange(1, 13)[:, None] * tau)).real.sum(axis=0) * 1e6
+    line = line_of(figures["sweep"], "all sun-planet meshes (identical)")
+    assert line.get_ydata()[11] == pytest.approx(np.sqrt(np.mean(signal**2)), rel=1e-12)
+
+
+def test_colours_differ_for_deuteranopes():
+    """Vienot, Brettel and Mollon (1999): colours of lines stay apart when red and green are confused."""
+    to_lms = np.array(
+        [[17.8824, 43.5161, 4.11935], [3.45565, 27.1554, 3.86714], [0.0299566, 0.184309, 1.46709]]
+    )
+    rgb = np.array([[int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)] for c in COLOURS]) ** 2.2
+    lms = rgb @ to_lms.T
+    lms[:, 1] = 0.494207 * lms[:, 0] + 1.24827 * lms[:, 2]
+    seen = np.clip(lms @ np.linalg.inv(to_lms).T, 0, 1) ** (1 / 2.2)
+    distance = np.linalg.norm(seen[:, None] - seen[None], axis=2) + np.eye(len(seen))
+    assert distance.min() > 0.15
+
+
+def test_a_figure_is_written_whole_or_not_at_all(tmp_path):
+    figure = plots.load_sharing(synthetic.static())
+    plots.save_figure(figure, tmp_path / "a.png")
+    plots.save_figure(figure, tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
+    with pytest.raises(StorageError):
+        plots.save_figure(figure, tmp_path / "missing" / "a.png")
+
+
+def test_figures_do_without_pyplot():
+    code = "import sys, femgear.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
