@@ -73,11 +73,6 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
         )
     if case.operation.torque < 0:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
-    if case.response_harmonics < 2 * case.dynamics.mesh_harmonics:
-        found.append(
-            f"[W-HARMONICS] dynamics.response_harmonics: {case.response_harmonics} harmonics of the response "
-            f"for {case.dynamics.mesh_harmonics} of the mesh; twice as many are advised"
-        )
     return tuple(found)
 
 

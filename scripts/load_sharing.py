@@ -122,7 +122,7 @@ def parallel_springs(stiffness, force, gap, planet) -> np.ndarray:
     """Mean shares of planets that act as springs in parallel, one of them behind a gap.
 
     With the stiffness ``k_n = 1/(1/k_sun-planet + 1/k_planet-ring)`` of every planet and the sun moved by
-    ``x`` along the lines of action: ``F_n = k_n (x - g_n)``, ``sum F_n = F``; a planet is open while ``x < g_n``.
+    ``x`` along the lines of action: ``F_n = k_n (x - g_n)`` and ``sum F_n = F``; open while ``x < g_n``.
 
     Parameters
     ----------
@@ -188,7 +188,9 @@ def _share_figure(gaps, cycles, planet):
     for ax, gap, cycle in zip(axes, gaps, cycles):
         position, share = periodic(cycle.position, 100 * cycle.load_share)
         for n, values in enumerate(share):
-            ax.plot(position, values, label=f"planet {n + 1}", linewidth=2.0, **line_style(n))
+            ax.plot(
+                position, values, label=f"planet {n + 1}", linewidth=max(4.6 - 1.5 * n, 1.2), **line_style(n)
+            )
         ax.set_xlim(0, 1)
         label(ax, "position in the period [1]", title=f"gap {gap * 1e6:g} µm at planet {planet}")
     highest = max(100 * cycle.load_share.max() for cycle in cycles)
@@ -205,13 +207,8 @@ def _tooth_figure(gaps, cycles, names, planet):
     n = len(cycles[0].load_share)
     neighbour = planet % n + 1
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=7.0, sharey=True)
-    chosen = [
-        (planet - 1, planet),
-        (neighbour - 1, neighbour),
-        (n + planet - 1, planet),
-        (n + neighbour - 1, neighbour),
-    ]
-    for ax, (j, number) in zip(axes, chosen):
+    chosen = (planet - 1, neighbour - 1, n + planet - 1, n + neighbour - 1)
+    for ax, j in zip(axes, chosen):
         for i, (gap, cycle) in enumerate(zip(gaps, cycles)):
             order = np.argsort(cycle.path[j], axis=None)
             path, load = cycle.path[j].ravel()[order] * 1e3, cycle.tooth_load[j].ravel()[order]

@@ -42,6 +42,10 @@ def _variable(dims, values, units, long_name):
     return (dims, np.asarray(values), {"units": units, "long_name": long_name})
 
 
+def _circumferential():
+    return _variable("circumferential", np.arange(-DIAMETERS, DIAMETERS + 1), "1", "signed nodal diameter")
+
+
 def static(*, defect: float = 0.0) -> xr.Dataset:
     """STE, stiffness and sharing of identical planets; `defect` makes the last planet differ."""
     position = np.arange(64) / 64
@@ -69,7 +73,7 @@ def static(*, defect: float = 0.0) -> xr.Dataset:
         coords={
             "mesh": MESHES,
             "position": _variable("position", position, "1", "position"),
-            "planet": [1, 2, 3],
+            "planet": _variable("planet", [1, 2, 3], "1", "planet"),
         },
         attrs={
             "contact_ratio_sun_planet": ratio["sun"],
@@ -137,8 +141,8 @@ def modes() -> xr.Dataset:
         },
         coords={
             "dof": dofs,
-            "mode": np.arange(len(order)),
-            "circumferential": np.arange(-DIAMETERS, DIAMETERS + 1),
+            "mode": _variable("mode", np.arange(len(order)), "1", "mode"),
+            "circumferential": _circumferential(),
         },
     )
 
@@ -182,13 +186,17 @@ def dynamics(*, speeds: np.ndarray | None = None) -> xr.Dataset:
         for name, value, units in (("dte", dte, "m"), ("mesh_force", force, "N"))
         for part in ("real", "imag")
     }
-    coords = {"speed": _variable("speed", rpm, "rpm", "input speed"), "mesh": MESHES, "harmonic": h}
+    coords = {
+        "speed": _variable("speed", rpm, "rpm", "input speed"),
+        "mesh": MESHES,
+        "harmonic": _variable("harmonic", h, "1", "harmonic"),
+    }
     if speeds is None:
         field, dims = ring_field(), ("speed", "harmonic", "circumferential")
         for name, value in (("ring", field), ("ring_tangential", 0.3j * field)):
             for part in ("real", "imag"):
                 data[f"{name}_{part}"] = _variable(dims, getattr(value, part), "m", name)
-        coords["circumferential"] = np.arange(-DIAMETERS, DIAMETERS + 1)
+        coords["circumferential"] = _circumferential()
     return xr.Dataset(data, coords=coords)
 
 
@@ -218,5 +226,5 @@ def housing() -> xr.Dataset:
             "time": _variable("time", turn, "1", "carrier revolutions"),
             "order": _variable("order", np.arange(top), "1", "carrier order"),
         },
-        attrs={"sensor_angle": 0.0},
+        attrs={"sensor_angle": 0.0, "ring_teeth": RING},
     )

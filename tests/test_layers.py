@@ -14,8 +14,8 @@ LAYERS = (
     ("system", "gears", "fe", "casefile", "netcdf"),
     ("contact", "models", "solvers", "housing", "case"),
     ("storage", "datasets", "plots", "scene"),
-    ("analysis",),
-    ("report", "sweep", "summary", "validation", "pictures"),
+    ("analysis", "summary"),
+    ("report", "sweep", "validation", "pictures"),
     ("run",),
     ("cli",),
 )

@@ -36,6 +36,9 @@ def all_figures():
         "shapes": plots.mode_shapes(modes, gears),
         "frequencies": plots.natural_frequencies(modes, mesh_frequencies=[("mesh at 250 rpm", 90.0)]),
         "dte": plots.transmission_error_period(dynamics, static),
+        "dte of four speeds": plots.transmission_error_period(
+            synthetic.dynamics(speeds=np.arange(500, 3000, 500))
+        ),
         "dte spectrum": plots.transmission_error_spectrum(dynamics),
         "sweep": plots.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
         "deflection": plots.ring_mean_deflection(dynamics, gears),

@@ -37,7 +37,7 @@ def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
 
 
 def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = None) -> Figure:
-    """Fluctuation of the dynamic transmission error over one mesh period, a column of axes for each speed.
+    """Fluctuation of the dynamic transmission error over one mesh period, axes for each speed.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = 
     Figure
     """
     speeds = _few(dynamics.sizes["speed"])
-    figure, axes = new_figure(columns=len(speeds), width=max(5.0 * len(speeds), 6.5), sharey=True)
+    figure, axes = _panels(len(speeds))
     h = dynamics["harmonic"].values
     position = np.linspace(0.0, 1.0, 257)
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
@@ -73,7 +73,8 @@ def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = 
             "position in the mesh period [1]",
             title=f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz",
         )
-    label(axes[0], y="transmission error less its mean [µm]")
+    for ax in axes[::2]:
+        label(ax, y="transmission error less its mean [µm]")
     legend_below(figure, columns=2)
     return figure
 
@@ -91,7 +92,7 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     Figure
     """
     speeds = _few(dynamics.sizes["speed"])
-    figure, axes = new_figure(columns=len(speeds), width=max(5.0 * len(speeds), 6.5), sharey=True)
+    figure, axes = _panels(len(speeds))
     h = dynamics["harmonic"].values
     amplitude = np.abs(harmonics_of(dynamics, "dte"))[:, :, h > 0] * 1e6
     names, floor = dynamics["mesh"].values, max(amplitude.max(initial=0.0), 1e-12) * 1e-7
@@ -113,7 +114,8 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
         ax.set_yscale("log")
         ax.set_xticks(h[h > 0][:: max(1, len(h) // 13)])
         label(ax, "harmonic of the mesh frequency [1]", title=rpm(dynamics["speed"].values[s]))
-    label(axes[0], y="amplitude of the transmission error [µm]")
+    for ax in axes[::2]:
+        label(ax, y="amplitude of the transmission error [µm]")
     legend_below(figure)
     return figure
 
@@ -202,6 +204,17 @@ def _free_angle(angles) -> float:
     gaps = np.diff(np.append(sorted_angles, sorted_angles[0] + 2 * np.pi))
     widest = int(np.argmax(gaps))
     return float(np.degrees(sorted_angles[widest] + gaps[widest] / 2))
+
+
+def _panels(count: int):
+    """Figure with `count` axes of one vertical scale, two in a row."""
+    rows, columns = -(-count // 2), min(count, 2)
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=0.8 + 3.6 * rows, sharey=True
+    )
+    for ax in axes[count:]:
+        figure.delaxes(ax)
+    return figure, axes[:count]
 
 
 def _few(count: int, limit: int = 4) -> list[int]:

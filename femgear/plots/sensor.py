@@ -264,7 +264,7 @@ def modulation_polar(
         for text in ax.get_yticklabels():
             text.set_bbox({"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0})
         # the scale stands where the curve is lowest, so that it hides nothing
-        ax.set_rlabel_position(float(np.degrees(angle[np.argmin(value)])))
+        ax.set_rlabel_position(float(np.degrees(angle[np.argmin(_around(found.envelope))])))
         ax.set_title(
             f"{speed}, mesh harmonic {harmonic}: {len(lobes.position)} lobes\n"
             "envelope of the acceleration [m/s²] over the carrier angle",
@@ -273,6 +273,13 @@ def modulation_polar(
         )
     legend_below(figure)
     return figure
+
+
+def _around(values):
+    """Mean over the fifteenth of a turn around every value."""
+    from scipy.ndimage import uniform_filter1d
+
+    return uniform_filter1d(values, max(len(values) // 15, 1), mode="wrap")
 
 
 def _round_step(step: float) -> float:

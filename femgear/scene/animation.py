@@ -11,7 +11,7 @@ import numpy as np
 
 from femgear.errors import CaseError, FemgearError
 from femgear.files import replace_file
-from femgear.scene.drawing import add_coloured, add_text, look_down
+from femgear.scene.drawing import add_coloured, add_text, look_down, rounded
 from femgear.scene.library import load_pyvista
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def _draw(planetary_set, field, carrier, sensor_angle, scale, title, size):
         plotter.add_mesh(edge, color="#404040", line_width=1.0, lighting=False)
     discs = _discs(pv, plotter, planetary_set)
     _add_sensor(pv, plotter, sensor_angle, outer * 1.1, outer)
-    add_text(plotter, f"{title}\nring deflection × {_rounded(scale)}, triangle: fixed sensor".strip(), size)
+    add_text(plotter, f"{title}\nring deflection × {rounded(scale)}, triangle: fixed sensor".strip(), size)
     look_down(plotter, outer * 1.26)
     images = []
     try:
@@ -279,11 +279,6 @@ def _strip_faces(around: int, across: int) -> np.ndarray:
 
 def _plane(points) -> np.ndarray:
     return np.column_stack([points.real, points.imag, np.zeros(len(points))])
-
-
-def _rounded(value: float) -> str:
-    """Two significant figures, without an exponent."""
-    return f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
 
 
 def _write(path, images, seconds):

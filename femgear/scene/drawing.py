@@ -83,8 +83,10 @@ def deformed_picture(
     plotter.add_mesh(rest, color="#A0A0A0", line_width=1.0, lighting=False)
     add_coloured(plotter, surface, colour_label, size, cmap="cividis")
     plotter.add_mesh(surface.extract_feature_edges(**_OUTLINE), color="black", line_width=1.2, lighting=False)
-    if title:
-        add_text(plotter, title, size)
+    # a factor below one is that of a normalised shape, which has no magnification
+    text = f"{title}\ndeformation × {rounded(scale)}" if scale >= 1 else title
+    if text:
+        add_text(plotter, text.strip(), size)
     look_down(plotter, radius * 1.1)
     write_png(plotter, path)
     return float(scale)
@@ -148,6 +150,11 @@ def add_text(plotter: pv.Plotter, text: str, size: int, *, name: str = "title") 
     points = _font(size)
     top = size - 2.6 * points * (1 + text.count("\n")) - 0.01 * size
     plotter.add_text(text, position=(0.02 * size, top), font_size=points, color="black", name=name)
+
+
+def rounded(value: float) -> str:
+    """Two significant figures, without an exponent."""
+    return f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
 
 
 def _font(size: int) -> float:

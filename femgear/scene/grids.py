@@ -80,8 +80,8 @@ def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
     Returns
     -------
     pyvista.UnstructuredGrid
-        Point data ``displacement`` [m] (3 components), cell data ``body`` (index), field data
-        ``body_names``.
+        Point data ``displacement`` [m] (3 components), cell data ``body`` (number), and the
+        number of every body as field data under its name.
 
     Raises
     ------
@@ -104,7 +104,9 @@ def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
     grid = pv.UnstructuredGrid({_QUADRATIC_TRIANGLE: cells}, points)
     grid.point_data["displacement"] = displacement
     grid.cell_data["body"] = np.repeat(np.arange(len(bodies)), [len(body.triangles) for body in bodies])
-    grid.field_data["body_names"] = [body.name for body in bodies]
+    # numbers, not a list of names: meshio cannot read text in a VTU file
+    for number, body in enumerate(bodies):
+        grid.field_data[body.name] = [number]
     return grid
 
 

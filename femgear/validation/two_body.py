@@ -50,7 +50,7 @@ class PairContact:
     peak_pressure : float
         [Pa]
     half_width : float
-        Of the semi-elliptic pressure that fits best [m].
+        See `equal_half_width` [m].
     unknowns : int
         Degrees of freedom of both grids.
     """
@@ -69,13 +69,13 @@ def hertz_of(zeta: float) -> HertzLine:
     return hertz_line(LINE_LOAD, radius, contact_modulus(youngs, nu, youngs, nu))
 
 
-def half_width_of(position, pressure) -> float:
-    """Half width of the semi-ellipse through pressures: ``p^2`` is a parabola in the position."""
-    strong = pressure > 0.3 * pressure.max()
-    unit = np.ptp(position[strong])
-    square = np.polyfit(position[strong] / unit, (pressure[strong] / pressure.max()) ** 2, 2)
-    roots = np.roots(square).real
-    return float(0.5 * unit * abs(roots[0] - roots[1]))
+def equal_half_width(position, pressure) -> float:
+    """Half width [m] of the semi-elliptic pressure with the same integrals of ``p`` and ``p^2``.
+
+    ``16 (int p)^2 / (3 pi^2 int p^2)``, from ``pi a p_0 / 2`` and ``4 a p_0^2 / 3``.
+    """
+    force, square = np.trapezoid(pressure, position), np.trapezoid(pressure**2, position)
+    return float(16.0 * force**2 / (3.0 * math.pi**2 * square))
 
 
 # --- the contact of femgear ---
@@ -122,7 +122,7 @@ def femgear_contact(bodies: Bodies, fraction: float, *, cells: int = 36) -> Pair
     return PairContact(
         approach=float(state.motions[0]),
         peak_pressure=float(pressure.max()),
-        half_width=half_width_of(problem.cell * cell, pressure),
+        half_width=equal_half_width(problem.cell * cell, pressure),
         unknowns=bodies.sun.unknowns + bodies.planet.unknowns,
     )
 
@@ -334,6 +334,6 @@ def two_body_contact(zeta: float, *, level: float = 1.0, edges: int = 10) -> Pai
     return PairContact(
         approach=approach,
         peak_pressure=float(pressure.max()),
-        half_width=half_width_of(position, pressure),
+        half_width=equal_half_width(position, pressure),
         unknowns=sun.stiffness.shape[0] + planet.stiffness.shape[0],
     )

@@ -1,0 +1,284 @@
+"""Dynamic response of the reference set: quasi-static limit, time integration, truncation, stability."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from femgear.solvers.floquet import stability
+from femgear.solvers.harmonics import mesh_harmonics, sample
+from femgear.solvers.spectral import solve_spectral
+from femgear.system import MeshExcitation, Modes
+from femgear.validation.reference import reference_case, reference_modes, reference_static
+from femgear.validation.rows import Row, at_most, counted, information, within
+
+MESHES = (("sun-planet", 0), ("planet-ring", 3))
+HARMONICS = 6
+STATIC = "static solution of the same case"
+SHOOTING = "DOP853 over one period, periodic by linear shooting"
+
+
+def _changed(**entries):
+    """The reference case with dotted entries changed; ``__`` stands for the point."""
+    from femgear.case import with_value
+
+    case = reference_case()
+    for key, value in entries.items():
+        case = with_value(case, key.replace("__", "."), value)
+    return case
+
+
+def quasi_static() -> tuple[Row, ...]:
+    """At 1 rpm the dynamic transmission error is the static one."""
+    from femgear.analysis import solve_dynamics, solve_modes
+
+    static = reference_static()
+    ste = static.cycle.deflection
+    harmonics = (ste.shape[1] - 1) // 2
+    rows = []
+    for foundation in ("1e10 N/m^3", "1e17 N/m^3"):
+        case = _changed(
+            operation__speeds=["1 rpm"],
+            dynamics__response_harmonics=2 * harmonics,
+            dynamics__mesh_harmonics=harmonics,
+            ring__foundation_radial=foundation,
+            ring__foundation_tangential=foundation,
+        )
+        dte = sample(solve_dynamics(case, static, solve_modes(case, static)).dte[0], 2 * ste.shape[1])[:, ::2]
+        for name, mesh in MESHES:
+            moving, still = (x[mesh] - x[mesh].mean() for x in (dte, ste))
+            label = f"1 rpm, foundation {foundation}, {name}: "
+            quantity = label + "largest difference of the fluctuations over peak to peak"
+            error = np.abs(moving - still).max() / np.ptp(still)
+            rows.append(at_most("quasi-static", STATIC, quantity, 1e-3, error))
+            mean = 1e6 * ste[mesh].mean(), 1e6 * dte[mesh].mean()
+            if foundation == "1e17 N/m^3" or mesh == 0:
+                rows.append(within("quasi-static", STATIC, label + "mean [um]", *mean, 1e-3))
+            else:
+                note = "the difference is what the ring moves on its foundation"
+                rows.append(information("quasi-static", STATIC, label + "mean [um]", *mean, note=note))
+    return tuple(rows)
+
+
+def shooting(
+    modes: Modes, excitation: MeshExcitation, mesh_frequency: float, *, harmonics: int, count: int = 128
+) -> tuple[np.ndarray, np.ndarray]:
+    """Periodic mesh deflections by time integration of the modal equations, and the Floquet multipliers.
+
+    ``q'' + 2 zeta w q' + w^2 q = R^T load - R^T g``, ``g = F - k s + k~ d``, and for the modes left out
+    ``d = R q + d_rest - T_res g``, solved for ``d`` at every instant.
+
+    Parameters
+    ----------
+    modes, excitation, mesh_frequency
+        As for `solve_spectral`, one speed.
+    harmonics : int
+        Mesh harmonics kept in stiffness, deflection and force.
+    count : int
+        Instants of one mesh period.
+
+    Returns
+    -------
+    deflection : (n_meshes, count) array
+        [m].
+    multipliers : complex array
+        Eigenvalues of the monodromy matrix, rigid modes left out.
+    """
+    from scipy.integrate import solve_ivp
+
+    system = _ModalSystem.build(modes, excitation, mesh_frequency, harmonics)
+    n, period = len(system.natural), 1.0 / mesh_frequency
+    scale = np.concatenate([np.ones(n), system.natural])[:, None]
+    start = np.hstack([np.diag(scale[:, 0]), np.zeros((2 * n, 1))])
+    instants = period * np.arange(count + 1) / count
+    path = solve_ivp(
+        lambda t, y: system.rate(t, y.reshape(2 * n, -1)).ravel(),
+        (0.0, period),
+        start.ravel(),
+        method="DOP853",
+        t_eval=instants,
+        rtol=1e-10,
+        atol=1e-13,
+    )
+    path = path.y.reshape(2 * n, 2 * n + 1, -1)
+    transition, particular = path[:, :-1, -1], path[:, -1, -1]
+    initial = np.linalg.solve(np.diag(scale[:, 0]) - transition, particular)
+    state = np.einsum("ijt,j->it", path[:, :-1], initial) + path[:, -1]
+    deflection = [system.deflection(t, x)[0] for t, x in zip(instants[:-1], state[:n].T)]
+    return np.array(deflection).T, np.linalg.eigvals(transition / scale.T)
+
+
+class _ModalSystem:
+    """Modal equations of motion of one speed, the modes left out as static flexibility."""
+
+    def __init__(self, natural, damping, rows, residual, load, rest, signals, mean, speed):
+        self.natural, self.damping, self.rows, self.residual = natural, damping, rows, residual
+        self.load, self.rest, self.signals, self.mean, self.speed = load, rest, signals, mean, speed
+
+    @classmethod
+    def build(cls, modes: Modes, excitation: MeshExcitation, mesh_frequency: float, harmonics: int):
+        elastic = modes.frequency > 0
+        natural = 2 * np.pi * modes.frequency[elastic]
+        rows, load = modes.mesh_deflection[:, elastic], modes.modal_load[elastic]
+        return cls(
+            natural,
+            2 * modes.damping_ratio[elastic] * natural,
+            rows,
+            modes.residual,
+            load,
+            modes.load_deflection - (rows / natural**2) @ load,
+            np.stack(mesh_harmonics(excitation, harmonics)),
+            modes.mesh_stiffness,
+            2 * np.pi * mesh_frequency,
+        )
+
+    def deflection(self, t, q):
+        """Deflections (n_meshes, ...) and forces beyond the mean stiffness, the last column forced."""
+        wave = np.exp(1j * self.speed * t * np.arange(self.signals.shape[-1]))
+        stiffness, still, force = (self.signals @ wave).real
+        change, constant = stiffness - self.mean, force - stiffness * still
+        d = self.rows @ q
+        forced = d[:, -1] if d.ndim == 2 else d
+        forced += self.rest - self.residual @ constant
+        d = np.linalg.solve(np.eye(len(change)) + self.residual * change, d)
+        g = change[:, None] * d if d.ndim == 2 else change * d
+        (g[:, -1] if g.ndim == 2 else g)[...] += constant
+        return d, g
+
+    def rate(self, t, y):
+        """Time derivative of columns of (q, q'); the last column carries the loads."""
+        q, v = np.split(y, 2)
+        a = -(self.natural**2)[:, None] * q - self.damping[:, None] * v
+        a -= self.rows.T @ self.deflection(t, q)[1]
+        a[:, -1] += self.load
+        return np.concatenate([v, a])
+
+
+def _solve(mesh_frequency, **options):
+    basis = reference_modes()
+    return solve_spectral(
+        basis.modes, basis.excitation, mesh_frequency, excitation_harmonics=HARMONICS, **options
+    )
+
+
+def _resonance() -> float:
+    """Mesh frequency [Hz] between 40 and 1600 Hz at which the planet-ring force fluctuates most."""
+    frequency = np.linspace(40.0, 1600.0, 391)
+    force = _solve(frequency, response_harmonics=2 * HARMONICS).force[:, 3, 1:]
+    return float(frequency[np.argmax(np.sum(np.abs(force) ** 2, axis=1))])
+
+
+def _compared(mesh_frequency: float, label: str) -> tuple[Row, ...]:
+    basis = reference_modes()
+    modes, excitation = basis.modes, basis.excitation
+    reference, multipliers = shooting(modes, excitation, mesh_frequency, harmonics=HARMONICS)
+    rows = []
+    for lines in (2 * HARMONICS, 3 * HARMONICS):
+        for method in ("fixed point", "direct"):
+            found = _solve(mesh_frequency, response_harmonics=lines, tolerance=1e-11, method=method)
+            if not found.converged[0]:
+                continue
+            ours = sample(found.deflection[0], reference.shape[1])
+            error = (np.abs(ours - reference).max(axis=1) / np.ptp(reference, axis=1)).max()
+            quantity = f"{label}, {method}, {lines} harmonics: largest difference over peak to peak"
+            if lines == 3 * HARMONICS:
+                rows.append(at_most("time", SHOOTING, quantity, 1e-4, error))
+            else:
+                note = "twice the excitation's harmonics; what is missing is the tail"
+                rows.append(information("time", SHOOTING, quantity, None, error, note=note))
+    verdict = stability(modes, excitation, mesh_frequency, excitation_harmonics=HARMONICS)
+    largest = np.abs(multipliers).max()
+    quantity = f"{label}: largest Floquet multiplier"
+    rows.append(within("time", SHOOTING, quantity, largest, np.abs(verdict.multiplier[0]), 1e-3))
+    return tuple(rows)
+
+
+def time_integration() -> tuple[Row, ...]:
+    """The periodic response at 3100 rpm against time integration."""
+    return _compared(1116.0, "mesh frequency 1116 Hz")
+
+
+def more_time_integration() -> tuple[Row, ...]:
+    """The periodic response at 250 rpm and near a resonance against time integration."""
+    peak = _resonance()
+    return (
+        *_compared(90.0, "mesh frequency 90 Hz"),
+        *_compared(peak, f"mesh frequency {peak:g} Hz, where the planet-ring force fluctuates most"),
+    )
+
+
+def fixed_point() -> tuple[Row, ...]:
+    """Fixed point and direct solution of the same equations."""
+    frequency = np.linspace(40.0, 1600.0, 79)
+    options = {"response_harmonics": 3 * HARMONICS, "tolerance": 1e-12}
+    direct = _solve(frequency, method="direct", **options)
+    fixed = _solve(frequency, method="fixed point", max_iterations=400, **options)
+    done = fixed.converged
+    difference = np.abs(fixed.deflection - direct.deflection)[done].max(axis=(1, 2))
+    error = (difference / np.abs(direct.deflection[done, :, 1:]).max(axis=(1, 2))).max()
+    contracts = fixed.spectral_radius < 0.95
+    name = f"{len(frequency)} mesh frequencies, 40 to 1600 Hz: "
+    return (
+        at_most("operator", "direct solution", name + "fixed point, relative difference", 1e-8, error),
+        counted(
+            "operator",
+            "spectral radius below 0.95",
+            name + "those at which the fixed point converges",
+            int(contracts.sum()),
+            int((done & contracts).sum()),
+        ),
+        information("operator", "definition", name + "largest spectral radius", None, fixed.spectral_radius.max()),
+        at_most("operator", "definition", name + "residual of the direct solution", 1e-10, direct.residual.max()),
+    )
+
+
+def harmonics_kept() -> tuple[Row, ...]:
+    """Harmonics of the response."""
+    rows = []
+    for frequency in (90.0, 1116.0):
+        fine = _solve(frequency, response_harmonics=36)
+        reference = sample(fine.deflection[0], 256)
+        for lines in (12, 18, 24):
+            ours = sample(_solve(frequency, response_harmonics=lines).deflection[0], 256)
+            error = (np.abs(ours - reference).max(axis=1) / np.ptp(reference, axis=1)).max()
+            quantity = f"{frequency:g} Hz, {lines} harmonics: largest difference over peak to peak"
+            rows.append(at_most("harmonics", "36 harmonics", quantity, 1e-3 if lines == 12 else 1e-4, error))
+    return tuple(rows)
+
+
+def modes_kept() -> tuple[Row, ...]:
+    """Modes of the set, the residual flexibility of the others kept or dropped."""
+    from dataclasses import replace
+
+    from femgear.solvers.modal import solve_modes
+
+    basis = reference_modes()
+    top = float(2 * 2 * HARMONICS * 1116.0)
+
+    def deflection(max_frequency, frequency, flexible=True):
+        modes = solve_modes(
+            basis.model.system,
+            basis.excitation.stiffness.mean(axis=1),
+            damping_ratio=reference_case().dynamics.damping_ratio,
+            max_frequency=max_frequency,
+        )
+        if not flexible:
+            modes = replace(modes, residual=np.zeros_like(modes.residual))
+        found = solve_spectral(modes, basis.excitation, frequency, response_harmonics=3 * HARMONICS)
+        return sample(found.deflection[0], 128), len(modes.frequency)
+
+    rows = []
+    for frequency in (90.0, 1116.0):
+        reference, count = deflection(2 * top, frequency)
+        for factor in (0.25, 0.5, 1.0):
+            ours, kept = deflection(factor * top, frequency)
+            error = (np.abs(ours - reference).max(axis=1) / np.ptp(reference, axis=1)).max()
+            quantity = f"{frequency:g} Hz, {kept} modes below {1e-3 * factor * top:.3g} kHz"
+            source = f"{count} modes below twice the limit of the pipeline"
+            words = quantity + ": largest difference over peak to peak"
+            rows.append(at_most("modes", source, words, 1e-3, error))
+            if factor < 1:
+                bare = deflection(factor * top, frequency, flexible=False)[0]
+                error = (np.abs(bare - reference).max(axis=1) / np.ptp(reference, axis=1)).max()
+                words = quantity + ", no residual flexibility: the same"
+                rows.append(information("modes", source, words, None, error))
+    return tuple(rows)

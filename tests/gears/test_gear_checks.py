@@ -1,0 +1,228 @@
+"""What cannot be assembled or run is refused with numbers; what is unusual is warned about."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femgear.errors import GeometryError
+from femgear.gears import BasicRack, Gear, PlanetarySet, check_set, close_set, equal_planet_angles
+from femgear.gears.checks import feasible_angles, neighbour_limit, tip_clearances
+from femgear.gears.involute import trochoid_interference
+
+ALPHA = math.radians(20.0)
+
+
+def gears(teeth, *, module=1.5e-3, shifts=(0.0, 0.0, 0.0), rack=BasicRack(), tip=None):  # noqa: B008
+    outer = module * (teeth[2] / 2 + 5)
+    rims = module * (teeth[0] / 2 - 4), module * (teeth[1] / 2 - 4), outer
+    sun, planet, ring = (
+        Gear(z, module, ALPHA, x, 25e-3, rim, internal=rim == outer, rack=rack)
+        for z, x, rim in zip(teeth, shifts, rims, strict=True)
+    )
+    return sun, planet, ring if tip is None else replace(ring, tip_diameter=2 * tip)
+
+
+def standard(teeth, planets=1, **options):
+    return close_set(*gears(teeth, **options), planet_angles=equal_planet_angles(planets))
+
+
+REFERENCE = PlanetarySet(
+    *gears((27, 40, 108), shifts=(0.52681, 0.0, 0.0)), 51e-3, planet_angles=equal_planet_angles(3)
+)
+
+
+def refusal(planetary):
+    with pytest.raises(GeometryError) as caught:
+        check_set(planetary)
+    error = caught.value
+    assert error.exit_code == 2 and error.limit and error.remedy and error.key
+    return error
+
+
+def codes(planetary):
+    return [w.code for w in check_set(planetary)]
+
+
+def test_reference_set_passes_without_a_word():
+    """Its shift is rounded to five decimals: 4.5 nm of overlap, within the stated tolerance."""
+    assert check_set(REFERENCE) == ()
+    assert REFERENCE.backlash_sun_planet == pytest.approx(-4.5e-9, abs=1e-10)
+
+
+def test_four_planets_on_126_teeth_are_refused_with_the_feasible_angles():
+    """BENCHMARK D8: OH-58, 27/99, (27 + 99)/4 = 31.5."""
+    error = refusal(standard((27, 36, 99), planets=4, rack=BasicRack(root_radius=0.15)))
+    assert error.code == "E-ASSEMBLY"
+    assert "31.5" in str(error)
+    for angle in ("91.428571", "180.000000", "271.428571"):
+        assert angle in error.remedy
+
+
+def test_feasible_angles_assemble():
+    wanted = feasible_angles(126, equal_planet_angles(4))
+    made = replace(standard((27, 36, 99), rack=BasicRack(root_radius=0.15)), planet_angles=wanted)
+    assert check_set(made) == ()
+    rounded = tuple(math.radians(round(math.degrees(a), 6)) for a in wanted)
+    assert check_set(replace(made, planet_angles=rounded)) == ()
+
+
+def test_overlapping_planets_are_refused():
+    error = refusal(replace(REFERENCE, planet_angles=equal_planet_angles(5)))
+    assert error.code == "E-NEIGHBOURS"
+    # chord of 72 deg on 51 mm minus two tip radii of 31.5 mm
+    assert f"{63 - 102 * math.sin(math.radians(36)):.4f}" in str(error)
+    assert error.limit == "at most 4 equally spaced planets"
+    assert refusal(replace(REFERENCE, planet_angles=equal_planet_angles(1000))).code == "E-NEIGHBOURS"
+    assert refusal(replace(REFERENCE, planet_angles=(0.0, 1.0, 3.0))).code == "E-NEIGHBOURS"
+    # the last and the first planet are neighbours too
+    assert refusal(replace(REFERENCE, planet_angles=(0.0, 3.0, 6.0))).code == "E-NEIGHBOURS"
+
+
+def test_neighbour_limit_allows_what_the_check_allows():
+    for sun, planet, limit in ((20, 30, 4), (27, 35, 4), (12, 42, 3), (30, 20, 6)):
+        assert math.floor(neighbour_limit(sun, planet)) == limit
+    assert neighbour_limit(6, 40) == pytest.approx(math.pi / math.asin(42 / 46))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_one_or_two_planets_are_warned_about(count):
+    angles = feasible_angles(135, equal_planet_angles(count))
+    assert codes(replace(REFERENCE, planet_angles=angles)) == ["W-PLANETS"]
+
+
+def test_shift_that_does_not_close_the_set_is_refused_or_warned_about():
+    tight = replace(REFERENCE, sun=replace(REFERENCE.sun, profile_shift=0.6))
+    error = refusal(tight)
+    assert (error.code, error.key) == ("E-BACKLASH", "sun.profile_shift")
+    loose = replace(REFERENCE, sun=replace(REFERENCE.sun, profile_shift=0.0))
+    assert "W-BACKLASH" in codes(loose)
+    assert (
+        refusal(replace(REFERENCE, ring=replace(REFERENCE.ring, profile_shift=-0.1))).key
+        == "ring.profile_shift"
+    )
+
+
+@pytest.mark.parametrize(("rho", "refused"), [(0.25, False), (0.26, False), (0.30, True), (0.38, True)])
+def test_ring_tip_on_planet_fillet(rho, refused, mesh_gaps):
+    """Against placed outlines: the largest overlap over one mesh period is the one that is told."""
+    rack = BasicRack(root_radius=rho)
+    made = [replace(g, rack=rack) for g in (REFERENCE.sun, REFERENCE.planet, REFERENCE.ring)]
+    s = close_set(*made, planet_angles=(0.0,), centre_distance=51e-3, find=("sun",))
+    overlap = -min(np.min(mesh_gaps(s, tau)[1, 0]) for tau in np.linspace(0.0, 1.0, 241))
+    if refused:
+        error = refusal(s)
+        assert (error.code, error.key) == ("E-FILLET", "rack.root_radius")
+        assert "ring's tip runs into the planet's root fillet" in str(error)
+        told = float(str(error).split("overlap ")[1].split(" um")[0]) * 1e-6
+        assert told == pytest.approx(overlap, rel=0.05)  # arcs about planet and ring centres
+        allowed = float(error.remedy.split(">= ")[1].split(" mm")[0]) * 1e-3
+        assert check_set(replace(s, ring=replace(s.ring, tip_diameter=allowed + 1e-7)))[0].code == "W-PLANETS"
+    else:
+        assert overlap < 1e-4 * s.planet.module
+        assert ("W-FILLET" in codes(s)) is (overlap > 1e-9)
+
+
+def test_long_sun_tip_on_planet_fillet_is_refused():
+    error = refusal(replace(REFERENCE, sun=replace(REFERENCE.sun, tip_diameter=45.7e-3)))
+    assert error.code == "E-FILLET"
+    assert "sun's tip runs into the planet's root fillet" in str(error)
+
+
+def test_involute_interference_of_the_standard_18_72_pair():
+    """BENCHMARK D: the line of action is 0.77 mm short at m = 3."""
+    error = refusal(standard((36, 18, 72), module=3e-3, rack=BasicRack(root_radius=0.38)))
+    assert error.code == "E-INTERFERENCE"
+    assert "0.7664 mm" in str(error)
+
+
+@pytest.mark.parametrize("ring", [44, 45, 46, 47, 48, 49, 50, 52])
+def test_passing_tips_against_placed_outlines(ring, mesh_gaps):
+    """Tips shortened at the ring to be free of involute interference: only the passing of the tips remains."""
+    base = 0.5e-3 * math.cos(ALPHA) * np.array([40, ring])
+    distance = 0.5e-3 * (ring - 40)
+    tip = max(math.hypot(base[1], distance * math.sin(ALPHA)) + 2e-5, 0.5e-3 * (ring - 2))
+    s = close_set(
+        *gears((60, 40, ring), module=1e-3, tip=tip, rack=BasicRack(root_radius=0.1)),
+        planet_angles=(0.0,),
+        centre_distance=distance,
+        find=("sun",),
+    ) if ring > 200 else None  # fmt: skip
+    margin = trochoid_interference(40, ring, 21e-3, tip, *base, distance)
+    struck = _tips_strike(ring, tip, distance)
+    assert s is None
+    assert (margin < 0.0) is struck
+
+
+def _tips_strike(ring_teeth, tip, distance):
+    """Roll a planet of 40 teeth in the ring and look for tip corners of the planet inside ring teeth."""
+    planet = Gear(40, 1e-3, ALPHA, 0.0, 1e-2, 15e-3)
+    ring = Gear(ring_teeth, 1e-3, ALPHA, 0.0, 1e-2, 40e-3, internal=True, tip_diameter=2 * tip)
+    half = math.pi / 80 + math.tan(ALPHA) - ALPHA
+    corner = half - (math.tan(b := math.acos(planet.base_radius / planet.tip_radius)) - b)
+    turns = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 40001)
+    # at the pitch point: planet tooth half a pitch from the ring tooth, both half a pitch thick
+    worst = 0.0
+    for side in (1.0, -1.0):
+        point = distance + planet.tip_radius * np.exp(1j * (turns + side * corner))
+        r = np.abs(point)
+        local = np.angle(point) - turns * 40 / ring_teeth - math.pi / ring_teeth
+        pitch = ring.pitch_angle
+        local = np.abs((local + 0.5 * pitch) % pitch - 0.5 * pitch)
+        ok = (r >= tip) & (r > ring.base_radius)
+        pressure = np.arccos(ring.base_radius / r[ok])
+        width = math.pi / (2 * ring_teeth) - (math.tan(ALPHA) - ALPHA) + np.tan(pressure) - pressure
+        worst = max(worst, float(np.max(width - local[ok], initial=0.0)))
+    return worst > 1e-7
+
+
+def test_negative_tip_clearance_is_refused():
+    deep = standard((24, 36, 96), rack=BasicRack(addendum=1.2, dedendum=1.1, root_radius=0.05))
+    error = refusal(deep)
+    assert error.code in ("E-CLEARANCE", "E-FILLET")
+    assert min(tip_clearances(deep).values()) == pytest.approx(-0.1 * 1.5e-3)
+
+
+def test_clearances_of_the_standard_rack_are_a_quarter_module():
+    values = tip_clearances(standard((24, 36, 96)))
+    assert list(values.values()) == pytest.approx([0.375e-3] * 4)
+
+
+def test_contact_ratio_under_one_is_refused():
+    stub = standard((24, 36, 96), rack=BasicRack(addendum=0.5))
+    error = refusal(stub)
+    assert error.code == "E-CONTACT-RATIO"
+    assert "W-CONTACT-RATIO" in codes(standard((24, 36, 96), rack=BasicRack(addendum=0.65)))
+
+
+def test_undercut_is_flagged_with_the_least_shift():
+    s = standard((12, 36, 84), rack=BasicRack(root_radius=0.2))
+    (warning,) = [w for w in check_set(s) if w.code == "W-UNDERCUT"]
+    assert warning.key == "sun.profile_shift"
+    assert "0.2981" in str(warning)  # x_min(12) of a tool flank one module deep
+    assert s.contact_ratio_sun_planet < 1.6
+
+
+def test_thin_tips_and_thin_rims_are_warned_about():
+    sun = Gear(27, 1.5e-3, ALPHA, 1.2, 25e-3, 9e-3)
+    s = close_set(
+        sun,
+        REFERENCE.planet,
+        REFERENCE.ring,
+        planet_angles=(0.0,),
+        centre_distance=51.5e-3,
+        find=("ring", "planet"),
+    )
+    thin = replace(REFERENCE, ring=replace(REFERENCE.ring, rim_radius=85e-3))
+    assert "W-RIM" in codes(thin)
+    assert 2 * s.sun.tip_radius > 0
+    pointed = replace(REFERENCE, sun=replace(REFERENCE.sun, rack=BasicRack(addendum=1.1)))
+    assert "W-TIP-THIN" not in codes(REFERENCE)
+    assert pointed.sun.tip_radius > REFERENCE.sun.tip_radius
+
+
+def test_warnings_say_where_and_how_much():
+    (warning,) = check_set(replace(REFERENCE, planet_angles=(0.0,)))
+    assert str(warning).startswith("[W-PLANETS] set.planets: 1 planet")
+    assert warning.value == 1
