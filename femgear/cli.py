@@ -147,12 +147,9 @@ def report(folder: Path, /) -> int:
     folder
         Folder that femgear run wrote.
     """
-    from femgear.storage import open_results
+    from femgear.run import report_again
 
-    open_results(folder)
-    from femgear.report import write_report
-
-    write_report(folder)
+    report_again(folder)
     print(f"report:  {folder / 'report.html'}")
     return 0
 

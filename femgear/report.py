@@ -73,8 +73,7 @@ _CAPTIONS = (
     (
         "dynamic_transmission_error",
         "Dynamics",
-        "Dynamic transmission error over one mesh period, beside the static one; both without "
-        "their mean.",
+        "Dynamic transmission error over one mesh period, beside the static one; both without their mean.",
     ),
     (
         "dynamic_spectrum",

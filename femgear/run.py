@@ -120,3 +120,27 @@ def _convergence(stage, result) -> dict:
             "message": result.response.message,
         }
     return {"points": result.points}
+
+
+def report_again(folder: Path) -> None:
+    """Write report.html anew, with its figures where the run drew none, and bring the manifest up to date.
+
+    Parameters
+    ----------
+    folder : path
+        Results of a complete run.
+    """
+    from femgear.case import planetary_set
+    from femgear.pictures import write_figures
+    from femgear.report import write_report
+    from femgear.storage import open_results
+
+    results = open_results(folder)
+    manifest = results.manifest
+    names = [name for name in manifest.files if name != "report.html"]
+    if not any(name.endswith(".png") for name in names):
+        data = {stage: getattr(results, stage) for stage in results.stages}
+        names += write_figures(results.folder, planetary_set(results.case), data)
+        finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
+    write_report(folder)
+    finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)

@@ -255,3 +255,25 @@ def test_a_figure_is_written_whole_or_not_at_all(tmp_path):
 def test_figures_do_without_pyplot():
     code = "import sys, femgear.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+def test_unloaded_set_is_drawn_flat():
+    """Without torque everything is zero: figures show that, without warnings of divisions."""
+    static = synthetic.static()
+    for name in static.data_vars:
+        static[name].values[:] = 0.0
+    for draw in (
+        plots.static_transmission_error,
+        plots.mesh_stiffness,
+        plots.load_sharing,
+        plots.tooth_loads,
+    ):
+        assert plots.png_bytes(draw(static)).startswith(b"\x89PNG")
+
+
+def test_silent_housing_is_drawn():
+    housing = synthetic.housing()
+    for name in ("acceleration", "order_amplitude", "order_amplitude_exact"):
+        housing[name].values[:] = 0.0
+    for draw in (plots.housing_signal, plots.order_spectrum, plots.modulation_polar):
+        assert plots.png_bytes(draw(housing, ring_teeth=TEETH)).startswith(b"\x89PNG")

@@ -34,7 +34,7 @@ def check_interference(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
             if overlap > FILLET_TOLERANCE * gear.module:
                 _fillet_interference(gear, partner, reach, overlap)
             warnings.append(_fillet_warning(gear, partner, reach, overlap))
-    _trochoid_interference(planetary)
+    check_passing_tips(planetary.planet, planetary.ring, planetary.centre_distance)
     return tuple(warnings)
 
 
@@ -139,23 +139,24 @@ def _fillet_warning(gear: Gear, partner: Gear, reach: float, overlap: float) -> 
     )
 
 
-def _trochoid_interference(s: PlanetarySet) -> None:
+def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None:
+    """Refuse an internal pair whose tips strike each other outside the path of contact (E-TROCHOID)."""
     margin = involute.trochoid_interference(
-        s.planet.teeth,
-        s.ring.teeth,
-        s.planet.tip_radius,
-        s.ring.tip_radius,
-        s.planet.base_radius,
-        s.ring.base_radius,
-        s.centre_distance,
+        planet.teeth,
+        ring.teeth,
+        planet.tip_radius,
+        ring.tip_radius,
+        planet.base_radius,
+        ring.base_radius,
+        centre_distance,
     )
     if margin < 0.0:
         raise GeometryError(
-            f"the tips of planet ({s.planet.teeth} teeth) and ring ({s.ring.teeth}) strike each other "
-            f"outside the path of contact: the corners overlap by {-margin * s.ring.tip_radius * 1e3:.4f} mm",
+            f"the tips of planet ({planet.teeth} teeth) and ring ({ring.teeth}) strike each other outside "
+            f"the path of contact: the corners overlap by {-margin * ring.tip_radius * 1e3:.4f} mm",
             code="E-TROCHOID",
             key="ring.teeth",
-            value=s.ring.teeth,
+            value=ring.teeth,
             limit="corners of the tips pass each other",
             remedy="increase the difference of the tooth numbers, or shorten the tips (tip_diameter)",
         )

@@ -14,6 +14,7 @@ from femgear.validation import (
     parametric,
     planetary,
     standard,
+    two_body,
     vibration,
 )
 from femgear.validation.run import Theme
@@ -82,6 +83,7 @@ THEMES = (
             contact.depth_reference,
             contact.springs_with_gap,
         ),
+        (two_body.tooth_pairs, two_body.tip_contact),
     ),
     Theme(
         "stability",

@@ -1,7 +1,7 @@
 """Tooth outlines of all bodies of a set, put where `orientations` says, and their distances.
 
-The distance is measured in polar coordinates of the sun (or ring): arc between a point of the planet and the side
-of the nearest tooth. Nothing of the theory of gearing goes into it but the shape of one tooth.
+The distance is measured in polar coordinates of the sun (or ring): arc between a point of the planet and the
+side of the nearest tooth. Nothing of the theory of gearing goes into it but the shape of one tooth.
 """
 
 from functools import lru_cache
@@ -15,8 +15,8 @@ from femgear.gears import half_sector, orientations
 @lru_cache(maxsize=64)
 def profile(gear):
     """Radius and polar angle of the half tooth from the tip along flank and fillet, dense."""
-    curves = dict(half_sector(gear, flank_elements=4000).curves)
-    curves["fillet"] = half_sector(gear, refine=40.0).curve("fillet")
+    curves = dict(half_sector(gear, flank_elements=1000).curves)
+    curves["fillet"] = half_sector(gear, refine=20.0).curve("fillet")
     order = ("fillet", "flank", "tip") if gear.internal else ("tip", "flank", "fillet")
     points = np.vstack([curves[name] for name in order])
     return np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
@@ -34,10 +34,11 @@ def facing(gear, orientation, points, side):
     return r[inside] * (local[inside] - width)
 
 
-def planet_sides(s, n, state):
-    """Points of all teeth of planet n about the common centre: left sides, right sides."""
+def planet_sides(s, n, state, direction):
+    """Left and right sides of the nine planet teeth nearest to a direction, about the common centre."""
     radius, half = profile(s.planet)
-    turned = s.planet.pitch_angle * np.arange(s.planet.teeth)[:, None] + state.planets[n]
+    first = round((direction - state.planets[n]) / s.planet.pitch_angle) - 4
+    turned = s.planet.pitch_angle * (first + np.arange(9))[:, None] + state.planets[n]
     centre = s.centre_distance * np.exp(1j * s.planet_angles[n])
     return [(centre + radius * np.exp(1j * (turned + side * half))).ravel() for side in (1.0, -1.0)]
 
@@ -50,17 +51,17 @@ def arcs_to_tooth():
 
 @pytest.fixture
 def mesh_gaps():
-    """Function: smallest signed arcs (loaded sides, back sides) of every mesh, sun and ring of each planet."""
+    """Function: smallest signed arcs (loaded sides, back sides) for sun and ring of each planet."""
 
     def gaps(s, position):
         state, rows = orientations(s, position), []
         for n in range(s.n_planets):
-            left, right = planet_sides(s, n, state)
+            psi = s.planet_angles[n]
             # loaded: left of the sun on left of the planet, right of the planet on left of the ring
-            for gear, turn, loaded, back in (
-                (s.sun, state.sun, left, right),
-                (s.ring, state.ring, right, left),
-            ):
+            left, right = planet_sides(s, n, state, psi + np.pi)
+            back_ring, on_ring = planet_sides(s, n, state, psi)
+            meshes = ((s.sun, state.sun, left, right), (s.ring, state.ring, on_ring, back_ring))
+            for gear, turn, loaded, back in meshes:
                 rows.append([np.min(facing(gear, turn, loaded, 1.0)), np.min(facing(gear, turn, back, -1.0))])
         return np.array(rows)
 

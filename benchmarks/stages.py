@@ -1,0 +1,303 @@
+"""The stages of the reference case, as things to measure: what each needs, does, and how large it is."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+CASE = ROOT / "cases" / "planetary_27_40_108.toml"
+SWEEP_SPEEDS = 1000
+
+
+class Reference:
+    """The reference case and the results of its stages, each computed when it is first asked for."""
+
+    @cached_property
+    def case(self):
+        from femgear import read_case
+
+        return read_case(CASE)
+
+    @cached_property
+    def material(self):
+        from femgear.fe.elasticity import Material
+
+        section = self.case.material
+        return Material(section.youngs_modulus, section.poisson_ratio, section.density)
+
+    @cached_property
+    def cache(self) -> Path:
+        self._folder = tempfile.TemporaryDirectory()
+        return Path(self._folder.name)
+
+    @cached_property
+    def gears(self):
+        from femgear import planetary_set
+
+        return planetary_set(self.case)
+
+    @cached_property
+    def halves(self):
+        return outlines(self)
+
+    @cached_property
+    def grids(self):
+        from femgear.fe.grid import mirror
+
+        return [mirror(grid) for grid in cached_grids(self)]
+
+    @cached_property
+    def sectors(self):
+        from femgear.contact.bodies import make_sectors
+
+        elements = self.case.static.flank_elements
+        return make_sectors(self.gears, self.material, flank_elements=elements, cache=self.cache)
+
+    @cached_property
+    def bodies(self):
+        return compliance(self)
+
+    @cached_property
+    def static(self):
+        return static(self)
+
+    @cached_property
+    def modes(self):
+        return modes(self)
+
+    @cached_property
+    def dynamics(self):
+        return dynamics(self)
+
+    @property
+    def sun_torque(self) -> float:
+        return self.case.operation.torque
+
+    @cached_property
+    def sweep_frequency(self) -> np.ndarray:
+        return np.linspace(0.25, 1.5, SWEEP_SPEEDS) * 1116.0
+
+
+def outlines(reference: Reference):
+    """Exact outlines of half a tooth sector of each gear."""
+    from femgear.gears.tooth import half_sector
+
+    gears, elements = reference.gears, reference.case.static.flank_elements
+    return [half_sector(gear, flank_elements=elements) for gear in (gears.sun, gears.planet, gears.ring)]
+
+
+def cold_grids(reference: Reference):
+    """Gmsh grids of the three half sectors, nothing cached."""
+    from femgear.fe.meshing import mesh_outlines
+
+    return mesh_outlines(reference.halves, cache=None)
+
+
+def cached_grids(reference: Reference):
+    """The same grids from the cache."""
+    from femgear.fe.meshing import mesh_outlines
+
+    return mesh_outlines(reference.halves, cache=reference.cache)
+
+
+def assembly(reference: Reference):
+    """Stiffness matrices of the three sectors."""
+    from femgear.contact.bodies import RING_STATE, TEETH_STATE
+    from femgear.fe.elasticity import stiffness
+
+    states = (TEETH_STATE, TEETH_STATE, RING_STATE)
+    width = reference.gears.sun.face_width
+    return [
+        stiffness(grid, reference.material, state=state, thickness=width)
+        for grid, state in zip(reference.grids, states)
+    ]
+
+
+def compliance(reference: Reference):
+    """Compliance between all flanks of all teeth of the three bodies."""
+    from femgear.contact.bodies import make_bodies
+
+    return make_bodies(reference.sectors, reference.material)
+
+
+def contact(reference: Reference):
+    """Contact of all meshes at the positions of the case."""
+    from femgear.contact.cycle import walk_mesh_cycle
+
+    positions = reference.case.static.positions
+    return walk_mesh_cycle(
+        reference.gears, reference.bodies, sun_torque=reference.sun_torque, positions=positions
+    )
+
+
+def static(reference: Reference):
+    """The static stage, grids cached."""
+    from femgear import solve_static
+
+    return solve_static(reference.case, cache=reference.cache)
+
+
+def modes(reference: Reference):
+    """The modal stage."""
+    from femgear import solve_modes
+
+    return solve_modes(reference.case, reference.static)
+
+
+def dynamics(reference: Reference):
+    """The dynamic stage: the speeds of the case, with their Floquet verdicts."""
+    from femgear import solve_dynamics
+
+    return solve_dynamics(reference.case, reference.static, reference.modes)
+
+
+def sweep(reference: Reference):
+    """Periodic responses at 1000 speeds."""
+    from femgear.solvers.spectral import solve_spectral
+
+    result, case = reference.modes, reference.case
+    return solve_spectral(
+        result.modes,
+        result.excitation,
+        reference.sweep_frequency,
+        excitation_harmonics=case.dynamics.mesh_harmonics,
+        response_harmonics=case.response_harmonics,
+    )
+
+
+def sweep_verdicts(reference: Reference):
+    """Periodic responses at 1000 speeds and the Floquet verdict of each."""
+    from femgear.solvers.floquet import stability
+
+    result, case = reference.modes, reference.case
+    response = sweep(reference)
+    stability(
+        result.modes,
+        result.excitation,
+        reference.sweep_frequency,
+        excitation_harmonics=case.dynamics.mesh_harmonics,
+    )
+    return response
+
+
+def housing(reference: Reference):
+    """The housing stage."""
+    from femgear import solve_housing
+
+    return solve_housing(reference.case, reference.dynamics)
+
+
+def whole(reference: Reference):
+    """Static, modes, dynamics and housing, grids cached; no pictures."""
+    from femgear import solve_dynamics, solve_housing, solve_modes, solve_static
+
+    case = reference.case
+    still = solve_static(case, cache=reference.cache)
+    basis = solve_modes(case, still)
+    return solve_housing(case, solve_dynamics(case, still, basis))
+
+
+def whole_cold(reference: Reference):
+    """The same with new grids."""
+    from femgear import solve_dynamics, solve_housing, solve_modes, solve_static
+
+    case = reference.case
+    still = solve_static(case)
+    basis = solve_modes(case, still)
+    return solve_housing(case, solve_dynamics(case, still, basis))
+
+
+def help_text(_):
+    """``femgear --help`` in a new process."""
+    command = [sys.executable, "-c", "from femgear.cli import main; main(['--help'])"]
+    subprocess.run(command, check=True, capture_output=True, env=os.environ)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Something to measure.
+
+    Parameters
+    ----------
+    title : str
+    run : callable
+        Given the reference, whose properties in `needs` were asked for before.
+    needs : tuple of str
+    unknowns : callable
+        Given the reference and the result.
+    rounds : int
+    limit : float, optional
+        Time that the project promises [s].
+    """
+
+    title: str
+    run: Callable
+    needs: tuple[str, ...]
+    unknowns: Callable
+    rounds: int = 5
+    limit: float | None = None
+
+
+def _sector_unknowns(reference, _):
+    return 2 * sum(len(grid.points) for grid in reference.grids)
+
+
+def _lines(reference, response):
+    return (
+        response.deflection.shape[1] * (2 * response.deflection.shape[2] - 1) * len(response.mesh_frequency)
+    )
+
+
+def _none(*_):
+    return None
+
+
+STAGES = {
+    "outlines": Stage("outlines of three tooth sectors", outlines, ("gears",), _none, 9),
+    "cold_grids": Stage("grids by Gmsh, cold", cold_grids, ("halves", "grids"), _sector_unknowns, 3),
+    "cached_grids": Stage("grids from the cache", cached_grids, ("halves", "grids"), _sector_unknowns, 9),
+    "assembly": Stage("stiffness matrices", assembly, ("grids",), _sector_unknowns),
+    "compliance": Stage(
+        "flank compliance of all teeth",
+        compliance,
+        ("sectors",),
+        lambda _, b: sum(body.unknowns for body in (b.sun, b.planet, b.ring)),
+    ),
+    "contact": Stage("contact, 64 positions", contact, ("bodies",), lambda _, cycle: cycle.unknowns),
+    "static": Stage("static stage", static, ("grids",), lambda _, r: r.cycle.unknowns),
+    "modes": Stage("modal stage", modes, ("static",), lambda _, r: len(r.model.system.M)),
+    "dynamics": Stage(
+        "dynamics, 2 speeds, with Floquet verdict", dynamics, ("modes",), lambda r, d: _lines(r, d.response)
+    ),
+    "sweep": Stage("sweep of 1000 speeds", sweep, ("modes",), _lines, 3, 1.0),
+    "sweep_verdicts": Stage(
+        "sweep of 1000 speeds with Floquet verdicts", sweep_verdicts, ("modes",), _lines, 3
+    ),
+    "housing": Stage("housing, 2 speeds", housing, ("dynamics",), lambda _, h: h.linear.displacement.size, 9),
+    "whole": Stage("whole computation, grids cached", whole, ("grids",), _none, 3, 3.0),
+    "whole_cold": Stage("whole computation, new grids", whole_cold, (), _none, 3),
+    "help": Stage("femgear --help", help_text, (), _none, 5, 0.5),
+}
+
+
+def baseline():
+    """Fixed work that times are compared with: factor and solve a Laplacian of 160 x 160 points.
+
+    Ratios to it are much the same on machines of different speed.
+    """
+    from scipy.sparse import diags_array, eye_array, kron
+    from scipy.sparse.linalg import splu
+
+    n = 160
+    line = diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
+    laplacian = (kron(line, eye_array(n)) + kron(eye_array(n), line)).tocsc()
+    return splu(laplacian).solve(np.ones((n * n, 8)))

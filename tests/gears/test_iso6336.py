@@ -1,0 +1,46 @@
+"""Limits of the method B stiffness; its values are in tests/validation/test_gear_geometry.py."""
+
+import math
+
+import pytest
+
+from femgear.errors import GeometryError
+from femgear.gears.iso6336 import (
+    basic_rack_factor,
+    blank_factor,
+    mesh_stiffness_method_b,
+    theoretical_single_stiffness,
+)
+
+
+def test_internal_gear_is_the_limit_of_many_teeth():
+    internal = theoretical_single_stiffness(20, math.inf, 0.0, 0.0)
+    assert theoretical_single_stiffness(20, 1e12, 0.0, 0.0) == pytest.approx(internal, rel=1e-10)
+
+
+def test_mean_stiffness_grows_with_the_contact_ratio():
+    single, mean = mesh_stiffness_method_b(20, 40, 0.0, 0.0, 1.0)
+    assert mean == single
+    assert mesh_stiffness_method_b(20, 40, 0.0, 0.0, 2.0)[1] == pytest.approx(1.75 * single)
+
+
+def test_factors():
+    assert basic_rack_factor(dedendum=1.2, pressure_angle=math.radians(20)) == pytest.approx(1.0)
+    assert basic_rack_factor(dedendum=1.25, pressure_angle=math.radians(20)) == pytest.approx(0.975)
+    assert basic_rack_factor(dedendum=1.2, pressure_angle=math.radians(25)) == pytest.approx(1.1)
+    assert blank_factor(web_ratio=1.0, rim_ratio=3.0) == 1.0
+    assert blank_factor(web_ratio=0.1, rim_ratio=0.5) == blank_factor(web_ratio=0.2, rim_ratio=1.0) < 1.0
+
+
+def test_stiffness_scales_with_the_modulus():
+    steel = mesh_stiffness_method_b(20, 40, 0.0, 0.0, 1.6)
+    half = mesh_stiffness_method_b(20, 40, 0.0, 0.0, 1.6, youngs_modulus=103e9)
+    assert half == pytest.approx((steel[0] / 2, steel[1] / 2))
+
+
+def test_numbers_outside_the_method_are_refused():
+    with pytest.raises(GeometryError) as caught:
+        mesh_stiffness_method_b(20, 40, 0.0, 0.0, 0.9)
+    assert caught.value.code == "E-ISO6336"
+    with pytest.raises(GeometryError):
+        theoretical_single_stiffness(10, 40, 20.0, 0.0)

@@ -1,0 +1,168 @@
+"""The scripts: their help, what they write, and that bad input ends in a message, not in a traceback."""
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SCRIPTS = ("mesh_stiffness.py", "load_sharing.py", "housing_modulation.py")
+CASE = ROOT / "cases" / "planetary_27_40_108.toml"
+
+
+def run(name, *arguments, folder):
+    """Run a script as a user does, from a folder that is not the repository."""
+    command = [sys.executable, str(ROOT / "scripts" / name), *map(str, arguments)]
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "COLUMNS": "160"}
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def table(path):
+    """Columns of a CSV file by name: numbers as arrays, texts as lists."""
+    with open(path, newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    columns = {}
+    for name in rows[0]:
+        values = [row[name] for row in rows]
+        columns[name] = np.array(values, float) if name != "mesh" else np.array(values)
+    return columns
+
+
+def is_png(path):
+    return path.read_bytes().startswith(b"\x89PNG\r\n") and path.stat().st_size > 5000
+
+
+@pytest.fixture(scope="module")
+def quick_case(tmp_path_factory):
+    """The reference set on a coarse grid with few positions."""
+    text = CASE.read_text(encoding="utf-8")
+    text = text.replace("positions = 64", "positions = 16\nflank_elements = 8")
+    path = tmp_path_factory.mktemp("case") / "quick.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_help(name, tmp_path):
+    done = run(name, "--help", folder=tmp_path)
+    assert done.returncode == 0
+    assert "--output" in done.stdout and "CASE" in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "code", "message"),
+    [
+        ("mesh_stiffness.py", ["no_such_case.toml"], 2, "no_such_case.toml"),
+        ("mesh_stiffness.py", ["--torque", "20 mm"], 2, "not a unit of torque"),
+        ("mesh_stiffness.py", ["--colour", "blue"], 2, "--colour"),
+        ("load_sharing.py", ["--planet", "7"], 2, "1 to 3"),
+        ("load_sharing.py", ["--gap=-1 um"], 2, "cannot be negative"),
+        ("load_sharing.py", ["--gap", "3"], 2, "needs its unit"),
+        ("housing_modulation.py", ["--harmonic", "50"], 2, "1 to 12"),
+        ("housing_modulation.py", ["--speed", "5 Hz"], 2, "not a unit of speed"),
+        ("housing_modulation.py", ["-o", "/dev/null/x"], 4, "E-STORAGE"),
+    ],
+)
+def test_bad_input_ends_in_a_message(name, arguments, code, message, tmp_path):
+    done = run(name, *arguments, folder=tmp_path)
+    assert done.returncode == code
+    assert message in done.stderr + done.stdout
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_mesh_stiffness_of_two_torques(quick_case, tmp_path):
+    arguments = (
+        "--torque",
+        "50 N m",
+        "--torque",
+        "100 N m",
+        "--positions",
+        "14",
+        "--contact",
+        "line_of_action",
+    )
+    done = run("mesh_stiffness.py", quick_case, *arguments, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "line_of_action; 14 positions" in done.stdout
+    folder = tmp_path / "out" / "mesh_stiffness"
+    assert is_png(folder / "mesh_stiffness.png")
+    data = table(folder / "mesh_stiffness.csv")
+    assert len(data["mesh"]) == 2 * 6 * 14
+    # torque over base radius and planets: 50 N m / (19.0273 mm * 3)
+    half = data["torque [N m]"] == 50
+    base_radius = 0.5 * 27 * 1.5e-3 * np.cos(np.radians(20))
+    np.testing.assert_allclose(data["force [N]"][half], 50 / (3 * base_radius), rtol=1e-7)
+    np.testing.assert_allclose(
+        data["force [N]"],
+        data["secant stiffness [N/m]"] * data["transmission error [m]"],
+        rtol=1e-7,
+    )
+    # a contact stiffens under load
+    assert np.all(data["tangent stiffness [N/m]"] > data["secant stiffness [N/m]"])
+
+
+def test_load_sharing_with_gaps(quick_case, tmp_path):
+    arguments = ("--gap", "0 um", "--gap", "1 um", "--gap", "40 um", "--planet", "2")
+    done = run("load_sharing.py", quick_case, *arguments, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "gap 40 um: planet 2 carries nothing over 100% of the cycle" in done.stdout
+    assert is_png(tmp_path / "load_sharing.png") and is_png(tmp_path / "tooth_loads.png")
+    data = table(tmp_path / "load_sharing.csv")
+
+    def mean_share(gap, planet):
+        return data["share [1]"][(data["gap [m]"] == gap) & (data["planet"] == planet)].mean()
+
+    assert mean_share(0.0, 2) == pytest.approx(1 / 3, rel=1e-6)
+    assert mean_share(40e-6, 2) == 0
+    assert mean_share(40e-6, 1) == pytest.approx(0.5, rel=2e-3)
+    # springs in parallel, 1/k = 1/498 + 1/686 um/N: the planet loses (2/3) k g of 1752 N
+    loss = (1 / 3 - mean_share(1e-6, 2)) * 3
+    assert loss == pytest.approx(2 / 3 / (1 / 498 + 1 / 686) / 1752, rel=0.06)
+    teeth = table(tmp_path / "tooth_loads.csv")
+    chosen = (teeth["mesh"] == "sun-planet 1") & (teeth["gap [m]"] == 0) & (teeth["position [periods]"] == 0)
+    assert teeth["tooth load [N]"][chosen].sum() == pytest.approx(1751.733, rel=1e-5)
+
+
+def test_load_sharing_under_negative_torque_keeps_the_planet_numbers(quick_case, tmp_path):
+    case = tmp_path / "negative.toml"
+    case.write_text(quick_case.read_text().replace('"100 N m"', '"-100 N m"'))
+    done = run(
+        "load_sharing.py", case, "--gap", "3 um", "--planet", "2", "-o", tmp_path / "o", folder=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    data = table(tmp_path / "o" / "load_sharing.csv")
+    shares = [data["share [1]"][data["planet"] == n].mean() for n in (1, 2, 3)]
+    assert shares[1] < 0.27 and shares[0] == pytest.approx(shares[2], rel=1e-6)
+
+
+def test_housing_modulation(quick_case, tmp_path):
+    import pyvista as pv
+
+    done = run("housing_modulation.py", quick_case, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    # the paper reports lines at 108 -+ 3 and six lobes, the window model shows three
+    assert "exact: 6 lobes" in done.stdout and "Hanning: 3 lobes" in done.stdout
+    lines = table(tmp_path / "lines.csv")
+    strongest = lines["carrier order"][np.argsort(-lines["exact [m/s^2]"])[:2]]
+    assert set(strongest) == {105, 111}
+    # identical planets: nothing where the order is no multiple of their number
+    others = lines["carrier order"] % 3 != 0
+    assert lines["exact [m/s^2]"][others].max() < 1e-8 * lines["exact [m/s^2]"].max()
+    for name in ("order_spectrum.png", "envelope.png", "modulation.png"):
+        assert is_png(tmp_path / name)
+    surface = pv.read(tmp_path / "ring_deflection.vtu")
+    np.testing.assert_allclose(np.hypot(*surface.points[:, :2].T), 0.1, rtol=1e-6)
+    # the ring turns against its foundation: torque over k R^2 (2 pi R b), on average
+    along = np.column_stack([-surface.points[:, 1], surface.points[:, 0]]) / 0.1
+    twist = np.einsum("ij,ij->i", surface.point_data["static"][:, :2], along)[:-2].mean()
+    assert abs(twist) == pytest.approx(400 / (1e10 * 0.1**2 * 2 * np.pi * 0.1 * 0.025) * 0.1, rel=0.01)
+    curve = pv.read(tmp_path / "modulation.vtp")
+    assert "envelope [m/s^2]" in curve.point_data
