@@ -247,7 +247,7 @@ def _verdicts(results: Results) -> Iterator[str]:
 def _section(name: str, numbers, pictures, results: Results) -> str:
     blocks = [numbers[name]] if name in numbers else []
     if name == "Housing" and "housing" in results.stages:
-        blocks.append(_bands(results.housing, results.case.dynamics.mesh_harmonics))
+        blocks.append(_bands(results))
     figures = [picture for picture in pictures if picture.section == name]
     if not blocks and not figures:
         return ""
@@ -269,24 +269,29 @@ def _table(block: Block, *, heading: bool = True) -> str:
     return title + table + notes
 
 
-def _bands(housing: xr.Dataset, harmonics: int) -> Block:
+def _bands(results: Results) -> Block:
     """Dominant lines and lobes around every mesh harmonic of the excitation, at a few speeds."""
     from femgear.housing.orders import analyse_band, order_spectrum
 
+    housing, case = results.housing, results.case
     teeth = int(housing.attrs["ring_teeth"])
     rows, threshold = [], 0.0
     count = housing.sizes["speed"]
     for s in sorted({round(i) for i in np.linspace(0, count - 1, min(count, _FEW))}):
         spectrum = order_spectrum(housing["acceleration"].values[s])
-        for h in range(1, harmonics + 1):
+        windowed = _hanning_spectrum(results, s)
+        rpm = float(housing["speed"][s])
+        for h in range(1, case.dynamics.mesh_harmonics + 1):
             if h * teeth + teeth // 2 > spectrum.order[-1]:
                 break
             found = analyse_band(spectrum, teeth, h, count=3)
             threshold = found.lobes.threshold
             lines = [_line(line, h * teeth) for line in found.lines[:2]] + ["-", "-"]
             third = f"{found.lines[2].level:.1f}" if len(found.lines) > 2 else "-"
-            speed = f"{float(housing['speed'][s]):.6g}"
-            rows.append((speed, str(h), str(h * teeth), *lines[:2], third, str(len(found.lobes.position))))
+            hanning = "-" if windowed is None else str(len(analyse_band(windowed, teeth, h).lobes.position))
+            lobes = str(len(found.lobes.position))
+            published = _published(case, rpm, h)
+            rows.append((f"{rpm:.6g}", str(h), str(h * teeth), *lines[:2], third, lobes, hanning, published))
     header = (
         "speed [rpm]",
         "harmonic",
@@ -295,12 +300,48 @@ def _bands(housing: xr.Dataset, harmonics: int) -> Block:
         "second line [m/s²]",
         "third [dB]",
         "lobes",
+        "Hanning lobes",
+        "published",
     )
-    notes = (
+    notes = [
         f"lobes of the envelope a carrier revolution that stand out by {threshold:.0%} of its largest value; "
-        "third: level of the third line below the strongest",
+        "third: level of the third line below the strongest; Hanning lobes: of the classical model, in which "
+        "each planet is heard through a Hanning window while it passes the sensor",
+        *dict.fromkeys(f"published: {entry.source}" for entry in case.housing.published),
+    ]
+    if not case.housing.published:
+        header, rows = header[:-1], [row[:-1] for row in rows]
+    return Block("Around the mesh harmonics", header, tuple(rows), tuple(notes))
+
+
+def _hanning_spectrum(results: Results, speed: int):
+    """Order spectrum of the Hanning-window model with the planet-ring forces of the dynamic solution."""
+    from femgear.case import planetary_set
+    from femgear.housing import fixed_sensor_lines, fixed_sensor_signal, hanning_model, order_spectrum
+
+    if "dynamics" not in results.stages:
+        return None
+    data = results.dynamics
+    ring = [str(name).endswith("ring") for name in data["mesh"].values]
+    force = (data["mesh_force_real"] + 1j * data["mesh_force_imag"]).values[speed][ring]
+    teeth = int(results.housing.attrs["ring_teeth"])
+    field = hanning_model(force, planetary_set(results.case).planet_angles)
+    lines = fixed_sensor_lines(
+        field,
+        teeth,
+        2 * np.pi * float(data["mesh_frequency"][speed]) / teeth,
+        float(results.housing.attrs["sensor_angle"]),
     )
-    return Block("Around the mesh harmonics", header, tuple(rows), notes)
+    return order_spectrum(fixed_sensor_signal(lines).acceleration)
+
+
+def _published(case, rpm: float, harmonic: int) -> str:
+    """What the case file says was published for a speed and mesh harmonic."""
+    for entry in case.housing.published:
+        if entry.harmonic == harmonic and np.isclose(entry.speed * 30 / np.pi, rpm):
+            lobes = "" if entry.lobes is None else f"; {entry.lobes} lobes"
+            return f"{', '.join(map(str, entry.orders))}{lobes}"
+    return "-"
 
 
 def _line(line, centre: int) -> str:

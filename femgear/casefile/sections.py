@@ -185,11 +185,22 @@ class DynamicsSection(_Section):
     tolerance: Number(1e-14, 1e-2) = 1e-6
 
 
+class PublishedLines(_Section):
+    """Lines and lobes around a mesh harmonic that somebody published; the report compares them."""
+
+    speed: _Speed
+    harmonic: Count(1, 1000)
+    orders: Annotated[tuple[Count(0, 10_000_000), ...], Field(min_length=1, max_length=20)]
+    lobes: Count(0, 10_000) | None = None
+    source: Title
+
+
 class HousingSection(_Section):
     """Points of the carrier-frame ring and the fixed sensor."""
 
     points: Count(3, 100_000) = 54
     sensor_angle: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = 0.0
+    published: tuple[PublishedLines, ...] = ()
 
 
 class Case(_Section):

@@ -15,8 +15,8 @@ from femgear.gears.limits import GeometryWarning
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
-BACKLASH_TOLERANCE = 1e-5
-"""Normal backlash, in modules, that counts as none: what five decimals of a profile shift leave open."""
+BACKLASH_TOLERANCE = 1e-4
+"""Normal backlash, in modules, that counts as none: what four decimals of profile shifts leave open."""
 
 ASSEMBLY_TOLERANCE = 1e-6
 """Part of a tooth pitch by which planet angles may miss an assembly position."""

@@ -65,8 +65,8 @@ class Gear:
     Raises
     ------
     GeometryError
-        A value that no gear can have (E-TEETH, E-MODULE, E-PRESSURE-ANGLE, E-FACE-WIDTH, E-RIM, E-RACK,
-        E-ROOT-RADIUS, E-CUTTER, E-TIP, E-POINTED, E-ALLOWANCE, E-VALUE).
+        A value that no gear can have (E-TEETH, E-MODULE, E-PRESSURE-ANGLE, E-SHIFT, E-FACE-WIDTH, E-RIM,
+        E-ALLOWANCE, E-RACK, E-ROOT-RADIUS, E-CUTTER, E-TIP, E-POINTED).
     """
 
     teeth: int

@@ -86,9 +86,8 @@ def mesh_stiffness_method_b(
 ) -> tuple[float, float]:
     """Single stiffness c' and mean mesh stiffness c_gamma_alpha after ISO 6336-1, method B.
 
-    ``c' = c'_th C_M C_R C_B cos(beta)`` with C_M = 0.8, and
-    ``c_gamma_alpha = c' (0.75 eps_alpha + 0.25)``, given for eps_alpha >= 1.2; for spur gears with
-    eps_alpha < 1.2 the standard lets c' be up to 10 % lower, which is not applied here.
+    ``c' = c'_th C_M C_R C_B cos(beta)``, C_M = 0.8, and ``c_gamma_alpha = c' (0.75 eps_alpha + 0.25)``, given
+    for eps_alpha >= 1.2; under it the standard lets c' of spur gears be up to 10 % lower, not applied here.
 
     Parameters
     ----------
@@ -96,10 +95,8 @@ def mesh_stiffness_method_b(
         As for `theoretical_single_stiffness`.
     contact_ratio : float
         Transverse contact ratio eps_alpha, at least 1.
-    dedendum : float
-        Basic rack dedendum in modules; the default 1.2 makes C_B = 1 at 20 deg.
-    pressure_angle : float
-        Normal pressure angle of the rack [rad].
+    dedendum, pressure_angle : float
+        Basic rack [modules, rad]; the defaults make C_B = 1.
     youngs_modulus : float
         Of both gears [Pa]; c' is scaled with E/206 GPa.
     blank_factor : float

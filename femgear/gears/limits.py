@@ -220,7 +220,19 @@ def _check_cutter(gear: Gear) -> None:
             limit=f"whole number 5 .. {gear.teeth - 5}",
             remedy="choose a smaller cutter; 30 teeth, or 12 fewer than the gear, is the default",
         )
-    tool = gear.tool
+    try:
+        tool = gear.tool
+    except GeometryError:
+        _refuse(
+            gear,
+            "profile_shift",
+            f"a cutter of {cutter.teeth} teeth with shift {cutter.profile_shift:.4f} finds no working "
+            f"pressure angle for a flank shifted by {gear.profile_shift:.4f}",
+            code="E-CUTTER",
+            value=gear.profile_shift,
+            limit="inv(alpha_w0) >= 0 between cutter and gear",
+            remedy="increase the profile shift, or take a cutter with fewer teeth or a smaller shift",
+        )
     if not tool.centre_radius > tool.cutter_base_radius:
         _refuse(
             gear,

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from femgear.gears import involute
 from femgear.gears.checks import BACKLASH_TOLERANCE, GeometryWarning, check_set
 from femgear.gears.gear import Gear, working_half_angles
 from femgear.gears.motion import Orientations, Speeds, Torques, orientations, speeds, torques
+from femgear.gears.set_limits import check_angles, check_roles, equal_planet_angles
 
 __all__ = [
     "GeometryWarning",
@@ -67,8 +67,8 @@ class PlanetarySet:
             gear = getattr(self, name)
             if gear.name != name:
                 object.__setattr__(self, name, replace(gear, name=name))
-        _check_roles(self)
-        _check_angles(self.planet_angles)
+        check_roles(self)
+        check_angles(self.planet_angles)
         # both raise when the base circles would overlap
         _ = self.working_pressure_angle_sun_planet, self.working_pressure_angle_planet_ring
 
@@ -168,27 +168,6 @@ class PlanetarySet:
         return _fraction(np.concatenate([sun_planet, planet_ring]))
 
 
-def equal_planet_angles(planets: int) -> tuple[float, ...]:
-    """Angles ``2 pi n / N`` [rad] of N equally spaced planets.
-
-    Raises
-    ------
-    GeometryError
-        Not a whole number of at least one planet (E-PLANETS).
-    """
-    whole = isinstance(planets, int | np.integer) and not isinstance(planets, bool)
-    if not whole or not 1 <= planets <= 1000:
-        raise GeometryError(
-            f"a planetary set with {planets!r} planets",
-            code="E-PLANETS",
-            key="set.planets",
-            value=planets,
-            limit="a whole number, 1 to 1000",
-            remedy="three planets share the load of a set best",
-        )
-    return tuple(2.0 * math.pi * n / int(planets) for n in range(int(planets)))
-
-
 def close_set(
     sun: Gear,
     planet: Gear,
@@ -208,20 +187,17 @@ def close_set(
     centre_distance : float, optional
         [m]; None takes the distance at which the given shifts run without play.
     find : tuple of str
-        Gears whose profile shift is to be found so that the mesh has no play before thickness allowances:
-        ("sun",), ("ring",), ("sun", "ring"), ("sun", "planet"), ("planet", "ring"), or () for none. Without a
-        centre distance one of sun and ring may be found; the mesh without it sets the distance.
-
-    Returns
-    -------
-    PlanetarySet
+        Gears whose profile shift is found so that the mesh has no play before thickness allowances:
+        ("sun",), ("ring",), or with a centre distance any two of "sun", "planet", "ring". Without a distance
+        the mesh that is not to be found sets it.
 
     Raises
     ------
     GeometryError
-        Meshes that ask for different centre distances (E-COAXIAL), a choice of shifts that is not determined
-        (E-FIND), an impossible centre distance (E-CENTRE-DISTANCE), or a gear that the shift found spoils.
+        Meshes that ask for different centre distances (E-COAXIAL), shifts not determined (E-FIND), an
+        impossible centre distance (E-CENTRE-DISTANCE, E-INVOLUTE), or a gear that the shift found spoils.
     """
+    sun, planet, ring = (replace(g, name=n) for g, n in ((sun, "sun"), (planet, "planet"), (ring, "ring")))
     _check_find(find, centre_distance)
     if centre_distance is None:
         centre_distance = _free_distance(sun, planet, ring, find)
@@ -230,17 +206,10 @@ def close_set(
     x_sun, x_planet, x_ring = sun.profile_shift, planet.profile_shift, ring.profile_shift
     if "planet" in find:
         x_planet = x_ring - difference if "sun" in find else total - x_sun
-    if "sun" in find:
-        x_sun = total - x_planet
-    if "ring" in find:
-        x_ring = difference + x_planet
-    return PlanetarySet(
-        sun=_shifted(sun, x_sun),
-        planet=_shifted(planet, x_planet),
-        ring=_shifted(ring, x_ring),
-        centre_distance=centre_distance,
-        planet_angles=planet_angles,
-    )
+    x_sun = total - x_planet if "sun" in find else x_sun
+    x_ring = difference + x_planet if "ring" in find else x_ring
+    shifts = ((sun, x_sun), (planet, x_planet), (ring, x_ring))
+    return PlanetarySet(*(_shifted(g, x) for g, x in shifts), centre_distance, planet_angles)
 
 
 def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, float]:
@@ -248,9 +217,21 @@ def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, f
     alpha = sun.pressure_angle
     out = []
     for one, two in ((sun, planet), (planet, ring)):
-        angle = involute.working_pressure_angle(
-            one.teeth, two.teeth, one.profile_shift, two.profile_shift, alpha, internal=two.internal
-        )
+        shifts = one.profile_shift, two.profile_shift
+        try:
+            angle = involute.working_pressure_angle(
+                one.teeth, two.teeth, *shifts, alpha, internal=two.internal
+            )
+        except GeometryError as error:
+            raise GeometryError(
+                f"no centre distance suits profile shifts {shifts[0]:.4f} ({one.name}) and {shifts[1]:.4f} "
+                f"({two.name}): {error.message}",
+                code=error.code,
+                key=f"{two.name}.profile_shift",
+                value=shifts[1],
+                limit=error.limit,
+                remedy=error.remedy,
+            ) from None
         reference = involute.reference_centre_distance(
             one.teeth, two.teeth, one.module, internal=two.internal
         )
@@ -339,51 +320,4 @@ def _check_find(find: tuple[str, ...], centre_distance: float | None) -> None:
             value=find,
             limit="sun, ring" + ("" if free else ", or two of sun, planet, ring"),
             remedy="fix the other profile shifts",
-        )
-
-
-def _check_roles(planetary: PlanetarySet) -> None:
-    sun, planet, ring = planetary.sun, planetary.planet, planetary.ring
-    for gear, internal in ((sun, False), (planet, False), (ring, True)):
-        if gear.internal is not internal:
-            raise GeometryError(
-                f"the {gear.name} is {'an external' if internal else 'an internal'} gear",
-                code="E-ROLE",
-                key=f"{gear.name}.internal",
-                value=gear.internal,
-                limit="sun and planet external, ring internal",
-            )
-        for entry in ("module", "pressure_angle"):
-            mine, suns = getattr(gear, entry), getattr(sun, entry)
-            if abs(mine - suns) > 1e-12 * suns:
-                raise GeometryError(
-                    f"{entry.replace('_', ' ')} of the {gear.name} is {mine:.6g}, of the sun {suns:.6g}",
-                    code="E-MODULE",
-                    key=f"{gear.name}.{entry}",
-                    value=mine,
-                    limit=f"{suns:.6g}",
-                    remedy="gears that mesh share module and pressure angle",
-                )
-
-
-def _check_angles(angles: tuple[float, ...]) -> None:
-    """Number, order and range of the planet angles."""
-    if not 1 <= len(angles) <= 1000:
-        equal_planet_angles(len(angles))
-    problem = None
-    if not all(math.isfinite(a) for a in angles):
-        problem = "contain a value that is not finite"
-    elif any(b - a < 1e-9 for a, b in pairwise(angles)):
-        problem = "are not in ascending order, or two of them are equal"
-    elif angles[-1] - angles[0] > 2.0 * math.pi - 1e-9:
-        problem = f"span {angles[-1] - angles[0]:.6g} rad, more than one turn (degrees taken for radians?)"
-    if problem:
-        listing = ", ".join(f"{a:.6g}" for a in angles[:12])
-        raise GeometryError(
-            f"the planet angles [{listing}] rad {problem}",
-            code="E-ANGLES",
-            key="set.planet_angles",
-            value=listing,
-            limit="ascending, different, within one turn",
-            remedy="sort the angles; the case file takes them with a unit, such as '120 deg'",
         )

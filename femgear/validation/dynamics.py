@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from femgear.solvers.floquet import stability
@@ -107,12 +109,19 @@ def shooting(
     return np.array(deflection).T, np.linalg.eigvals(transition / scale.T)
 
 
+@dataclass(frozen=True)
 class _ModalSystem:
-    """Modal equations of motion of one speed, the modes left out as static flexibility."""
+    """Modal equations of motion at one speed, the modes left out as static flexibility."""
 
-    def __init__(self, natural, damping, rows, residual, load, rest, signals, mean, speed):
-        self.natural, self.damping, self.rows, self.residual = natural, damping, rows, residual
-        self.load, self.rest, self.signals, self.mean, self.speed = load, rest, signals, mean, speed
+    natural: np.ndarray
+    damping: np.ndarray
+    rows: np.ndarray
+    residual: np.ndarray
+    load: np.ndarray
+    rest: np.ndarray
+    signals: np.ndarray
+    mean: np.ndarray
+    speed: float
 
     @classmethod
     def build(cls, modes: Modes, excitation: MeshExcitation, mesh_frequency: float, harmonics: int):
@@ -208,8 +217,6 @@ def more_time_integration() -> tuple[Row, ...]:
 
 def fixed_point() -> tuple[Row, ...]:
     """Fixed point and direct solution of the same equations, at the damping of the case and at 1 %."""
-    from dataclasses import replace
-
     basis = reference_modes()
     frequency = np.linspace(40.0, 1600.0, 79)
     options = {"response_harmonics": 3 * HARMONICS, "tolerance": 1e-11, "max_iterations": 400}
@@ -263,8 +270,6 @@ def harmonics_kept() -> tuple[Row, ...]:
 
 def modes_kept() -> tuple[Row, ...]:
     """Modes of ring and set, the static flexibility of the others kept or dropped."""
-    from dataclasses import replace
-
     from femgear.analysis import solve_modes as pipeline_modes
     from femgear.solvers.modal import solve_modes
 
@@ -283,9 +288,7 @@ def modes_kept() -> tuple[Row, ...]:
                 max_frequency=factor * top,
             )
             bare = replace(modes, residual=np.zeros_like(modes.residual))
-            errors = [
-                _distance(_periodic(m, basis.excitation, frequency), reference) for m in (modes, bare)
-            ]
+            errors = [_distance(_periodic(m, basis.excitation, frequency), reference) for m in (modes, bare)]
             name = f"{frequency:g} Hz, {len(modes.frequency)} modes below {1e-3 * factor * top:.1f} kHz"
             if factor == 1.0:
                 words = name + ", those of the pipeline: largest difference over peak to peak"

@@ -126,8 +126,8 @@ def _static_images(housing, dynamics, points: int) -> Row:
         "250 rpm, orders 88 to 128: largest line that the static deflection would make [m/s^2]",
         float(np.abs(housing.linear.acceleration[SLOW, orders]).max()),
         float(np.abs(images.acceleration[orders]).max()),
-        note="108 teeth are twice 54 points, so its images fall on the mesh orders; femgear carries the static "
-        "deflection exactly in both forms",
+        note="108 teeth are twice 54 points, so its images fall on the mesh orders; femgear carries the "
+        "static deflection exactly in both forms",
     )
 
 
@@ -141,7 +141,9 @@ def higher_harmonics() -> tuple[Row, ...]:
         counted("paper", PAPER, label + "lower dominating order", 537, low),
         counted("paper", PAPER, label + "upper dominating order", 543, high),
         counted("paper", PAPER, label + "lobes a carrier revolution", 6, fifth.lobes.per_revolution),
-        information("paper", "definition", label + "level of the third line [dB]", None, fifth.lines[2].level),
+        information(
+            "paper", "definition", label + "level of the third line [dB]", None, fifth.lines[2].level
+        ),
     ]
     low, high = _strongest(sixth)
     note = (

@@ -62,7 +62,9 @@ def equilibrium() -> tuple[Row, ...]:
     name = f"{POSITIONS} positions: "
     return (
         at_most("static", "equilibrium", name + "force imbalance of a planet over the load", 1e-9, planets),
-        at_most("static", "equilibrium", name + "sum of the sun's mesh forces over the load, less 1", 1e-9, sun),
+        at_most(
+            "static", "equilibrium", name + "sum of the sun's mesh forces over the load, less 1", 1e-9, sun
+        ),
         at_most("static", "definition", name + "largest load times separation [N m]", 0.0, work),
         at_most("static", "definition", name + "most negative load or separation", 0.0, min(lowest, 0.0)),
         at_most("static", "definition", name + "separation against H p - G q over motion", 1e-9, separation),
@@ -108,7 +110,9 @@ def _changes(label: str, cycle) -> tuple[Row, ...]:
         for (name, _), reference, value in zip(MESHES, before, after, strict=True):
             quantity = f"{label}: {name}, {kind}"
             rows.append(
-                within("convergence", "the case as it stands", quantity, reference * scale, value * scale, gate)
+                within(
+                    "convergence", "the case as it stands", quantity, reference * scale, value * scale, gate
+                )
             )
     return tuple(rows)
 

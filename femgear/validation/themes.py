@@ -8,12 +8,16 @@ from __future__ import annotations
 
 from femgear.validation import (
     contact,
+    dynamics,
     elasticity,
     geometry,
+    housing,
     modulation,
     parametric,
     planetary,
+    ring,
     standard,
+    static,
     two_body,
     vibration,
 )
@@ -86,6 +90,28 @@ THEMES = (
         (two_body.tooth_pairs, two_body.tip_contact),
     ),
     Theme(
+        "static",
+        "Static solution of the reference set",
+        "27/40/108, 100 N m at the sun, 64 positions. The convergence rows compare the case as it stands "
+        "with one numerical parameter changed.",
+        (static.equilibrium, static.iso_stiffness, static.planet_gaps, static.some_random_problems),
+        (static.numerical_parameters, static.element_size, static.random_problems),
+    ),
+    Theme(
+        "ring",
+        "Vibration of the ring",
+        "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress.",
+        (ring.plain_annulus, ring.toothed_ring),
+    ),
+    Theme(
+        "dynamics",
+        "Dynamic response of the reference set",
+        "6 mesh harmonics of the excitation, 5 % modal damping. Differences are those of the mesh "
+        "deflections.",
+        (dynamics.fixed_point, dynamics.harmonics_kept, dynamics.modes_kept, dynamics.time_integration),
+        (dynamics.quasi_static, dynamics.more_time_integration),
+    ),
+    Theme(
         "stability",
         "Parametric stability",
         "G5 and G6: one gear pair of unit mass, contact ratio 1.635, mesh stiffness 1 and 0.65.",
@@ -107,6 +133,20 @@ THEMES = (
             modulation.moving_sensor,
             modulation.linear_interpolation,
             modulation.lobes,
+        ),
+    ),
+    Theme(
+        "housing",
+        "Modulated signal of the reference set",
+        "Radial acceleration at a fixed point of the ring's outer surface; lobes are maxima of the envelope "
+        "with a prominence above a tenth of its largest value. The paper's pair of lines 645/649 at the 6th "
+        "mesh harmonic cannot come from identical planets on a symmetric ring: only orders that are "
+        "multiples of the number of planets are left, and 649 is none.",
+        (
+            housing.symmetry,
+            housing.first_harmonic,
+            housing.interpolation,
+            housing.higher_harmonics,
         ),
     ),
 )

@@ -133,6 +133,7 @@ def test_impossible_sun_is_refused_with_code_and_key(change, code, key):
         ({"cutter": PinionCutter(teeth=105)}, "E-CUTTER", "ring.cutter_teeth"),
         ({"cutter": PinionCutter(teeth=2.5)}, "E-CUTTER", "ring.cutter_teeth"),
         ({"cutter": PinionCutter(teeth=6)}, "E-CUTTER", "ring.cutter_teeth"),
+        ({"cutter": PinionCutter(30, profile_shift=4.0)}, "E-CUTTER", "ring.profile_shift"),
         ({"cutter": PinionCutter(teeth=30, tip_radius=0.6)}, "E-ROOT-RADIUS", "rack.root_radius"),
     ],
 )

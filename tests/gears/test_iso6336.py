@@ -43,4 +43,4 @@ def test_numbers_outside_the_method_are_refused():
         mesh_stiffness_method_b(20, 40, 0.0, 0.0, 0.9)
     assert caught.value.code == "E-ISO6336"
     with pytest.raises(GeometryError):
-        theoretical_single_stiffness(10, 40, 20.0, 0.0)
+        theoretical_single_stiffness(20, 5, 0.0, 10.0)

@@ -150,6 +150,12 @@ def test_sets_whose_meshes_want_different_centre_distances_are_refused():
     assert "50.25" in str(caught.value) and "51.0" in str(caught.value)
 
 
+def test_shifts_without_any_centre_distance_are_refused():
+    with pytest.raises(GeometryError) as caught:
+        close_set(*gears((27, 40, 108), shifts=(0.0, -1.5, 0.0)), planet_angles=(0.0,))
+    assert (caught.value.code, caught.value.key) == ("E-INVOLUTE", "planet.profile_shift")
+
+
 @pytest.mark.parametrize("find", [("sun", "planet", "ring"), ("planet",), ("sun", "sun"), ("carrier",)])
 def test_undetermined_shifts_are_refused(find):
     with pytest.raises(GeometryError) as caught:

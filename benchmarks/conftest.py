@@ -1,0 +1,42 @@
+"""Fixtures of the benchmarks, and the table that a run of them prints or writes."""
+
+import os
+import sys
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).parent))
+
+import pytest
+from table import page, rows_of
+
+
+def pytest_addoption(parser):
+    parser.addoption("--page", type=Path, help="write the table to this Markdown file")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread():
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        yield
+
+
+@pytest.fixture(scope="session")
+def reference():
+    from stages import Reference
+
+    return Reference()
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    session = getattr(config, "_benchmarksession", None)
+    rows = rows_of(session.benchmarks) if session else []
+    if not rows:
+        return
+    text = page(rows)
+    terminalreporter.write_line("")
+    terminalreporter.write_line(text)
+    if config.option.page:
+        config.option.page.write_text(text, encoding="utf-8")

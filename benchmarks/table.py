@@ -1,0 +1,88 @@
+"""Benchmark results as a Markdown page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+BASELINE = "baseline"
+
+HEAD = """# Benchmarks
+
+Time and peak memory of every stage of the reference case (`cases/planetary_27_40_108.toml`), in one
+process with one BLAS thread. Times are medians. Seconds depend on the machine and on what else it does; the
+column *ratio* divides them by the time of a fixed piece of work measured in the same run: factor a Laplacian
+of 160 x 160 points with SciPy's `splu` and solve for 8 right-hand sides ({baseline:.1f} ms here). *Peak* is
+the resident memory of a fresh process at its highest during the stage, *added* how much of it came with the
+stage; both contain the libraries that the stage loads. *Limit* is the time that the project promises.
+
+This page is written by `make bench ARGS="--page docs/benchmarks.md"`.
+
+"""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One benchmark: its group, title, median time [s], and what it noted."""
+
+    group: str
+    title: str
+    median: float
+    info: dict
+
+
+def rows_of(benchmarks) -> list[Row]:
+    """Rows of the benchmarks of a pytest-benchmark session."""
+    return [
+        Row(b.group or "", b.extra_info.get("title", b.name), b.stats.median, dict(b.extra_info))
+        for b in benchmarks
+        if b.stats.rounds
+    ]
+
+
+def page(rows: list[Row]) -> str:
+    """Markdown page with one table a group."""
+    base = next((row.median for row in rows if row.group == BASELINE), None)
+    text = HEAD.format(baseline=1e3 * base) if base else "# Benchmarks\n\n"
+    # the stages, which have unknowns, come first
+    for group in dict.fromkeys(row.group for row in sorted(rows, key=lambda row: "unknowns" not in row.info)):
+        chosen = [row for row in rows if row.group == group]
+        if group == BASELINE:
+            continue
+        text += f"## {group}\n\n" + (
+            _stages(chosen, base) if "unknowns" in chosen[0].info else _plain(chosen, base)
+        )
+        text += "\n"
+    return text.rstrip() + "\n"
+
+
+def _stages(rows, base) -> str:
+    lines = [
+        "| stage | unknowns | time [ms] | ratio | limit [ms] | peak [MB] | added [MB] |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for row in rows:
+        info = row.info
+        unknowns = f"{info['unknowns']:,}".replace(",", " ") if info["unknowns"] else ""
+        limit = f"{1e3 * info['limit']:.0f}" if info.get("limit") else ""
+        memory = [f"{info[key]:.0f}" if key in info else "" for key in ("peak", "added")]
+        lines.append(
+            f"| {row.title} | {unknowns} | {_ms(row.median)} | {_ratio(row.median, base)} | {limit} | "
+            f"{memory[0]} | {memory[1]} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _plain(rows, base) -> str:
+    lines = ["| route | time [ms] | ratio | note |", "|---|---:|---:|---|"]
+    for row in rows:
+        note = row.info.get("note", "")
+        lines.append(f"| {row.title} | {_ms(row.median)} | {_ratio(row.median, base)} | {note} |")
+    return "\n".join(lines) + "\n"
+
+
+def _ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g}" if seconds < 1 else f"{1e3 * seconds:.0f}"
+
+
+def _ratio(seconds: float, base: float | None) -> str:
+    return f"{seconds / base:.3g}" if base else ""
