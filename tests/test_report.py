@@ -132,7 +132,7 @@ def test_bands_of_an_amplitude_modulated_signal(tmp_path):
     row = next(row for row in page.rows if row[:3] == ["250", "2", "216"])
     assert row[3] == "216: 1"
     assert row[4] in ("210 = 216 − 6: 0.25", "222 = 216 + 6: 0.25")
-    assert row[5:] == ["-12.0", "6"]
+    assert row[5:] == ["-12.0", "6", "3", "-"]
     assert "10% of its largest value" in "".join(page.text)
 
 
