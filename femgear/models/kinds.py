@@ -46,15 +46,19 @@ def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, plane
     for n in range(len(share)):
         folded = n % N
         classes[min(folded, N - folded)] += share[n]
+    # planet modes of different classes coincide on a rigid ring, where any mixture of them is a mode
+    kinetic = np.vstack([classes[:2], classes[2:].sum(axis=0)])
     kinds = []
     for m in range(energy.shape[1]):
         if frequency[m] == 0.0:
             kinds.append("rigid")
             continue
-        best = int(classes[:, m].argmax())
-        name = ("rotational", "translational")[best] if best < 2 else "planet"
-        if classes[best, m] < 0.99 * total[m]:
-            name = "mixed"
+        best = int(kinetic[:, m].argmax())
+        name = (
+            ("rotational", "translational", "planet")[best]
+            if kinetic[best, m] >= 0.99 * total[m]
+            else "mixed"
+        )
         kinds.append(f"ring, {name}" if ring[:, m].sum() > 0.5 * total[m] else name)
     moves = share.sum(axis=0) > 1e-3 * total
     return tuple(kinds), np.where(moves, share.argmax(axis=0), -1)

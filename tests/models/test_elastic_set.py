@@ -108,7 +108,7 @@ def test_rotation_of_the_mechanism_is_the_zero_mode(sector, ring, planets, torqu
     assert np.abs(system.K @ q).max() < 1e-12 * np.abs(system.K).max()
     assert abs(system.load @ q) < 1e-12 * np.abs(system.load) @ np.abs(q)
     modes = solve_modes(system, np.full(2 * planets, 5e8), damping_ratio=0.0, count=4)
-    assert list(modes.frequency == 0) == [True, False, False, False]
+    assert list(modes.frequency[:4] == 0) == [True, False, False, False]
     found = modes.shape[:, 0]
     assert found == pytest.approx(q * found[place(model, "sun: rotation")], abs=1e-8 * np.abs(found).max())
 
@@ -223,14 +223,11 @@ def test_mesh_directions_are_derivatives_of_the_separation(sector, ring, side):
 
 
 def test_mesh_directions_fit_the_separations_of_the_contact_problem():
-    """Turning the sun and moving the planet outwards change the candidates' separations as W says."""
+    """Moving the planet outwards changes the candidates' separations as W says."""
     gears = gear_set()
     for pair, sign in zip(mesh_pairs(gears), (1.0, -1.0)):
         step = 1e-7
-        at_rest = separation(pair, 0.0, pair.pitch_roll_1)[0]
-        assert abs(at_rest) < 1e-12
-        turned = separation(pair, pair.base_radius_1 * step, np.linspace(0.9, 1.1, 2001) * pair.pitch_roll_1)
-        assert turned[0].min() / step == pytest.approx(-pair.base_radius_1, rel=1e-6)
+        assert abs(separation(pair, 0.0, pair.pitch_roll_1)[0]) < 1e-12
         # the centres move apart: W has the sine of the working angle along the line of centres
         apart = replace(pair, centre_distance=pair.centre_distance + step)
         moved = separation(apart, 0.0, np.linspace(0.99, 1.01, 2001) * pair.pitch_roll_1)[0]
@@ -248,30 +245,30 @@ def test_back_flanks_have_the_same_frequencies(sector, ring):
 
 
 def test_ring_on_its_foundation_is_the_whole_ring_of_finite_elements():
-    """Static deflection under unit mesh forces, all nodal diameters, against one sparse solve of all teeth."""
-    common = dict(module=3e-3, pressure_angle=np.deg2rad(20), face_width=0.02)
+    """Static deflection under unit mesh forces, all nodal diameters, against a sparse solve of all teeth."""
+    common = dict(module=2e-3, pressure_angle=np.deg2rad(20), face_width=0.02)
     gears = PlanetarySet(
-        Gear(teeth=12, profile_shift=0.4, rim_radius=0.006, **common),
-        Gear(teeth=12, profile_shift=0.4, rim_radius=0.006, **common),
-        Gear(teeth=36, profile_shift=1.2, rim_radius=0.072, internal=True, **common),
-        centre_distance=0.0375,
+        Gear(teeth=18, profile_shift=0.0, rim_radius=0.009, **common),
+        Gear(teeth=18, profile_shift=0.0, rim_radius=0.009, **common),
+        Gear(teeth=54, profile_shift=0.0, rim_radius=0.066, internal=True, **common),
+        centre_distance=0.036,
         planet_angles=equal_planet_angles(3),
     )
     sector = make_sectors(gears, STEEL, flank_elements=4).ring
-    ring = make_ring(sector, gears, foundation_stiffness=1e11, max_diameter=18)
+    ring = make_ring(sector, gears, foundation_stiffness=1e11, max_diameter=27)
     model = make(gears, ring)
-    whole = rotated_copies(sector.grid, 36)
+    whole = rotated_copies(sector.grid, 54)
     width, state = 0.02, {"tooth": "plane strain", "body": "plane stress"}
     K = stiffness(whole, STEEL, state=state, thickness=width)
     K = K + foundation(whole, "rim", 1e11, 1e11, thickness=width)
     load = active_flank_load(sector.grid, gears, 1.0).reshape(-1, 2)
-    nodes = copy_nodes(sector.grid, 36)
+    nodes = copy_nodes(sector.grid, 54)
     columns = np.zeros((2 * whole.n_nodes, 3))
     for n in range(3):
         angle = 2 * np.pi * n / 3
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         for axis in range(2):
-            np.add.at(columns[:, n], 2 * nodes[12 * n] + axis, (load @ turn.T)[:, axis])
+            np.add.at(columns[:, n], 2 * nodes[18 * n] + axis, (load @ turn.T)[:, axis])
     direct = columns.T @ np.column_stack([spsolve(K.tocsc(), column) for column in columns.T])
     teeth = 2 * np.pi * np.arange(3) / 3
     R = ring_displacement(ring.modes, model.ring_mode, model.ring_phase, teeth)

@@ -45,27 +45,19 @@ def solve(K, mass):
     return np.sqrt(np.maximum(values, 0)) / (2 * np.pi), vectors / root[:, None]
 
 
-def kinds_of(K, mass, names, psi, *, ring=()):
+def kinds_of(K, mass, names, psi):
+    """Frequencies, kinds and nodal diameters, with one ring coordinate that nothing moves."""
     frequency, shape = solve(K, mass)
-    n = len(names)
-    diameters = np.array(ring, int) if len(ring) else np.zeros(1, int)
-    where = slice(n, n + len(ring)) if len(ring) else slice(n, n)
-    if not len(ring):  # a ring coordinate that nothing moves
-        shape, mass, where = (
-            np.vstack([shape, np.zeros(shape.shape[1])]),
-            np.append(mass, 1.0),
-            slice(n, n + 1),
-        )
-    kinds, found = mode_kinds(
-        shape,
-        mass,
+    kinds, diameter = mode_kinds(
+        np.vstack([shape, np.zeros(shape.shape[1])]),
+        np.append(mass, 1.0),
         names,
         frequency=frequency,
-        ring_diameter=diameters,
-        ring_slice=where,
+        ring_diameter=np.zeros(1, int),
+        ring_slice=slice(len(names), len(names) + 1),
         planet_angles=psi,
     )
-    return frequency, kinds, found
+    return frequency, kinds, diameter
 
 
 @pytest.mark.parametrize("planets", [3, 4, 5, 6])
