@@ -190,7 +190,9 @@ def solve_modes(case: Case, static: StaticResult) -> ModesResult:
     excitation = mesh_excitation(
         cycle.stiffness, cycle.deflection, cycle.force, compliance, backlash=_backlash(gears)
     )
-    model = elastic_set(gears, ring, **_bodies_of(case), sun_torque=static.sun_torque)
+    model = elastic_set(
+        gears, ring, **_bodies_of(case), sun_torque=static.sun_torque, driven=case.operation.input
+    )
     modes = modal_basis(
         model.system,
         excitation.stiffness.mean(axis=1),

@@ -119,7 +119,6 @@ def run(
     force
         Replace the results that the folder holds.
     """
-    from femgear import analysis
     from femgear.case import planetary_set, read_case
     from femgear.run import run_case
     from femgear.storage import open_results, prepare_output

@@ -19,7 +19,7 @@ from femgear.storage import Results, open_results
 from femgear.summary import Block, describe_case, describe_results
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 _LARGEST_PICTURE = 8_000_000  # bytes
 _KINDS = {".png": "image/png", ".gif": "image/gif"}

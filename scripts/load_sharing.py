@@ -75,7 +75,7 @@ def _checked(gap: float, text: str) -> float:
 def _solve(case, gears, gaps, planet, progress):
     """One mesh cycle for each gap; grids and compliances are made once."""
     from femgear.contact.bodies import make_bodies, make_sectors
-    from femgear.contact.mirrored import mirrored_set, walk_either_flank
+    from femgear.contact.mirrored import walk_either_flank
     from femgear.fe.elasticity import Material
     from femgear.gears import torques
     from femgear.run import grid_cache
@@ -86,8 +86,6 @@ def _solve(case, gears, gaps, planet, progress):
     bodies = make_bodies(sectors, material, depth=case.static.depth)
     progress("compliance", 1, 1)
     sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
-    # under a negative torque the set is solved in its mirror image, where the planets have other numbers
-    order = mirrored_set(gears)[1] if sun_torque < 0 else np.arange(gears.n_planets)
     cycles = []
     for gap in gaps:
         separation = np.zeros(gears.n_planets)
@@ -98,7 +96,7 @@ def _solve(case, gears, gaps, planet, progress):
             sun_torque=sun_torque,
             positions=case.static.positions,
             contact=case.static.contact,
-            planet_gaps=separation[order],
+            planet_gaps=separation,
             progress=lambda done, total, gap=gap: progress(f"gap {gap * 1e6:g} um", done, total),
         )
         cycles.append(cycle)

@@ -16,11 +16,12 @@ IMAGES = (
     "modulation_250_rpm.png",
     "order_spectrum_250_rpm.png",
 )
+FOLDER = Path(__file__).resolve().parents[1] / "docs" / "images"
 LARGEST = 300_000
 
 
-def main(results: Path, /, *, output: Path = Path(__file__).resolve().parents[1] / "docs" / "images") -> None:
-    """Write the pictures that the README and docs/ show, with few colours, each below 300 kB.
+def main(results: Path, /, *, output: Path = FOLDER) -> None:
+    """Write the pictures that the README and docs/ show, in 256 colours, each below 300 kB.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ def main(results: Path, /, *, output: Path = Path(__file__).resolve().parents[1]
     folder = open_results(results).folder
     for name in ready_images(folder):
         with Image.open(folder / name) as picture:
-            small = picture.convert("RGB").quantize(64)
+            small = picture.convert("RGB").quantize(256)
         stream = io.BytesIO()
         small.save(stream, format="png", optimize=True)
         data = stream.getvalue()

@@ -258,8 +258,8 @@ class Case(_Section):
 
     @property
     def response_harmonics(self) -> int:
-        """Harmonics of the response: as given, or twice those of the mesh."""
-        return self.dynamics.response_harmonics or 2 * self.dynamics.mesh_harmonics
+        """Harmonics of the response: as given, or three times those of the mesh."""
+        return self.dynamics.response_harmonics or 3 * self.dynamics.mesh_harmonics
 
 
 def cross_check(case: Case) -> list[CaseError]:

@@ -25,16 +25,22 @@ def mirrored_set(planetary_set):
     return replace(planetary_set, planet_angles=tuple(angles[0] + turned[order])), order
 
 
-def walk_either_flank(planetary_set, bodies, *, sun_torque, progress=None, **options) -> MeshCycle:
+def walk_either_flank(
+    planetary_set, bodies, *, sun_torque, positions=64, contact="profile", planet_gaps=None, progress=None
+) -> MeshCycle:
     """`walk_mesh_cycle` for a torque of either sign; results keep the order of planets and positions.
 
     For a negative torque the right flanks of the sun carry. Position zero is then where the right flanks of
     "sun-planet 1" touch at the pitch point, and positions still run with the rotation of the sun.
     """
+    options = {"positions": positions, "contact": contact, "progress": progress}
     if sun_torque >= 0:
-        return walk_mesh_cycle(planetary_set, bodies, sun_torque=sun_torque, progress=progress, **options)
+        return walk_mesh_cycle(
+            planetary_set, bodies, sun_torque=sun_torque, planet_gaps=planet_gaps, **options
+        )
     mirrored, order = mirrored_set(planetary_set)
-    cycle = walk_mesh_cycle(mirrored, bodies, sun_torque=-sun_torque, progress=progress, **options)
+    turned = None if planet_gaps is None else np.asarray(planet_gaps, float)[order]
+    cycle = walk_mesh_cycle(mirrored, bodies, sun_torque=-sun_torque, planet_gaps=turned, **options)
     N, P = len(order), len(cycle.position)
     back = np.empty(N, int)
     back[order] = np.arange(N)

@@ -84,6 +84,7 @@ def elastic_set(
     motor: ShaftData | None,
     brake: ShaftData | None,
     sun_torque: float,
+    driven: str = "sun",
 ) -> ElasticSet:
     """Assemble the mechanical system.
 
@@ -94,10 +95,14 @@ def elastic_set(
     sun, carrier, planet : BodyData
         Stiffness is the support of sun and carrier, and the bearing between a planet and the carrier.
     motor, brake : ShaftData, optional
-        Inertias behind springs at the sun and at the carrier.
+        Inertias behind springs at the driven member and at the output; without one, its torque acts on the
+        member itself.
     sun_torque : float
         Torque on the sun [N m]; its sign tells which flanks carry.
+    driven : {"sun", "carrier"}
+        Input member.
     """
+    motor_shaft, brake_shaft = ("motor", motor), ("brake", brake)
     names = rigid_dofs(planetary_set.n_planets, motor is not None, brake is not None)
     place = {name: i for i, name in enumerate(names)}
     n_rigid = len(names)
@@ -110,7 +115,8 @@ def elastic_set(
     M[n_rigid:] = 1.0
     K[range(n_rigid, n), range(n_rigid, n)] = (2 * np.pi * modes.frequency[ring_mode]) ** 2
     _place_bodies(M, K, place, planetary_set, sun, carrier, planet)
-    _place_shafts(M, K, load, place, planetary_set, motor, brake, sun_torque)
+    shafts = (motor_shaft, brake_shaft) if driven == "sun" else (brake_shaft, motor_shaft)
+    _place_shafts(M, K, load, place, planetary_set, shafts, sun_torque)
     side = 1.0 if sun_torque >= 0 else -1.0
     rigid = np.zeros_like(W)
     _mesh_directions(rigid, place, planetary_set, side)
@@ -169,12 +175,10 @@ def _place_bodies(M, K, place, planetary_set, sun, carrier, planet):
             K += planet.stiffness * np.outer(column, column)
 
 
-def _place_shafts(M, K, load, place, planetary_set, motor, brake, sun_torque):
+def _place_shafts(M, K, load, place, planetary_set, shafts, sun_torque):
     ratio = 1.0 + planetary_set.ring.teeth / planetary_set.sun.teeth
-    for name, shaft, member, torque in (
-        ("motor", motor, "sun", sun_torque),
-        ("brake", brake, "carrier", -ratio * sun_torque),
-    ):
+    torques = {"sun": sun_torque, "carrier": -ratio * sun_torque}
+    for (name, shaft), (member, torque) in zip(shafts, torques.items(), strict=True):
         end = place[f"{member}: rotation"]
         if shaft is not None:
             i = place[f"{name}: rotation"]

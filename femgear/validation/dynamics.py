@@ -274,8 +274,8 @@ def modes_kept() -> tuple[Row, ...]:
     from femgear.solvers.modal import solve_modes
 
     basis = reference_modes()
-    fine = pipeline_modes(_changed(dynamics__response_harmonics=4 * HARMONICS), reference_static())
-    top = 4 * HARMONICS * 1116.0
+    fine = pipeline_modes(_changed(dynamics__response_harmonics=6 * HARMONICS), reference_static())
+    top = 6 * HARMONICS * 1116.0
     rows = []
     for frequency in (90.0, 1116.0):
         reference = _periodic(fine.modes, fine.excitation, frequency)

@@ -22,7 +22,7 @@ carrier = { mass = "3 kg", inertia = "6e-3 kg m^2", support_stiffness = "2e8 N/m
 motor = { inertia = "0.02 kg m^2", coupling_stiffness = "400 N m/rad" }
 brake = { inertia = "0.2 kg m^2", coupling_stiffness = "5000 N m/rad" }
 static = { positions = 64, contact = "profile" }
-dynamics = { damping_ratio = 0.05, mesh_harmonics = 6, response_harmonics = 12, tolerance = 1e-6 }
+dynamics = { damping_ratio = 0.05, mesh_harmonics = 6, response_harmonics = 18, tolerance = 1e-6 }
 housing = { points = 54, sensor_angle = "0 deg" }
 
 [sun]

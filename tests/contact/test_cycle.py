@@ -124,6 +124,12 @@ def test_other_flanks_are_the_mirror_image(gears, bodies, cycle):
     assert np.abs(back.tooth_load.sum(axis=1) - back.force).max() < 1e-6
 
 
+def test_gap_stays_with_its_planet_on_the_other_flanks(gears, bodies):
+    gaps = [0.0, 3e-6, 0.0]
+    back = walk_either_flank(gears, bodies, sun_torque=-TORQUE, positions=8, planet_gaps=gaps)
+    assert (back.load_share[1] < 0.3).all() and (back.load_share[[0, 2]] > 0.35).all()
+
+
 def test_line_of_action_differs_only_near_the_ends_of_the_path(gears, bodies, cycle):
     rigid = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=32, contact="line_of_action")
     assert rigid.contact == "line_of_action" and cycle.contact == "profile"

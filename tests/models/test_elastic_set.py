@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from femgear.contact.assembly import mesh_pairs
 from femgear.contact.bodies import active_flank_load, make_sectors
@@ -171,15 +171,16 @@ def base_tangent_gap(rb, centres, angles, *, internal, side):
     The string of gear 1 unwinds in the direction of motion; `angles` are those of the involutes' origins.
     """
     line = centres[1] - centres[0]
-    distance, direction = np.hypot(*line), np.arctan2(line[1], line[0])
+    distance = np.hypot(*line)
     if not internal:
+        direction = np.arctan2(line[1], line[0])
         working = np.arccos((rb[0] + rb[1]) / distance)
         first = side * (angles[0] - (direction - side * working))
         second = side * (angles[1] - (direction - side * working + np.pi))
         return distance * np.sin(working) - rb[0] * first - rb[1] * second
     # gear 2 is internal and gear 1 lies on the other side of its centre
     working = np.arccos((rb[1] - rb[0]) / distance)
-    tangent = direction + np.pi + side * working
+    tangent = np.arctan2(-line[1], -line[0]) + side * working
     first, second = (-side * (angle - tangent) for angle in angles)
     return rb[1] * second - rb[0] * first - distance * np.sin(working)
 
@@ -254,7 +255,7 @@ def test_ring_on_its_foundation_is_the_whole_ring_of_finite_elements():
         centre_distance=0.036,
         planet_angles=equal_planet_angles(3),
     )
-    sector = make_sectors(gears, STEEL, flank_elements=4).ring
+    sector = make_sectors(gears, STEEL, flank_elements=4, refine=0.6).ring
     ring = make_ring(sector, gears, foundation_stiffness=1e11, max_diameter=27)
     model = make(gears, ring)
     whole = rotated_copies(sector.grid, 54)
@@ -269,7 +270,9 @@ def test_ring_on_its_foundation_is_the_whole_ring_of_finite_elements():
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         for axis in range(2):
             np.add.at(columns[:, n], 2 * nodes[18 * n] + axis, (load @ turn.T)[:, axis])
-    direct = columns.T @ np.column_stack([spsolve(K.tocsc(), column) for column in columns.T])
+    direct = columns.T @ splu(K.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(
+        columns
+    )
     teeth = 2 * np.pi * np.arange(3) / 3
     R = ring_displacement(ring.modes, model.ring_mode, model.ring_phase, teeth)
     omega2 = np.diag(model.system.K)[model.ring_slice]
@@ -335,3 +338,21 @@ def test_meshes_that_cannot_be_linearised_are_refused():
     with pytest.raises(ContactError) as caught:
         mesh_excitation(k, still, force, 30 * C, backlash=0.0)
     assert caught.value.code == "E-RING-COMPLIANCE"
+
+
+def test_motor_and_brake_follow_the_driven_member():
+    """With the carrier driven the motor hangs on the carrier and the brake on the sun; loads stay balanced."""
+    from femgear.analysis import solve_modes, solve_static
+    from femgear.case import with_value
+    from femgear.validation.reference import reference_case
+
+    case = with_value(reference_case(), "operation.input", "carrier")
+    case = with_value(case, "static.positions", 16)
+    model = solve_modes(case, solve_static(case)).model
+    system = model.system
+    place = {name: i for i, name in enumerate(system.dofs)}
+    motor, brake = place["motor: rotation"], place["brake: rotation"]
+    assert system.K[motor, place["carrier: rotation"]] == -400.0
+    assert system.K[brake, place["sun: rotation"]] == -5000.0
+    assert system.load[motor] == pytest.approx(100.0)
+    assert system.load[brake] == pytest.approx(-20.0)

@@ -1,0 +1,126 @@
+"""The pipeline as a whole: limits that join its stages, mirrored torque, refusals."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.analysis import max_nodal_diameter, solve_dynamics, solve_housing, solve_modes, solve_static
+from femgear.case import read_case, with_value
+from femgear.errors import CaseError
+from femgear.housing.orders import OrderSpectrum, symmetry_leakage
+from femgear.solvers.harmonics import sample
+from femgear.validation.reference import reference_case
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def case():
+    coarse = with_value(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), "static.positions", 32)
+    return with_value(coarse, "static.flank_elements", 12)
+
+
+@pytest.fixture(scope="module")
+def static(case):
+    return solve_static(case)
+
+
+@pytest.fixture(scope="module")
+def dynamics(case, static):
+    return solve_dynamics(case, static, solve_modes(case, static))
+
+
+def test_the_validation_tables_take_the_case_of_the_repository():
+    file = read_case(ROOT / "cases" / "planetary_27_40_108.toml").model_dump()
+    table = reference_case().model_dump()
+    # what the paper published is compared by the tables themselves
+    for data in (file, table):
+        data["housing"] = {key: data["housing"][key] for key in ("points", "sensor_angle")}
+    assert table == file
+
+
+def test_at_standstill_the_dynamic_transmission_error_is_the_static_one(case, static):
+    """1 rpm, all harmonics that 32 positions hold; with a stiff foundation the means agree as well."""
+    for key, value in {
+        "operation.speeds": ["1 rpm"],
+        "dynamics.response_harmonics": 30,
+        "dynamics.mesh_harmonics": 15,
+        "ring.foundation_radial": "1e17 N/m^3",
+        "ring.foundation_tangential": "1e17 N/m^3",
+    }.items():
+        case = with_value(case, key, value)
+    result = solve_dynamics(case, static, solve_modes(case, static))
+    dte = sample(result.dte[0], 64)[:, ::2]
+    spectrum = np.fft.rfft(static.cycle.deflection, axis=1)
+    spectrum[:, 16] = 0.0  # 32 positions do not tell the phase of the 16th
+    ste = np.fft.irfft(spectrum, 32, axis=1)
+    assert np.abs(dte - ste).max(axis=1) == pytest.approx(0, abs=1e-3 * np.ptp(ste, axis=1).min())
+    assert dte.mean(axis=1) == pytest.approx(ste.mean(axis=1), rel=1e-4)
+    force = sample(result.response.force[0], 64)
+    assert force == pytest.approx(100 / static.planetary_set.sun.base_radius / 3, rel=1e-3)
+
+
+def test_mean_deflection_of_the_ring_on_its_foundation_is_the_static_one_plus_the_rings(
+    case, static, dynamics
+):
+    """Mesh springs carry the static means; what the ring gives way comes on top."""
+    mean = dynamics.dte[:, :, 0].real
+    assert mean[0, :3] == pytest.approx(static.cycle.deflection[:3].mean(axis=1), rel=2e-3)
+    assert (mean[0, 3:] > static.cycle.deflection[3:].mean(axis=1)).all()
+
+
+def test_planets_in_phase_leave_only_multiples_of_three(case, dynamics):
+    housing = solve_housing(case, dynamics)
+    for lines in (housing.exact, housing.linear):
+        for one in lines.acceleration:
+            assert symmetry_leakage(OrderSpectrum(lines.order, one), 3) < 1e-7
+
+
+def test_mesh_harmonics_of_the_force_balance_the_torque(dynamics, static):
+    force = dynamics.response.force[:, :, 0].real
+    share = static.sun_torque / static.planetary_set.sun.base_radius / 3
+    assert force == pytest.approx(share, rel=1e-6)
+    assert np.all(np.abs(dynamics.stability.multiplier) < 1)
+
+
+def test_negative_torque_runs_the_cycle_backwards(case, static):
+    """The back flanks of a symmetric set are its mirror image."""
+    back_case = with_value(case, "operation.torque", "-100 N m")
+    back = solve_static(back_case)
+    turned = -np.arange(32) % 32
+    assert back.cycle.deflection == pytest.approx(static.cycle.deflection[:, turned], abs=1e-11)
+    modes = solve_modes(back_case, back)
+    assert modes.modes.frequency == pytest.approx(
+        solve_modes(case, static).modes.frequency, rel=1e-6, abs=1e-3
+    )
+    assert np.isfinite(solve_dynamics(back_case, back, modes).dte).all()
+
+
+def test_modes_need_a_fixed_ring(case):
+    freed = with_value(case, "operation.fixed", "carrier")
+    static = solve_static(with_value(freed, "static.positions", 13))
+    with pytest.raises(CaseError, match="fixed ring") as caught:
+        solve_modes(freed, static)
+    assert caught.value.code == "E-FIXED-MEMBER"
+
+
+def test_without_torque_static_is_defined_and_modes_are_refused(case):
+    empty = with_value(with_value(case, "operation.torque", "0 N m"), "static.positions", 13)
+    static = solve_static(empty)
+    assert not static.cycle.force.any()
+    with pytest.raises(CaseError) as caught:
+        solve_modes(empty, static)
+    assert caught.value.code == "E-NO-LOAD"
+
+
+def test_progress_counts_the_positions(case):
+    seen = []
+    short = with_value(case, "static.positions", 13)
+    solve_static(short, progress=lambda *step: seen.append(step))
+    assert seen[-1] == ("contact", 13, 13)
+
+
+@pytest.mark.parametrize(("points", "expected"), [(54, 26), (7, 3), (1000, 53)])
+def test_nodal_diameters_are_those_that_the_points_resolve(case, points, expected):
+    assert max_nodal_diameter(with_value(case, "housing.points", points)) == expected
