@@ -159,7 +159,7 @@ def write_ring_modes(folder: Path, case: Case, static: StaticResult, *, cache: P
     grid = ring_modes_grid(sector.grid, modes, range(len(modes.frequency)))
     write_vtu(grid, folder / "ring_modes.vtu")
     shown = int(np.flatnonzero(modes.nodal_diameter == 3)[0])
-    field = [name for name in grid.point_data if name.startswith(f"mode {shown},")][0]
+    field = next(name for name in grid.point_data if name.startswith(f"mode {shown},"))
     deformed_picture(
         grid,
         folder / "ring_mode.png",

@@ -115,7 +115,7 @@ def mesh_pairs(planetary_set: PlanetarySet) -> tuple[FlankPair, FlankPair]:
 
 
 def contact_half_width(pair: FlankPair, line_load: float, material: Material) -> float:
-    """Largest Hertzian half width on the path of contact [m] for one tooth pair carrying `line_load` [N/m]."""
+    """Largest Hertzian half width on the path of contact [m] of one tooth pair under `line_load` [N/m]."""
     begin, end = pair.path
     zeta = np.linspace(begin, end, 51)[1:-1]
     rho_1, rho_2 = pair.pitch_roll_1 + zeta, pair.pitch_roll_2 - pair.sign * zeta

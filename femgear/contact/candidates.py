@@ -138,7 +138,7 @@ def admissible_arcs(pair: FlankPair, zeta):
 
 
 def _arc_of_foot(pair: FlankPair, zeta, roll_2):
-    """Arc length on flank 1 of the point whose foot on flank 2 has the roll length `roll_2`, by the secant."""
+    """Arc length on flank 1 of the point whose foot on flank 2 has the roll length `roll_2` (secant)."""
     rb1, rb2 = pair.base_radius_1, pair.base_radius_2
     target = roll_2**2 / (2 * rb2)
     contact_1 = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * rb1)

@@ -183,7 +183,7 @@ def _curved_coordinates(element_nodes, points, b1, b2):
 
 
 def directional(weights, directions):
-    """Turn scalar interpolation rows (m, n) into displacement columns (2n, m) along unit directions (m, 2)."""
+    """Displacement columns (2n, m) from interpolation rows (m, n) and unit directions (m, 2)."""
     dense = weights.toarray() if hasattr(weights, "toarray") else np.asarray(weights)
     columns = np.empty((2 * dense.shape[1], dense.shape[0]))
     columns[0::2] = dense.T * directions[:, 0]

@@ -76,7 +76,7 @@ def test_stiffness_against_iso_6336(gears, cycle):
 
 
 def solved(gears, bodies, position, *, torque=TORQUE, gaps=(0.0, 0.0, 0.0), coupled=True):
-    """Contact problem and solution at one of eight positions; without coupling the meshes see only themselves."""
+    """Contact problem and solution at one of eight positions; uncoupled meshes see only themselves."""
     share = TORQUE / gears.sun.base_radius / 3
     setup = mesh_windows(
         gears, bodies, share=2 * share, positions=8, cells=36, nearest=20e-6, contact="profile"

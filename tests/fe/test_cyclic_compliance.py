@@ -174,7 +174,7 @@ def test_cyclic_modes_are_those_of_the_whole_body(gear, sector, whole):
 
 
 def test_reduced_ring_is_statically_complete(gear, sector):
-    """Modes plus static shape give the exact cyclic compliance of the load, whatever the cut-off frequency."""
+    """Modes plus static shape give the exact cyclic compliance of the load, whatever the cut-off."""
     K = stiffness(sector, STEEL, state="plane stress", thickness=THICKNESS)
     K = K + foundation(sector, "rim", 1e11, 1e11, thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))[:, 3:4]

@@ -341,7 +341,7 @@ def test_meshes_that_cannot_be_linearised_are_refused():
 
 
 def test_motor_and_brake_follow_the_driven_member():
-    """With the carrier driven the motor hangs on the carrier and the brake on the sun; loads stay balanced."""
+    """With the carrier driven the motor hangs on the carrier and the brake on the sun."""
     from femgear.analysis import solve_modes, solve_static
     from femgear.case import with_value
     from femgear.validation.reference import reference_case
