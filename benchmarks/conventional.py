@@ -115,7 +115,7 @@ def contact_problems(gears, bodies, *, sun_torque: float, positions: int):
         contact="profile",
     )
     load = np.append(np.zeros(n), sun_torque / gears.sun.base_radius)
-    problems = [assemble_contact(setup, bodies, p, np.zeros(n)) for p in range(positions)]
+    problems = [assemble_contact(setup, bodies, p) for p in range(positions)]
     return [(problem.H, problem.gap, problem.G, load) for problem in problems]
 
 

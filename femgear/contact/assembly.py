@@ -10,11 +10,13 @@ import numpy as np
 from femgear.contact.candidates import FlankPair, Windows, flank_pair, window_polynomials, windows
 from femgear.contact.flanks import LEFT, RIGHT, FlankCompliance, station_weights
 from femgear.contact.halfplane import hertz_line, surface_displacement
-from femgear.errors import ContactError
+from femgear.contact.teeth import tooth_numbers
 
 if TYPE_CHECKING:
+    from femgear.contact.supports import MovingMembers
     from femgear.fe.elasticity import Material
-    from femgear.gears.planetary import PlanetarySet
+    from femgear.gears import PlanetarySet
+    from femgear.gears.deviations import SetDeviations
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,9 @@ class MeshWindows:
     edge : tuple of two bool arrays
         Whether the low and the high end of the window are ends of a flank.
     tooth : tuple of two integer arrays (2N, pairs)
-        Tooth numbers on gear 1 and gear 2.
+        Tooth numbers on gear 1 and gear 2 during the first mesh period.
+    turns : (P,) int array
+        Whole mesh periods passed at each position.
     local : (2, cells, cells) array
         Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh.
     cell_area : (2N,) array
@@ -64,22 +68,35 @@ class MeshWindows:
     roll: tuple[np.ndarray, np.ndarray]
     edge: tuple[np.ndarray, np.ndarray]
     tooth: tuple[np.ndarray, np.ndarray]
+    turns: np.ndarray
     local: np.ndarray
     cell_area: np.ndarray
 
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """``gap + H p - G q >= 0, p >= 0``, with the place of every candidate."""
+    """``gap + H p - G q >= 0, p >= 0``, with the place of every candidate.
+
+    ``H`` is the compliance of the gears; ``supports`` (2N, 2N) that of sprung members between the meshes,
+    which `compliance` adds to every pair of candidates.
+    """
 
     n_planets: int
     H: np.ndarray
     gap: np.ndarray
     G: np.ndarray
+    supports: np.ndarray
     mesh: np.ndarray
     pair: np.ndarray
     cell: np.ndarray
     position: int
+
+    @property
+    def compliance(self) -> np.ndarray:
+        """Compliance of gears and supports between all candidates [m/N]."""
+        if not self.supports.any():
+            return self.H
+        return self.H + self.supports[np.ix_(self.mesh, self.mesh)]
 
     def warm_start(self, other: ContactProblem, active: np.ndarray) -> np.ndarray:
         """Active candidates of another position, matched by mesh, pair and cell."""
@@ -124,100 +141,100 @@ def contact_half_width(pair: FlankPair, line_load: float, material: Material) ->
     return hertz_line(line_load, radius, modulus).half_width
 
 
-def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tooth numbers on gear 1 and gear 2 of the pairs `index` (2N, pairs), counted in each body's frame.
-
-    A pair of mesh j with index i touches at the pitch point when the position is ``-(phase_j + i)``; the
-    tooth is then at the planet's angle, less its half thickness, which fixes its place on the body.
-    """
-    from femgear.gears.gear import half_thickness_angle
-
-    s, N = planetary_set, planetary_set.n_planets
-    psi = np.asarray(s.planet_angles) - s.planet_angles[0]
-    turns = np.asarray(s.mesh_phases)[:, None] + index
-    sun = psi[:, None] / s.sun.pitch_angle + turns[:N] - s.mesh_phases[0]
-    ring = psi[:, None] / s.ring.pitch_angle - (turns[N:] - s.mesh_phases[N])
-    radius_s = s.planet.base_radius / np.cos(s.working_pressure_angle_sun_planet)
-    radius_r = s.planet.base_radius / np.cos(s.working_pressure_angle_planet_ring)
-    thickness = half_thickness_angle(s.planet, radius_s) + half_thickness_angle(s.planet, radius_r)
-    first = np.asarray(s.mesh_phases)[:N, None]
-    planet_sun = -(turns[:N] - first)
-    planet_ring = (thickness - np.pi) / s.planet.pitch_angle - (turns[N:] - first)
-    exact = np.concatenate([sun, planet_ring]), np.concatenate([planet_sun, ring])
-    rounded = tuple(np.rint(e).astype(int) for e in exact)
-    if max(np.abs(e - r).max() for e, r in zip(exact, rounded)) > 1e-3:
-        raise ContactError(
-            "the phases of the meshes and the positions of the teeth contradict one another",
-            code="E-CONTACT-PHASE",
-            remedy="planet angles must be whole multiples of 360/(z_sun + z_ring) degrees from one another",
-        )
-    return rounded
-
-
-def tooth_zero_angles(planetary_set: PlanetarySet, position: float = 0.0):
-    """Angles of the centre of tooth number 0 of every gear, as `tooth_numbers` counts them [rad].
+def mesh_windows(
+    planetary_set: PlanetarySet,
+    bodies: Bodies,
+    *,
+    share: float,
+    positions: int,
+    cells: int,
+    nearest: float,
+    contact: str,
+    periods: int = 1,
+    deviations: SetDeviations | None = None,
+    planet_gaps=None,
+) -> MeshWindows:
+    """Windows of every mesh at every position.
 
     Parameters
     ----------
     planetary_set : PlanetarySet
-    position : float
-        Fraction of one mesh period.
-
-    Returns
-    -------
-    sun : float
-    planets : (N,) array
-        In the frame of the set, about each planet's own centre.
-    ring : float
+    bodies : Bodies
+    share : float
+        Mesh force that sizes the windows [N].
+    positions : int
+        Positions in one mesh period.
+    cells : int
+        Pressure cells in a window.
+    nearest : float
+        Pairs are candidates whose separation exceeds that of the nearest pair of their mesh by less [m].
+    contact : {"profile", "line_of_action"}
+    periods : int
+        Number of mesh periods.
+    deviations : SetDeviations, optional
+    planet_gaps : (N,) array, optional
+        Extra separation of the sun-side flanks of each planet [m].
     """
-    from femgear.gears import half_thickness_angle
-
-    s = planetary_set
-    N, psi = s.n_planets, np.asarray(s.planet_angles)
-    turned = position + np.asarray(s.mesh_phases)
-
-    def half_angle(gear, pressure_angle):
-        return float(half_thickness_angle(gear, gear.base_radius / np.cos(pressure_angle)))
-
-    sun_angle, ring_angle = s.working_pressure_angle_sun_planet, s.working_pressure_angle_planet_ring
-    sun = psi[0] - half_angle(s.sun, sun_angle) + turned[0] * s.sun.pitch_angle
-    planets = psi + np.pi - half_angle(s.planet, sun_angle) - turned[:N] * s.planet.pitch_angle
-    ring = psi[0] - half_angle(s.ring, ring_angle) - turned[N] * s.ring.pitch_angle
-    return float(sun), planets, float(ring)
-
-
-def mesh_windows(
-    planetary_set: PlanetarySet, bodies: Bodies, *, share, positions, cells, nearest, contact
-) -> MeshWindows:
-    """Windows of every mesh at every position; `share` is the force [N] that sizes them."""
     N = planetary_set.n_planets
     pairs = mesh_pairs(planetary_set)
     pitch = planetary_set.sun.base_pitch
     phase = np.asarray(planetary_set.mesh_phases)
-    tau = np.arange(positions) / positions
+    tau = np.arange(positions * periods) / positions
+    turns = np.floor(tau).astype(int)
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
-    count = int(np.ceil(end - begin)) + 4
     first = np.floor(begin - phase - 1.0).astype(int) - 1
-    index = first[:, None] + np.arange(count)
-    zeta = pitch * (tau[None, :, None] + phase[:, None, None] + index[:, None, :])
+    index = first[:, None] + np.arange(int(np.ceil(end - begin)) + 4)
+    zeta = pitch * ((tau - turns)[None, :, None] + phase[:, None, None] + index[:, None, :])
+    tooth = tooth_numbers(planetary_set, index)
+    shift = _pair_separations(planetary_set, deviations, planet_gaps, tooth, turns, tau)
     found, areas, local = [], [], []
     for kind, pair in enumerate(pairs):
         half_width = contact_half_width(pair, share / bodies.face_width, bodies.material)
+        rows = slice(kind * N, (kind + 1) * N)
         found.append(
             windows(
                 pair,
-                zeta[kind * N : (kind + 1) * N],
+                zeta[rows],
                 width=3.2 * half_width,
                 cells=cells,
                 nearest=nearest,
                 line_of_action=contact == "line_of_action",
+                form=_profile_form(planetary_set, deviations, kind),
+                shift=shift[rows],
             )
         )
         areas += [found[-1].cell * bodies.face_width] * N
         local.append(local_compliance(found[-1].cell, cells, bodies))
-    used = np.concatenate([w.near.any(axis=1) for w in found])
-    return _gather(found, used, tooth_numbers(planetary_set, index), N, positions, np.array(areas), local)
+    return _gather(found, tooth, turns, N, np.array(areas), local)
+
+
+def _profile_form(planetary_set, deviations, kind):
+    """Separation by deviations of the profiles as a function of both roll lengths, or None."""
+    if deviations is None:
+        return None
+    from femgear.gears.deviations import profile_separation
+
+    return lambda roll_1, roll_2: profile_separation(deviations, planetary_set, kind, roll_1, roll_2)
+
+
+def _pair_separations(planetary_set, deviations, planet_gaps, tooth, turns, tau) -> np.ndarray:
+    """Separations of whole tooth pairs by errors of pitch and position, shape (2N, P, pairs) [m]."""
+    N = planetary_set.n_planets
+    shift = np.zeros((2 * N, len(tau), tooth[0].shape[1]))
+    if planet_gaps is not None:
+        shift[:N] += np.asarray(planet_gaps, float)[:, None, None]
+    if deviations is not None:
+        from femgear.gears.deviations import body_separation, tooth_separation
+
+        shift += body_separation(deviations, planetary_set, tau)[:, :, None]
+        for mesh in range(2 * N):
+            # with every mesh period the sun's teeth move on by one, those of planets and ring back
+            sign = -1 if mesh < N else 1
+            first = tooth[0][mesh][None, :] + sign * turns[:, None]
+            second = tooth[1][mesh][None, :] + turns[:, None]
+            shift[mesh] += tooth_separation(deviations, mesh, first, second)
+    return shift
 
 
 def local_compliance(cell: float, cells: int, bodies: Bodies) -> np.ndarray:
@@ -231,8 +248,9 @@ def local_compliance(cell: float, cells: int, bodies: Bodies) -> np.ndarray:
     return toeplitz(2.0 * one / bodies.face_width)
 
 
-def _gather(found: list[Windows], used, tooth, N, positions, areas, local) -> MeshWindows:
+def _gather(found: list[Windows], tooth, turns, N, areas, local) -> MeshWindows:
     """Join both kinds of mesh and drop the leading and trailing pairs that never come near."""
+    used = np.concatenate([w.near.any(axis=1) for w in found])
     # every mesh keeps the same number of pairs, starting at its own first candidate
     first = used.argmax(axis=1)
     count = int((used.shape[1] - used[:, ::-1].argmax(axis=1) - first).max())
@@ -247,7 +265,7 @@ def _gather(found: list[Windows], used, tooth, N, positions, areas, local) -> Me
     gap = join("gap")
     return MeshWindows(
         n_planets=N,
-        positions=positions,
+        positions=len(turns),
         pairs=count,
         zeta=join("zeta"),
         near=join("near"),
@@ -256,16 +274,19 @@ def _gather(found: list[Windows], used, tooth, N, positions, areas, local) -> Me
         roll=(join("roll_1"), join("roll_2")),
         edge=(join("at_low_edge"), join("at_high_edge")),
         tooth=(tooth[0][row, take], tooth[1][row, take]),
+        turns=turns,
         local=np.stack(local),
         cell_area=areas,
     )
 
 
-def assemble_contact(setup: MeshWindows, bodies: Bodies, position: int, gaps) -> ContactProblem:
+def assemble_contact(
+    setup: MeshWindows, bodies: Bodies, position: int, members: MovingMembers | None = None
+) -> ContactProblem:
     """The complementarity problem of all meshes at one position.
 
-    The motions are those of the planets and, last, of the sun, as arcs on their base circles [m], positive
-    in the direction in which the sun drives.
+    The motions are those of the planets and of the sun, as arcs on their base circles [m], positive in the
+    direction in which the sun drives, and then the free motions of `members`.
     """
     N = setup.n_planets
     mesh, pair = np.nonzero(setup.near[:, position])
@@ -275,25 +296,36 @@ def assemble_contact(setup: MeshWindows, bodies: Bodies, position: int, gaps) ->
     n = len(mesh)
     H = np.einsum("ca,wavb,db->wcvd", polynomials, H, polynomials, optimize=True)
     H[np.arange(n), :, np.arange(n), :] += setup.local[(mesh >= N).astype(int)]
-    shift = np.append(gaps, np.zeros(N))
-    gap = (setup.gap[mesh, position, pair] + shift[mesh, None]).ravel()
+    gap = setup.gap[mesh, position, pair].ravel()
     keep = np.isfinite(gap)
     H = H.reshape(n * cells, n * cells)[np.ix_(keep, keep)]
     of_cell = np.repeat(mesh, cells)[keep]
-    G = np.zeros((len(of_cell), N + 1))
-    sun_side = of_cell < N
-    G[np.arange(len(of_cell)), of_cell % N] = np.where(sun_side, -1.0, 1.0)
-    G[sun_side, N] = 1.0
+    approach = rotation_approach(N)
+    supports = np.zeros((2 * N, 2 * N))
+    if members is not None:
+        approach = np.hstack([approach, members.approach[:, members.free]])
+        supports = members.compliance
     return ContactProblem(
         n_planets=N,
         H=H,
         gap=gap[keep],
-        G=G,
+        G=approach[of_cell],
+        supports=supports,
         mesh=of_cell,
         pair=np.repeat(pair, cells)[keep],
         cell=np.tile(np.arange(cells), n)[keep],
         position=position,
     )
+
+
+def rotation_approach(n_planets: int) -> np.ndarray:
+    """Approach of the flanks per unit base-circle arc of each planet and of the sun, shape (2N, N + 1)."""
+    N = n_planets
+    approach = np.zeros((2 * N, N + 1))
+    approach[:N, :N] = -np.eye(N)
+    approach[N:, :N] = np.eye(N)
+    approach[:N, N] = 1.0
+    return approach
 
 
 def _regular_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair) -> np.ndarray:

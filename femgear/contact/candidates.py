@@ -10,6 +10,7 @@ Gear 1 drives. Its flank is drawn as a left flank; roll lengths on gear 1 grow w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -197,7 +198,15 @@ def window_polynomials(cells: int) -> np.ndarray:
 
 
 def windows(
-    pair: FlankPair, zeta, *, width: float, cells: int, nearest: float, line_of_action: bool
+    pair: FlankPair,
+    zeta,
+    *,
+    width: float,
+    cells: int,
+    nearest: float,
+    line_of_action: bool,
+    form: Callable | None = None,
+    shift=0.0,
 ) -> Windows:
     """Cells around the point of smallest separation of every tooth pair.
 
@@ -211,26 +220,35 @@ def windows(
     cells : int
         Number of pressure cells in it.
     nearest : float
-        Pairs whose smallest separation exceeds this [m] are no candidates.
+        Pairs (last axis) whose smallest separation exceeds that of the nearest pair by more than this [m]
+        are no candidates.
     line_of_action : bool
         Only pairs on the theoretical path of contact, as for rigid gears.
+    form : callable, optional
+        Separation that deviations of both profiles add, from the roll lengths on flank 1 and 2 [m].
+    shift : array, broadcast with `zeta`
+        Separation that errors of position add to a whole pair [m].
     """
     zeta = np.asarray(zeta, float)
     low, high = admissible_arcs(pair, zeta)
     nominal = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * pair.base_radius_1)
     tip_to_form = low < high
     centre = np.clip(nominal, low, np.maximum(low, high))
+    if form is not None:
+        centre = _nearest_arc(pair, zeta, centre, low, high, 6.0 * width, form)
     start = np.clip(centre - 0.5 * width, low, np.maximum(low, high - width))
     cell = width / cells
     arc = start[..., None] + (np.arange(cells) + 0.5) * cell
-    gap, _ = separation(pair, zeta[..., None], np.sqrt(2 * pair.base_radius_1 * arc))
+    gap = _separation_at(pair, zeta[..., None], arc, form) + np.asarray(shift)[..., None]
     gap = np.where(arc < high[..., None], gap, np.inf)
     node_arc = np.minimum(start[..., None] + WINDOW_NODES * width, np.maximum(high, low + width)[..., None])
     roll_1 = np.sqrt(2 * pair.base_radius_1 * node_arc)
     roll_2 = separation(pair, zeta[..., None], roll_1)[1]
     begin, end = pair.path
     on_path = (zeta >= begin) & (zeta <= end)
-    near = on_path if line_of_action else tip_to_form & (gap.min(axis=-1) < nearest)
+    smallest = gap.min(axis=-1)
+    smallest = np.where(tip_to_form, smallest, np.inf)
+    near = on_path if line_of_action else smallest - smallest.min(axis=-1, keepdims=True) < nearest
     tiny = 1e-9 * width
     return Windows(
         zeta=zeta,
@@ -243,3 +261,19 @@ def windows(
         at_low_edge=start <= low + tiny,
         at_high_edge=start + width >= high - tiny,
     )
+
+
+def _separation_at(pair: FlankPair, zeta, arc, form):
+    """Separation at arc lengths on flank 1, deviations of the profiles included."""
+    roll_1 = np.sqrt(2 * pair.base_radius_1 * np.maximum(arc, 0.0))
+    gap, roll_2 = separation(pair, zeta, roll_1)
+    return gap if form is None else gap + form(roll_1, roll_2)
+
+
+def _nearest_arc(pair: FlankPair, zeta, centre, low, high, reach, form):
+    """Arc length of the smallest separation within `reach` of the contact of the unmodified flanks."""
+    begin = np.maximum(centre - reach, low)
+    end = np.maximum(np.minimum(centre + reach, high), begin)
+    arc = begin[..., None] + (end - begin)[..., None] * np.linspace(0.0, 1.0, 97)
+    best = _separation_at(pair, zeta[..., None], arc, form).argmin(axis=-1)
+    return np.take_along_axis(arc, best[..., None], axis=-1)[..., 0]

@@ -8,24 +8,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.assembly import Bodies, ContactProblem, MeshWindows, assemble_contact, mesh_windows
+from femgear.contact.assembly import (
+    Bodies,
+    ContactProblem,
+    MeshWindows,
+    assemble_contact,
+    mesh_windows,
+    rotation_approach,
+)
 from femgear.contact.solve import solve_contact, tangent_stiffness
+from femgear.contact.supports import RIGID, MovingMembers, Supports, moving_members
 from femgear.errors import ContactError
 
 if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
+    from femgear.gears import PlanetarySet
+    from femgear.gears.deviations import SetDeviations
 
 
 @dataclass(frozen=True)
 class MeshCycle:
-    """Static solution over one mesh period; meshes in the order sun-planet 1..N, planet 1..N-ring.
+    """Static solution over one mesh period or several; meshes in the order sun-planet 1..N, planet 1..N-ring.
 
     Parameters
     ----------
     position : (P,) array
-        Fraction of one mesh period.
+        In mesh periods.
     deflection : (2N, P) array
-        Static transmission error of every mesh along its line of action [m].
+        Static transmission error of every mesh along its line of action: the approach of the flanks
+        by the motions of their gears, deviations included [m].
     force : (2N, P) array
         Mesh force, torque over base radius [N].
     stiffness : (2N, P) array
@@ -35,7 +45,7 @@ class MeshCycle:
     path : (2N, T, P) array
         Path coordinate of each tooth pair, from the pitch point in the direction of motion [m].
     tooth : (2, 2N, T) int array
-        Tooth numbers of the pairs on gear 1 and gear 2, see `tooth_zero_angles`.
+        Tooth numbers of the pairs on gear 1 and gear 2 in the first mesh period, see `tooth_zero_angles`.
     max_pressure : (2N, P) array
         Largest pressure of the contacts that do not reach the end of a flank [Pa]: under a sharp edge the
         pressure has no limit, it grows with every halving of the cells.
@@ -46,6 +56,12 @@ class MeshCycle:
     residual : (P,) array
         Largest relative violation of the contact conditions and of equilibrium.
     iterations : (P,) int array
+    member_motion : (m, P) array
+        Displacement of the axes of floating or sprung members [m], named by `member_names`.
+    member_names : tuple of str
+        Such as ``"sun: x"``.
+    periods : int
+        Mesh periods in the record.
     contact : str
         ``"profile"`` or ``"line_of_action"``.
     unknowns : int
@@ -65,6 +81,9 @@ class MeshCycle:
     open_planets: np.ndarray
     residual: np.ndarray
     iterations: np.ndarray
+    member_motion: np.ndarray
+    member_names: tuple[str, ...]
+    periods: int
     contact: str
     unknowns: int
     message: str
@@ -97,14 +116,17 @@ def walk_mesh_cycle(
     positions: int = 64,
     contact: str = "profile",
     cells: int = 36,
+    deviations: SetDeviations | None = None,
+    supports: Supports = RIGID,
+    periods: int = 1,
     planet_gaps=None,
     progress: Callable[[int, int], None] | None = None,
 ) -> MeshCycle:
-    """Static transmission error, load sharing and mesh stiffness over one mesh period.
+    """Static transmission error, load sharing and mesh stiffness over the mesh cycle.
 
-    Sun and planets are held at their bores, the ring at its outer surface, all centres fixed. At every
-    position one complementarity problem holds for the pressures of all meshes: no penetration, no
-    tension, equilibrium of every planet, and the sun's torque.
+    Sun and planets are held at their bores, the ring at its outer surface. At every position one
+    complementarity problem holds for the pressures of all meshes: no penetration, no tension, equilibrium
+    of every planet and of every floating member, and the sun's torque.
 
     Parameters
     ----------
@@ -114,11 +136,18 @@ def walk_mesh_cycle(
     sun_torque : float
         Torque on the sun [N m], not negative (mirror the set for the other flanks).
     positions : int
-        Number of equidistant positions in the period.
+        Number of equidistant positions in one mesh period.
     contact : {"profile", "line_of_action"}
         Candidates on the whole profiles, or only on the theoretical path of contact.
     cells : int
         Pressure cells in a contact window.
+    deviations : SetDeviations, optional
+        Micro-geometry and errors.
+    supports : Supports
+        Members whose axes move; by default all are fixed.
+    periods : int
+        Mesh periods in the record; errors that belong to teeth or turn with a member need
+        `gears.deviations.common_period` of them.
     planet_gaps : (N,) array, optional
         Extra separation of the sun-side flanks of each planet [m].
     progress : callable, optional
@@ -134,12 +163,12 @@ def walk_mesh_cycle(
         When the contact problem cannot be solved or no window size contains the contact.
     """
     N = planetary_set.n_planets
-    gaps = np.zeros(N) if planet_gaps is None else np.asarray(planet_gaps, float)
     if not sun_torque > 0:
-        return _unloaded(N, positions, contact)
+        return _unloaded(N, positions * periods, periods, contact)
+    members = moving_members(planetary_set, supports)
     share = sun_torque / (planetary_set.sun.base_radius * N)
-    enlarge, nearest = 1.0, 3.0 * share / (10e9 * planetary_set.sun.face_width) + gaps.max()
-    for _ in range(5):
+    enlarge, nearest = 1.0, 3.0 * share / (10e9 * planetary_set.sun.face_width)
+    for _ in range(6):
         setup = mesh_windows(
             planetary_set,
             bodies,
@@ -148,24 +177,29 @@ def walk_mesh_cycle(
             cells=cells,
             nearest=nearest,
             contact=contact,
+            periods=periods,
+            deviations=deviations,
+            planet_gaps=planet_gaps,
         )
-        cycle, overflow, missed = _walk(planetary_set, bodies, setup, sun_torque, gaps, contact, progress)
+        cycle, overflow, missed = _walk(
+            planetary_set, bodies, setup, sun_torque, members, contact, periods, progress
+        )
         if not overflow and missed <= nearest:
             return cycle
         enlarge *= 1.5 if overflow else 1.0
         nearest = max(nearest, 1.2 * missed)
     raise ContactError(
-        "the contact windows do not contain the contact after four enlargements",
+        "the contact windows do not contain the contact after five enlargements",
         code="E-CONTACT-WINDOW",
-        remedy="reduce operation.torque or the planet errors",
+        remedy="reduce operation.torque or the errors",
     )
 
 
-def _unloaded(N: int, positions: int, contact: str) -> MeshCycle:
+def _unloaded(N: int, positions: int, periods: int, contact: str) -> MeshCycle:
     """The defined result without load: nothing touches, nothing is stiff."""
     zero = np.zeros((2 * N, positions))
     return MeshCycle(
-        position=np.arange(positions) / positions,
+        position=np.arange(positions) * periods / positions,
         deflection=zero,
         force=zero,
         stiffness=zero,
@@ -177,44 +211,49 @@ def _unloaded(N: int, positions: int, contact: str) -> MeshCycle:
         open_planets=np.ones((N, positions), bool),
         residual=np.zeros(positions),
         iterations=np.zeros(positions, int),
+        member_motion=np.zeros((0, positions)),
+        member_names=(),
+        periods=periods,
         contact=contact,
         unknowns=0,
         message="no torque: no tooth carries load and the mesh stiffness is zero",
     )
 
 
-def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, gaps, contact, progress):
+def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, members, contact, periods, progress):
     """All positions with one set of windows; also whether a contact ran into the end of its window."""
     N, P = planetary_set.n_planets, setup.positions
-    load = np.append(np.zeros(N), sun_torque / planetary_set.sun.base_radius)
+    load = np.zeros(N + 1 + int(members.free.sum()))
+    load[N] = sun_torque / planetary_set.sun.base_radius
     out = {name: np.zeros((2 * N, P)) for name in ("deflection", "force", "stiffness", "max_pressure")}
     out["edge_contact"] = np.zeros((2 * N, P), bool)
-    tooth_load = np.zeros((2 * N, setup.pairs, P))
-    open_planets = np.zeros((N, P), bool)
+    out["tooth_load"] = np.zeros((2 * N, setup.pairs, P))
+    out["member_motion"] = np.zeros((len(members.names), P))
     residual, iterations = np.zeros(P), np.zeros(P, int)
     previous, unknowns, overflow, missed = None, 0, False, 0.0
     for p in range(P):
-        problem = assemble_contact(setup, bodies, p, gaps)
+        problem = assemble_contact(setup, bodies, p, members)
         start = None if previous is None else problem.warm_start(*previous)
-        state = solve_contact(problem.H, problem.gap, problem.G, load, start=start)
+        state = solve_contact(problem.compliance, problem.gap, problem.G, load, start=start)
         previous = (problem, state.active)
-        _collect(problem, state, setup, out, tooth_load, p)
-        open_planets[:, p] = out["force"][:N, p] <= 0.0
+        _collect(problem, state, setup, members, out, p)
         residual[p], iterations[p] = state.residual, state.iterations
         unknowns = max(unknowns, len(problem.gap))
         overflow |= problem.touches_window_end(state.active, setup)
-        missed = max(missed, _penetrated_outsider(setup, p, out["deflection"][:, p], gaps, contact))
+        missed = max(missed, _penetrated_outsider(setup, p, out["deflection"][:, p], contact))
         if progress is not None:
             progress(p + 1, P)
+    open_planets = out["force"][:N] <= 0.0
     method = "all positions by the active set"
     cycle = MeshCycle(
-        position=np.arange(P) / P,
-        tooth_load=tooth_load,
+        position=np.arange(P) * periods / P,
         path=np.moveaxis(setup.zeta, 2, 1),
         tooth=np.stack(setup.tooth),
         open_planets=open_planets,
         residual=residual,
         iterations=iterations,
+        member_names=members.names,
+        periods=periods,
         contact=contact,
         unknowns=unknowns,
         message=method if not open_planets.any() else f"{method}; some planets lose all load",
@@ -223,26 +262,32 @@ def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, gaps, contact, 
     return cycle, overflow, missed
 
 
-def _collect(problem: ContactProblem, state, setup: MeshWindows, out, tooth_load, p):
+def _collect(problem: ContactProblem, state, setup: MeshWindows, members: MovingMembers, out, p):
     """Mesh quantities of one position."""
-    n_meshes = 2 * problem.n_planets
+    N = problem.n_planets
     loads = state.loads
-    out["force"][:, p] = np.bincount(problem.mesh, weights=loads, minlength=n_meshes)
-    sun, planets = state.motions[-1], state.motions[:-1]
-    out["deflection"][:, p] = np.concatenate([sun - planets, planets])
-    out["stiffness"][:, p] = tangent_stiffness(problem.H, state.active, problem.mesh, n_meshes)
-    np.add.at(tooth_load[:, :, p], (problem.mesh, problem.pair), loads)
+    force = np.bincount(problem.mesh, weights=loads, minlength=2 * N)
+    out["force"][:, p] = force
+    # sprung members yield under the mesh forces, free ones are unknowns of the problem
+    motion = np.zeros(len(members.names))
+    motion[members.free] = state.motions[N + 1 :]
+    sprung = ~members.free
+    motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung]
+    out["member_motion"][:, p] = motion
+    out["deflection"][:, p] = rotation_approach(N) @ state.motions[: N + 1] + members.approach @ motion
+    out["stiffness"][:, p] = tangent_stiffness(problem.H, state.active, problem.mesh, 2 * N)
+    np.add.at(out["tooth_load"][:, :, p], (problem.mesh, problem.pair), loads)
     at_edge = problem.at_flank_end(state.active, setup)
     np.logical_or.at(out["edge_contact"][:, p], problem.mesh, at_edge)
     pressure = np.where(at_edge, 0.0, loads / setup.cell_area[problem.mesh])
     np.maximum.at(out["max_pressure"][:, p], problem.mesh, pressure)
 
 
-def _penetrated_outsider(setup: MeshWindows, p, deflection, gaps, contact) -> float:
-    """Largest separation needed so that no pair left out of the candidates would penetrate [m]."""
+def _penetrated_outsider(setup: MeshWindows, p, deflection, contact) -> float:
+    """Separation from the nearest pair within which no omitted pair penetrates [m]; zero if none does."""
     if contact == "line_of_action":
         return 0.0
-    shift = np.append(gaps, np.zeros_like(gaps))
-    outside = np.where(setup.near[:, p], np.inf, setup.smallest_gap[:, p] + shift[:, None])
-    penetrates = outside < deflection[:, None]
-    return float(deflection.max()) if penetrates.any() else 0.0
+    gap = setup.smallest_gap[:, p]
+    penetrates = ~setup.near[:, p] & (gap < deflection[:, None])
+    relative = deflection - gap.min(axis=1)
+    return float(relative[penetrates.any(axis=1)].max(initial=0.0))

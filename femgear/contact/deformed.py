@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.assembly import mesh_pairs, tooth_zero_angles
+from femgear.contact.assembly import mesh_pairs
 from femgear.contact.flanks import flank_load_columns, flank_stations
+from femgear.contact.teeth import tooth_zero_angles
 
 if TYPE_CHECKING:
     from femgear.contact.bodies import Sector, Sectors

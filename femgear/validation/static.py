@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -40,7 +41,9 @@ def _problem(position, gaps, *, positions=POSITIONS, nearest=30e-6):
     static = reference_static()
     setup = _setup(positions, nearest)
     load = np.append(np.zeros(3), static.sun_torque / static.planetary_set.sun.base_radius)
-    return assemble_contact(setup, static.bodies, position, np.asarray(gaps, float)), load
+    problem = assemble_contact(setup, static.bodies, position)
+    shift = np.append(np.asarray(gaps, float), np.zeros(3))
+    return replace(problem, gap=problem.gap + shift[problem.mesh]), load
 
 
 def equilibrium() -> tuple[Row, ...]:

@@ -110,7 +110,7 @@ def femgear_contact(bodies: Bodies, fraction: float, *, cells: int = 36) -> Pair
     only = np.zeros_like(setup.near)
     only[0] = np.abs(setup.zeta[0] - fraction * s.sun.base_pitch) < 1e-9 * s.sun.base_pitch
     position = int(np.flatnonzero(only[0].any(axis=1))[0])
-    problem = assemble_contact(replace(setup, near=only), bodies, position, np.zeros(s.n_planets))
+    problem = assemble_contact(replace(setup, near=only), bodies, position)
     # the planets are held, the sun turns: the other motions would be without restraint
     state = solve_contact(problem.H, problem.gap, problem.G[:, -1:], [force])
     pressure = state.loads / setup.cell_area[0]

@@ -79,9 +79,16 @@ def solved(gears, bodies, position, *, torque=TORQUE, gaps=(0.0, 0.0, 0.0), coup
     """Contact problem and solution at one of eight positions; uncoupled meshes see only themselves."""
     share = TORQUE / gears.sun.base_radius / 3
     setup = mesh_windows(
-        gears, bodies, share=2 * share, positions=8, cells=36, nearest=20e-6, contact="profile"
+        gears,
+        bodies,
+        share=2 * share,
+        positions=8,
+        cells=36,
+        nearest=20e-6,
+        contact="profile",
+        planet_gaps=gaps,
     )
-    problem = assemble_contact(setup, bodies, position, np.asarray(gaps))
+    problem = assemble_contact(setup, bodies, position)
     if not coupled:
         problem = replace(problem, H=problem.H * (problem.mesh[:, None] == problem.mesh))
     load = np.array([0.0, 0.0, 0.0, torque / gears.sun.base_radius])

@@ -1,0 +1,118 @@
+"""Members that move: springs and free motions of sun, carrier, planets and ring in the static problem.
+
+A motion ``u`` of a member's axis changes the approach of the flanks at mesh ``j`` by ``B_j u``. A support of
+stiffness ``k`` carries ``B^T F = -k u`` (F the mesh forces), so its elasticity is the mesh compliance
+``B k^-1 B^T``, one more term of H; a free motion is one more column of G with the equilibrium ``B^T F = 0``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import ContactError
+
+if TYPE_CHECKING:
+    from femgear.gears import PlanetarySet
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Radial stiffness of the supports [N/m]: None is rigid, 0 floats.
+
+    Parameters
+    ----------
+    sun, carrier, ring : float, optional
+        Between the member and the ground.
+    planet : float, optional
+        Bearing between each planet and its pin on the carrier; a planet cannot float.
+    """
+
+    sun: float | None = None
+    carrier: float | None = None
+    planet: float | None = None
+    ring: float | None = None
+
+    def __post_init__(self):
+        for name in ("sun", "carrier", "planet", "ring"):
+            value = getattr(self, name)
+            if value is not None and not (value >= 0 and np.isfinite(value)):
+                raise ContactError(
+                    f"the support of the {name} has a stiffness of {value} N/m",
+                    code="E-SUPPORT",
+                    limit="None (rigid), 0 N/m (floating) or above",
+                )
+        if self.planet == 0.0:
+            raise ContactError("a planet without bearing has no place", code="E-SUPPORT", limit="above 0 N/m")
+
+
+RIGID = Supports()
+
+
+@dataclass(frozen=True)
+class MovingMembers:
+    """Supports as the contact problem takes them.
+
+    Parameters
+    ----------
+    names : tuple of str
+        One a motion, such as ``"sun: x"``.
+    approach : (2N, m) array
+        Approach of the flanks of every mesh per unit motion.
+    stiffness : (m,) array
+        [N/m], 0 for free motions.
+    """
+
+    names: tuple[str, ...]
+    approach: np.ndarray
+    stiffness: np.ndarray
+
+    @property
+    def free(self) -> np.ndarray:
+        """Motions without a spring, boolean (m,)."""
+        return self.stiffness == 0.0
+
+    @property
+    def compliance(self) -> np.ndarray:
+        """Compliance of all sprung motions between the meshes, (2N, 2N) [m/N]."""
+        sprung = self.approach[:, ~self.free]
+        return (sprung / self.stiffness[~self.free]) @ sprung.T
+
+
+def force_directions(planetary_set: PlanetarySet) -> tuple[np.ndarray, np.ndarray]:
+    """Unit forces on the planets (from the sun) and on the ring (from the planets), each of shape (N, 2).
+
+    For the flanks that a positive torque on the sun loads, in the frame of the carrier.
+    """
+    psi = np.asarray(planetary_set.planet_angles)
+    on_planet = psi + np.pi / 2 - planetary_set.working_pressure_angle_sun_planet
+    on_ring = psi - np.pi / 2 + planetary_set.working_pressure_angle_planet_ring
+    return tuple(np.column_stack([np.cos(a), np.sin(a)]) for a in (on_planet, on_ring))
+
+
+def moving_members(planetary_set: PlanetarySet, supports: Supports) -> MovingMembers:
+    """The motions that the supports allow, each with its effect on every mesh."""
+    N = planetary_set.n_planets
+    on_planet, on_ring = force_directions(planetary_set)
+    zero = np.zeros((N, 2))
+    names, columns, stiffness = [], [], []
+    for member, value, effect in (
+        ("sun", supports.sun, np.vstack([on_planet, zero])),
+        ("carrier", supports.carrier, np.vstack([-on_planet, on_ring])),
+        ("ring", supports.ring, np.vstack([zero, -on_ring])),
+    ):
+        if value is not None:
+            names += [f"{member}: x", f"{member}: y"]
+            columns.append(effect)
+            stiffness += [value, value]
+    if supports.planet is not None:
+        for n in range(N):
+            effect = np.zeros((2 * N, 2))
+            effect[n], effect[N + n] = -on_planet[n], on_ring[n]
+            names += [f"planet {n + 1}: x", f"planet {n + 1}: y"]
+            columns.append(effect)
+            stiffness += [supports.planet, supports.planet]
+    approach = np.hstack(columns) if columns else np.zeros((2 * N, 0))
+    return MovingMembers(tuple(names), approach, np.array(stiffness, float))
