@@ -36,6 +36,8 @@ class MeshCycle:
     deflection : (2N, P) array
         Static transmission error of every mesh along its line of action: the approach of the flanks
         by the motions of their gears, deviations included [m].
+    sun_arc : (P,) array
+        Rotation of the sun behind the unloaded, exact set, as an arc on its base circle [m].
     force : (2N, P) array
         Mesh force, torque over base radius [N].
     stiffness : (2N, P) array
@@ -71,6 +73,7 @@ class MeshCycle:
 
     position: np.ndarray
     deflection: np.ndarray
+    sun_arc: np.ndarray
     force: np.ndarray
     stiffness: np.ndarray
     tooth_load: np.ndarray
@@ -90,9 +93,11 @@ class MeshCycle:
 
     @property
     def overall_deflection(self) -> np.ndarray:
-        """Sum of the two mesh deflections of every planet, shape (N, P) [m]."""
-        n = len(self.deflection) // 2
-        return self.deflection[:n] + self.deflection[n:]
+        """Transmission error from sun to ring over every planet, shape (N, P) [m].
+
+        With fixed centres the sum of the two mesh deflections; moving members add their part.
+        """
+        return np.broadcast_to(self.sun_arc, (len(self.deflection) // 2, len(self.sun_arc)))
 
     @property
     def secant_stiffness(self) -> np.ndarray:
@@ -201,6 +206,7 @@ def _unloaded(N: int, positions: int, periods: int, contact: str) -> MeshCycle:
     return MeshCycle(
         position=np.arange(positions) * periods / positions,
         deflection=zero,
+        sun_arc=np.zeros(positions),
         force=zero,
         stiffness=zero,
         tooth_load=np.zeros((2 * N, 1, positions)),
@@ -229,6 +235,7 @@ def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, members, contac
     out["edge_contact"] = np.zeros((2 * N, P), bool)
     out["tooth_load"] = np.zeros((2 * N, setup.pairs, P))
     out["member_motion"] = np.zeros((len(members.names), P))
+    out["sun_arc"] = np.zeros(P)
     residual, iterations = np.zeros(P), np.zeros(P, int)
     previous, unknowns, overflow, missed = None, 0, False, 0.0
     for p in range(P):
@@ -268,6 +275,7 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     loads = state.loads
     force = np.bincount(problem.mesh, weights=loads, minlength=2 * N)
     out["force"][:, p] = force
+    out["sun_arc"][p] = state.motions[N]
     # sprung members yield under the mesh forces, free ones are unknowns of the problem
     motion = np.zeros(len(members.names))
     motion[members.free] = state.motions[N + 1 :]

@@ -48,6 +48,7 @@ def walk_either_flank(
     return replace(
         cycle,
         deflection=cycle.deflection[mesh][:, position],
+        sun_arc=cycle.sun_arc[position],
         force=cycle.force[mesh][:, position],
         stiffness=cycle.stiffness[mesh][:, position],
         # the pair that comes first along the path leaves first when the rotation is seen from behind

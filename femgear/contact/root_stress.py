@@ -1,0 +1,297 @@
+"""Stress in the tooth roots over the mesh cycle, by superposition of the loads of all tooth pairs.
+
+The finite-element sector of a gear gives once and for all the tangential stress along the root of a tooth
+per unit force at any flank station of any tooth of the body. The loads of the contact solution then add up
+to the stress at every position, loads on neighbouring teeth and on the other flank included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.contact.assembly import mesh_pairs
+from femgear.contact.flanks import LEFT, RIGHT, flank_load_columns, flank_stations, station_weights
+
+if TYPE_CHECKING:
+    from femgear.contact.bodies import Sectors
+    from femgear.contact.cycle import MeshCycle
+    from femgear.fe.elasticity import Material
+    from femgear.fe.grid import Grid
+    from femgear.gears import Gear, PlanetarySet
+
+LOADED, BACK = 0, 1
+
+
+@dataclass(frozen=True)
+class RootStress:
+    """Tangential stress along the tooth roots of one gear per unit flank load.
+
+    The root of a flank runs from the end of the flank along the fillet and the root arc to the middle of
+    the gap.
+
+    Parameters
+    ----------
+    roll : (n,) array
+        Roll lengths of the flank stations [m].
+    arc : (m,) array
+        Arc length of the root points from the end of the flank [m].
+    points : (m, 2) array
+        Root points of the left flank in the tooth frame [m].
+    slope : (m,) array
+        Angle between the tangent of the root and the centreline of the tooth [rad], 0 to pi/2; the
+        critical section of ISO 6336-3 is where it is 30 deg (60 deg for internal gears).
+    influence : (teeth, 2 m, 2 n) array
+        ``influence[k, a, b]``: stress at root point ``a`` of tooth ``i`` per unit inward normal force at
+        station ``b`` of tooth ``i - k`` [Pa/N], positive in tension; the left flank first, then the right.
+    """
+
+    roll: np.ndarray
+    arc: np.ndarray
+    points: np.ndarray
+    slope: np.ndarray
+    influence: np.ndarray
+
+
+@dataclass(frozen=True)
+class RootStresses:
+    """Root stress influences of the three kinds of gears."""
+
+    sun: RootStress
+    planet: RootStress
+    ring: RootStress
+
+
+@dataclass(frozen=True)
+class RootCycle:
+    """Root stress of the teeth of one gear in one mesh.
+
+    Slots are places along the path of contact one base pitch apart: those of `MeshCycle` with one more at
+    either end, where a tooth without load of its own still feels its neighbours.
+
+    Parameters
+    ----------
+    kind : str
+        ``"sun"``, ``"planet"`` or ``"ring"``.
+    mesh : int
+    gear : int
+        0 or 1: first or second gear of the mesh.
+    path : (T, P) array
+        Path coordinate of the tooth pair of each slot in base pitches, 0 at the pitch point.
+    load : (T, P) array
+        [N]
+    stress : (T, P, 2, m) array
+        Tangential stress along the root of the loaded flank (0) and of the back flank (1) [Pa].
+    arc : (m,) array
+        Arc length from the end of the flank [m].
+    slope : (m,) array
+        See `RootStress`.
+    periods : int
+        Mesh periods in the P positions.
+    """
+
+    kind: str
+    mesh: int
+    gear: int
+    path: np.ndarray
+    load: np.ndarray
+    stress: np.ndarray
+    arc: np.ndarray
+    slope: np.ndarray
+    periods: int
+
+
+@dataclass(frozen=True)
+class RootHistory:
+    """One tooth on its way through one mesh: path (S,) in base pitches, load (S,) [N], stress (S, 2, m) [Pa]."""
+
+    path: np.ndarray
+    load: np.ndarray
+    stress: np.ndarray
+
+
+def root_stress(
+    grid: Grid,
+    gear: Gear,
+    material: Material,
+    *,
+    held: str | None = "rim",
+    support=None,
+    state: str = "plane strain",
+) -> RootStress:
+    """Root stress influence of a whole gear from the grid of one sector.
+
+    The whole sector has one plane state: the stresses of a plane body under given forces do not depend on
+    its elastic constants (Michell's theorem; Timoshenko and Goodier, "Theory of Elasticity", 3rd ed.,
+    section 43), and a change of state within the fillet would make a jump that no gear has.
+
+    Parameters
+    ----------
+    grid : Grid
+        Mirror-symmetric sector with boundaries ``flank_left``, ``fillet_left``, ``cut_left``, ``cut_right``
+        and `held`.
+    gear : Gear
+    material : Material
+    held : str, optional
+        Boundary that cannot move; None when `support` holds the body.
+    support : (2n, 2n) sparse matrix, optional
+        Stiffness between the sector and the ground [N/m], as of `fe.elasticity.foundation`.
+    state : str
+        ``"plane strain"`` or ``"plane stress"``.
+
+    Raises
+    ------
+    GridError
+        When the body can move freely or the root is not one chain of edges.
+    """
+    from femgear.fe.compliance import condense_sector, mirror_nodes, mirrored_columns, tooth_compliance
+    from femgear.fe.elasticity import stiffness
+    from femgear.fe.stress import tangential_stress
+
+    names = tuple(name for name in ("fillet_left", "root_left") if name in grid.boundaries)
+    along = tangential_stress(grid, material, names[::-1] if gear.internal else names, state=state)
+    matrix = stiffness(grid, material, state=state, thickness=gear.face_width)
+    stations = flank_stations(grid, gear)
+    schur = condense_sector(
+        grid,
+        matrix if support is None else matrix + support,
+        count=gear.teeth,
+        held=held,
+        loads=flank_load_columns(grid, stations),
+        observations=along.columns,
+    )
+    both = np.hstack([along.columns, mirrored_columns(along.columns, mirror_nodes(grid))])
+    influence = tooth_compliance(_with_cut(schur, grid, held, both))
+    order = slice(None, None, -1 if gear.internal else 1)
+    m = len(along.arc)
+    influence = influence.reshape(gear.teeth, 2, m, -1)[:, :, order].reshape(gear.teeth, 2 * m, -1)
+    return RootStress(
+        roll=stations.roll,
+        arc=np.abs(along.arc - along.arc[order][0])[order],
+        points=along.points[order],
+        slope=np.arccos(np.clip(np.abs(along.tangents[order, 0]), 0.0, 1.0)),
+        influence=influence,
+    )
+
+
+def _with_cut(schur, grid, held, observations):
+    """Add what the observations see of the cut itself: the last edge of the root ends on it."""
+    from femgear.fe.compliance import split_sector
+
+    _, right, left = split_sector(grid, held)
+    direct = np.stack([observations[right], observations[left]])
+    return replace(schur, observation_cut=schur.observation_cut + direct)
+
+
+def set_root_stress(sectors: Sectors, material: Material) -> RootStresses:
+    """Influences of sun, planet and ring, each held at its rim as in `bodies.make_bodies`."""
+    return RootStresses(
+        *(root_stress(s.grid, s.gear, material) for s in (sectors.sun, sectors.planet, sectors.ring))
+    )
+
+
+def root_stress_cycle(
+    planetary_set: PlanetarySet, roots: RootStresses, cycle: MeshCycle, *, reverse: bool = False
+) -> tuple[RootCycle, ...]:
+    """Root stress of both gears of every mesh at every position of the cycle.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    roots : RootStresses
+    cycle : MeshCycle
+        Of that set. The load of a tooth pair acts at its point on the line of action.
+    reverse : bool
+        Whether the cycle is that of a negative torque on the sun, `mirrored.walk_either_flank`; the stress
+        field is then the mirror image of that on the other flanks.
+
+    Returns
+    -------
+    tuple of RootCycle
+        Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on.
+    """
+    N = planetary_set.n_planets
+    found = {}
+    meshes = range(N)
+    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
+    bodies = [("sun", roots.sun, [(j, 0, LEFT) for j in meshes])]
+    bodies += [("planet", roots.planet, [(n, 1, LEFT), (N + n, 0, RIGHT)]) for n in meshes]
+    bodies.append(("ring", roots.ring, [(N + j, 1, LEFT) for j in meshes]))
+    for kind, root, acting in bodies:
+        loads = [_station_loads(planetary_set, root, cycle, *one, reverse) for one in acting]
+        for mesh, gear, side in acting:
+            found[mesh, gear] = _one_mesh(planetary_set, kind, root, cycle, (mesh, gear, side), acting, loads)
+    return tuple(found[mesh, gear] for mesh in range(2 * N) for gear in (0, 1))
+
+
+def _station_loads(planetary_set, root: RootStress, cycle, mesh, gear, side, reverse) -> np.ndarray:
+    """Forces at the stations of both flanks of every loaded tooth, shape (T, 2 n, P) [N]."""
+    pair = mesh_pairs(planetary_set)[int(mesh >= planetary_set.n_planets)]
+    zeta = np.clip(-cycle.path[mesh] if reverse else cycle.path[mesh], *pair.path)
+    roll = pair.pitch_roll_1 + zeta if gear == 0 else pair.pitch_roll_2 - pair.sign * zeta
+    index, weight = station_weights(roll, root.roll)
+    teeth, positions = roll.shape
+    n = len(root.roll)
+    result = np.zeros((teeth, 2 * n, positions))
+    t, p = np.indices((teeth, positions))
+    values = weight * cycle.tooth_load[mesh][..., None]
+    np.add.at(result, (t[..., None], index + side * n, p[..., None]), values)
+    return result
+
+
+def _one_mesh(planetary_set, kind, root: RootStress, cycle, target, acting, loads, reverse) -> RootCycle:
+    """Stress on the teeth of one mesh (mesh, gear, side) under the loads of all meshes of the body."""
+    mesh, gear, side = target
+    count = len(root.influence)
+    teeth = _slots(cycle.tooth[gear, mesh], kind)
+    # seen from behind the teeth are counted the other way round
+    sense = -1 if reverse else 1
+    total = np.zeros((len(teeth), root.influence.shape[1], len(cycle.position)))
+    for (other, other_gear, _), forces in zip(acting, loads, strict=True):
+        for tooth, force in zip(
+            cycle.tooth[other_gear if other_gear == gear or True else gear, other], forces
+        ):
+            if force.any():
+                total += root.influence[(teeth - tooth) % count] @ force
+    stress = total.reshape(len(teeth), 2, -1, len(cycle.position)).transpose(0, 3, 1, 2)
+    path = cycle.path[mesh] / planetary_set.sun.base_pitch
+    load = np.zeros((len(teeth), len(cycle.position)))
+    load[1:-1] = cycle.tooth_load[mesh]
+    return RootCycle(
+        kind=kind,
+        mesh=mesh,
+        gear=gear,
+        path=np.vstack([path[:1] - 1.0, path, path[-1:] + 1.0]),
+        load=load,
+        stress=stress if side == LEFT else stress[:, :, ::-1],
+        arc=root.arc,
+        slope=root.slope,
+        periods=cycle.periods,
+    )
+
+
+def _slots(teeth, kind) -> np.ndarray:
+    """Tooth numbers of the slots of a mesh with one more at either end."""
+    # the sun's teeth come one after another, those of planets and ring the other way round
+    step = 1 if kind == "sun" else -1
+    return np.concatenate([teeth[:1] - step, teeth, teeth[-1:] + step])
+
+
+def tooth_history(root: RootCycle, *, start: int = 0) -> RootHistory:
+    """Follow one tooth from slot to slot through the mesh.
+
+    Parameters
+    ----------
+    root : RootCycle
+    start : int
+        Mesh period of the record in which the tooth enters the first slot; records of one period serve
+        all teeth.
+    """
+    slots, positions = root.path.shape
+    each = positions // root.periods
+    slot = np.repeat(np.arange(slots), each)
+    period = (start + slot) % root.periods
+    position = period * each + np.tile(np.arange(each), slots)
+    return RootHistory(root.path[slot, position], root.load[slot, position], root.stress[slot, position])

@@ -1,0 +1,373 @@
+"""Deviations of a planetary set from its ideal gears, as separations of the loaded flanks.
+
+All separations are in metres along the flank normal, positive where material is missing or flanks stand
+further apart; they add to the gap of the contact problem. Loaded flanks are those of a positive sun torque:
+left of the sun on left of the planet ("sun side"), right of the planet ("ring side") on left of the ring.
+
+Teeth are numbered counter-clockwise; tooth 0 of a gear is the one whose centre `motion.orientations` gives:
+of the sun and of every planet a tooth that touches at the pitch point of its mesh "sun-planet" at the
+position ``-phi``, of the ring one that touches at the pitch point of "planet 1-ring" there. A displacement
+``u`` of a body changes the separation by its component along the line of action: involute flanks are parallel
+curves, so this is exact to first order (the next term is ``u^2`` over the centre distance).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.gears.modifications import FlankForm, Modification, form_deviation
+from femgear.gears.motion import orientations
+
+if TYPE_CHECKING:
+    from femgear.gears.planetary import PlanetarySet
+
+__all__ = [
+    "FlankForm",
+    "Modification",
+    "Ovality",
+    "Runout",
+    "SetDeviations",
+    "body_separation",
+    "common_period",
+    "form_deviation",
+    "mesh_normals",
+    "no_deviations",
+    "profile_separation",
+    "tooth_separation",
+]
+
+LONGEST_RECORD = 256
+"""Mesh periods that a record spans at most unless told otherwise."""
+
+
+@dataclass(frozen=True)
+class Runout:
+    """Eccentricity of a gear: the centre of its teeth lies off its axis of rotation.
+
+    Parameters
+    ----------
+    amplitude : float
+        Distance of the two centres [m], half of the total reading F_r of ISO 1328-2.
+    phase : float
+        Direction of the teeth's centre in the body [rad], counter-clockwise from the centre of tooth 0; of
+        the carrier from the x axis of its frame.
+    """
+
+    amplitude: float = 0.0
+    phase: float = 0.0
+
+
+@dataclass(frozen=True)
+class Ovality:
+    """Out-of-roundness of the ring: ``u_r = amplitude cos(n (phi - phase))``, outwards positive.
+
+    Parameters
+    ----------
+    nodal_diameter : int
+        n, at least 1.
+    amplitude : float
+        [m]
+    phase : float
+        Angle of a crest on the ring from the centre of its tooth 0 [rad].
+    inextensional : bool
+        Whether the teeth also shift along the circle as those of a ring that was bent without being
+        stretched do, ``u_t = -(amplitude/n) sin(n (phi - phase))``; otherwise they keep their angles.
+    """
+
+    nodal_diameter: int = 2
+    amplitude: float = 0.0
+    phase: float = 0.0
+    inextensional: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class SetDeviations:
+    """All deviations of a set with N planets; see the module for numbering and signs.
+
+    Parameters
+    ----------
+    sun, planet_sun_side, planet_ring_side, ring : FlankForm
+        Modifications of the loaded flanks; those of sun and ring stand for both flanks of a tooth.
+    sun_pitch, ring_pitch : (z,) array
+        Separation of each tooth's loaded flank from its cumulative pitch deviation [m].
+    planet_pitch, planet_ring_side_pitch : (N, z_p) array
+        The same of the sun-side (left) and ring-side (right) flanks of every planet [m].
+    sun_runout, ring_runout, carrier_runout : Runout
+    planet_runout : tuple of Runout, one a planet
+    pin_errors : (N, 2) array
+        Radial (outwards) and tangential (counter-clockwise) displacement of the planet axes [m].
+    ovality : Ovality
+    sun_thickness, ring_thickness : float
+        Reduction of the tooth thickness at the reference circle [m]; it only adds backlash.
+    planet_thickness : (N,) array
+        The same of every planet [m]. Only its differences separate loaded flanks: they stay in touch on the
+        planet with the thickest teeth, as they do for the set's own allowances.
+    """
+
+    sun: FlankForm
+    planet_sun_side: FlankForm
+    planet_ring_side: FlankForm
+    ring: FlankForm
+    sun_pitch: np.ndarray
+    planet_pitch: np.ndarray
+    planet_ring_side_pitch: np.ndarray
+    ring_pitch: np.ndarray
+    planet_runout: tuple[Runout, ...]
+    pin_errors: np.ndarray
+    planet_thickness: np.ndarray
+    sun_runout: Runout = Runout()
+    ring_runout: Runout = Runout()
+    carrier_runout: Runout = Runout()
+    ovality: Ovality = Ovality()
+    sun_thickness: float = 0.0
+    ring_thickness: float = 0.0
+
+    def __post_init__(self):
+        for name in _ARRAYS:
+            array = np.array(getattr(self, name), dtype=float)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def ideal(self) -> bool:
+        """Whether nothing here separates a loaded flank."""
+        forms = (self.sun, self.planet_sun_side, self.planet_ring_side, self.ring)
+        pitches = (self.sun_pitch, self.planet_pitch, self.planet_ring_side_pitch, self.ring_pitch)
+        runouts = (self.sun_runout, self.ring_runout, self.carrier_runout, *self.planet_runout)
+        return not (
+            any(form.modifications for form in forms)
+            or any(pitch.any() for pitch in pitches)
+            or any(runout.amplitude for runout in runouts)
+            or self.pin_errors.any()
+            or self.ovality.amplitude
+            or np.ptp(self.planet_thickness)
+        )
+
+
+_ARRAYS = (
+    "sun_pitch",
+    "planet_pitch",
+    "planet_ring_side_pitch",
+    "ring_pitch",
+    "pin_errors",
+    "planet_thickness",
+)
+
+
+def no_deviations(planetary_set: PlanetarySet) -> SetDeviations:
+    """Deviations of ideal gears: none. `dataclasses.replace` puts in what there is."""
+    s, N = planetary_set, planetary_set.n_planets
+    return SetDeviations(
+        sun=FlankForm(),
+        planet_sun_side=FlankForm(),
+        planet_ring_side=FlankForm(),
+        ring=FlankForm(),
+        sun_pitch=np.zeros(s.sun.teeth),
+        planet_pitch=np.zeros((N, s.planet.teeth)),
+        planet_ring_side_pitch=np.zeros((N, s.planet.teeth)),
+        ring_pitch=np.zeros(s.ring.teeth),
+        planet_runout=(Runout(),) * N,
+        pin_errors=np.zeros((N, 2)),
+        planet_thickness=np.zeros(N),
+    )
+
+
+def profile_separation(
+    deviations: SetDeviations, planetary_set: PlanetarySet, kind: int, roll_1, roll_2, *, back: bool = False
+):
+    """Separation of two flanks by their modifications.
+
+    Parameters
+    ----------
+    deviations : SetDeviations
+    planetary_set : PlanetarySet
+    kind : int
+        0 for sun-planet (gear 1 is the sun), 1 for planet-ring (gear 1 is the planet).
+    roll_1, roll_2 : arrays that broadcast
+        Roll lengths of the facing points on gear 1 and gear 2 [m].
+    back : bool
+        The other flanks of the teeth; those of a planet are its ring side in the mesh with the sun.
+
+    Returns
+    -------
+    array
+        [m]
+    """
+    d, s = deviations, planetary_set
+    planet = d.planet_sun_side if (kind == 0) is not back else d.planet_ring_side
+    one, two = ((d.sun, s.sun), (planet, s.planet)) if kind == 0 else ((planet, s.planet), (d.ring, s.ring))
+    return form_deviation(*one, roll_1) + form_deviation(*two, roll_2)
+
+
+def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):
+    """Separation of the loaded flanks of two teeth by their pitch deviations.
+
+    Parameters
+    ----------
+    deviations : SetDeviations
+    mesh : int
+        0 .. N-1 for sun-planet, N .. 2N-1 for planet-ring.
+    tooth_1, tooth_2 : integer arrays that broadcast
+        Numbers of the teeth on gear 1 and gear 2, taken modulo the tooth numbers.
+    back : bool
+        The other flanks of the teeth: a tooth of sun or ring moves as a whole.
+
+    Returns
+    -------
+    array
+        [m]
+    """
+    d, N = deviations, len(deviations.planet_pitch)
+    planets = d.planet_pitch if (mesh < N) is not back else d.planet_ring_side_pitch
+    planet, whole = planets[mesh % N], -1.0 if back else 1.0
+    one, two = (whole * d.sun_pitch, planet) if mesh < N else (planet, whole * d.ring_pitch)
+    return one[np.asarray(tooth_1) % len(one)] + two[np.asarray(tooth_2) % len(two)]
+
+
+def mesh_normals(planetary_set: PlanetarySet, *, back: bool = False) -> np.ndarray:
+    """Unit vectors, (2N, 2), of the force of gear 1 on gear 2 in every mesh: its line of action.
+
+    Sun on planet at ``psi + pi/2 - alpha_w``, planet on ring at ``psi - pi/2 + alpha_w`` (carrier frame); the
+    back flanks, with `back`, at ``psi - pi/2 + alpha_w`` and ``psi + pi/2 - alpha_w``.
+    """
+    s = planetary_set
+    psi, side = np.asarray(s.planet_angles), -1.0 if back else 1.0
+    angle = np.concatenate(
+        [
+            psi + side * (0.5 * np.pi - s.working_pressure_angle_sun_planet),
+            psi - side * (0.5 * np.pi - s.working_pressure_angle_planet_ring),
+        ]
+    )
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def body_separation(
+    deviations: SetDeviations, planetary_set: PlanetarySet, position, *, back: bool = False
+) -> np.ndarray:
+    """Separation of every mesh by displaced bodies: runouts, pin errors, ovality, planet thickness.
+
+    Parameters
+    ----------
+    deviations : SetDeviations
+    planetary_set : PlanetarySet
+    position : (P,) array
+        tau, as a fraction of mesh periods; may exceed 1.
+    back : bool
+        Of the other flanks: what adds to the backlash of the set there, thickness of all gears included.
+
+    Returns
+    -------
+    (2N, P) array
+        ``n . (u_2 - u_1)`` [m] with the normals of `mesh_normals` and the displacements of both bodies, and
+        the part of the reduced tooth thickness on that side.
+    """
+    d, s = deviations, planetary_set
+    moved = _relative_displacements(d, s, np.atleast_1d(np.asarray(position, float)))
+    normals = mesh_normals(s, back=back) @ np.array([1.0, 1.0j])
+    thinner = np.tile(0.5 * (d.planet_thickness - d.planet_thickness.min()), 2)
+    if back:
+        others = np.repeat([d.sun_thickness, d.ring_thickness], s.n_planets)
+        thinner = others + np.tile(d.planet_thickness, 2) - thinner
+    return (normals.conj()[:, None] * moved).real + thinner[:, None] * math.cos(s.sun.pressure_angle)
+
+
+def _relative_displacements(d: SetDeviations, s: PlanetarySet, position: np.ndarray) -> np.ndarray:
+    """Displacement of gear 2 less that of gear 1 of every mesh, (2N, P), as x + iy."""
+    start = orientations(s)
+    sun = _turning(d.sun_runout, start.sun + position * s.sun.pitch_angle)
+    turned = [
+        _turning(runout, angle - position * s.planet.pitch_angle)
+        for runout, angle in zip(d.planet_runout, start.planets, strict=True)
+    ]
+    planets = _pins(d, s)[:, None] + np.array(turned)
+    ring_angle = start.ring - position * s.ring.pitch_angle
+    ring = _turning(d.ring_runout, ring_angle) + _oval(d.ovality, np.asarray(s.planet_angles), ring_angle)
+    return np.concatenate([planets - sun, ring - planets])
+
+
+def _turning(runout: Runout, tooth_zero) -> np.ndarray:
+    """Displacement, as x + iy, of a body whose tooth 0 stands at the angles `tooth_zero` (P,)."""
+    return runout.amplitude * np.exp(1j * (tooth_zero + runout.phase))
+
+
+def _pins(deviations: SetDeviations, planetary_set: PlanetarySet) -> np.ndarray:
+    """Displacement (N,), as x + iy, of the planet axes: pin errors and the eccentric pin circle."""
+    errors = deviations.pin_errors @ np.array([1.0, 1.0j])
+    return errors * np.exp(1j * np.asarray(planetary_set.planet_angles)) + _turning(
+        deviations.carrier_runout, 0.0
+    )
+
+
+def _oval(ovality: Ovality, psi: np.ndarray, ring_angle: np.ndarray) -> np.ndarray:
+    """Displacement (N, P), as x + iy, of the ring at the planets' angles."""
+    n = ovality.nodal_diameter
+    wave = n * (psi[:, None] - ring_angle - ovality.phase)
+    along = -np.sin(wave) / n if ovality.inextensional else 0.0
+    return ovality.amplitude * (np.cos(wave) + 1j * along) * np.exp(1j * psi[:, None])
+
+
+def common_period(
+    deviations: SetDeviations, planetary_set: PlanetarySet, *, limit: int = LONGEST_RECORD
+) -> tuple[int, str]:
+    """Number of mesh periods after which everything repeats.
+
+    A member whose teeth or whose axis deviate repeats after the mesh periods of its own turn against the
+    carrier, one a tooth, or after an integer part of it if the deviations repeat earlier; all together after
+    their least common multiple (the hunting period). Modifications, pin errors and an eccentric carrier
+    stand still in the carrier frame.
+
+    Parameters
+    ----------
+    deviations : SetDeviations
+    planetary_set : PlanetarySet
+    limit : int
+        Most mesh periods wanted. Beyond it the record is one turn of the carrier against the ring, z_r mesh
+        periods, or the limit when even that is too long; it then does not close.
+
+    Returns
+    -------
+    periods : int
+    message : str
+        What decided it, in one sentence.
+    """
+    parts = {name: count for name, count in _own_periods(deviations, planetary_set) if count > 1}
+    if not parts:
+        return 1, "one mesh period: no deviation turns with a body"
+    periods = math.lcm(*parts.values())
+    causes = ", ".join(f"{name} {count}" for name, count in parts.items())
+    if periods <= limit:
+        return periods, f"{periods} mesh periods, after which all repeats ({causes})"
+    teeth = planetary_set.ring.teeth
+    if teeth <= limit:
+        kept, what = teeth, "one turn of the carrier against the ring"
+    else:
+        kept, what = limit, "the most allowed"
+    return kept, (
+        f"{kept} mesh periods, {what}: all repeats only after {periods} ({causes}), more than the limit of "
+        f"{limit}; the record does not close"
+    )
+
+
+def _own_periods(d: SetDeviations, s: PlanetarySet):
+    yield "sun", math.lcm(_repeat(d.sun_pitch), s.sun.teeth if d.sun_runout.amplitude else 1)
+    planets = [
+        math.lcm(_repeat(one), _repeat(two), s.planet.teeth if runout.amplitude else 1)
+        for one, two, runout in zip(d.planet_pitch, d.planet_ring_side_pitch, d.planet_runout, strict=True)
+    ]
+    yield "planets", math.lcm(*planets)
+    oval = s.ring.teeth // math.gcd(s.ring.teeth, d.ovality.nodal_diameter) if d.ovality.amplitude else 1
+    yield "ring", math.lcm(_repeat(d.ring_pitch), s.ring.teeth if d.ring_runout.amplitude else 1, oval)
+
+
+def _repeat(values: np.ndarray) -> int:
+    """Smallest divisor of the number of teeth by which the values may be shifted without a change."""
+    count = len(values)
+    return next(
+        step
+        for step in range(1, count + 1)
+        if count % step == 0 and np.array_equal(values, np.roll(values, step))
+    )

@@ -1,0 +1,232 @@
+"""Micro-geometry of one flank: what is taken off the involute, as a function of the roll length.
+
+Amounts are lengths along the flank normal, positive where material is missing. A law that starts or ends
+nowhere in particular spans the involute from the form circle ("root") to the tip circle ("tip"), for internal
+gears too. Terms and sign of relief, crowning and slope are those of ISO 21771-1 and ISO 1328-1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import GeometryError
+
+if TYPE_CHECKING:
+    from femgear.gears.gear import Gear
+
+LARGEST_DEVIATION = 0.2
+"""Largest plausible amount of any modification or error, in modules."""
+
+
+@dataclass(frozen=True)
+class TipRelief:
+    """Material taken off towards the tip: ``amount ((s - start)/(end - start))^power`` beyond the start.
+
+    Parameters
+    ----------
+    amount : float
+        At the end [m]; the law goes on to the tip when the end lies before it.
+    start : float
+        Roll length where it starts [m].
+    end : float, optional
+        Roll length where the amount is reached [m]; the tip circle when omitted.
+    power : float
+        1 linear, 2 parabolic.
+    """
+
+    amount: float
+    start: float
+    end: float | None = None
+    power: float = 1.0
+
+
+@dataclass(frozen=True)
+class RootRelief:
+    """Material taken off towards the root; parameters as `TipRelief`, the end is the form circle or given.
+
+    An end at the start of active profile gives the amount there.
+    """
+
+    amount: float
+    start: float
+    end: float | None = None
+    power: float = 1.0
+
+
+@dataclass(frozen=True)
+class ProfileSlope:
+    """Straight profile turned about its middle.
+
+    Parameters
+    ----------
+    amount : float
+        Rise of the profile from start to end [m]; positive where the tip has more material (the sign of
+        f_H-alpha in ISO 1328-1), zero halfway.
+    start, end : float, optional
+        Roll lengths at the root end and the tip end of the evaluated part [m]; form and tip circle.
+    """
+
+    amount: float
+    start: float | None = None
+    end: float | None = None
+
+
+@dataclass(frozen=True)
+class ProfileCrowning:
+    """Barrelling: a parabola that takes the amount off at both ends and nothing halfway.
+
+    Parameters
+    ----------
+    amount : float
+        C_alpha of ISO 21771-1 [m].
+    start, end : float, optional
+        Roll lengths at the root end and the tip end of the evaluated part [m]; form and tip circle.
+    """
+
+    amount: float
+    start: float | None = None
+    end: float | None = None
+
+
+@dataclass(frozen=True)
+class MeasuredProfile:
+    """Any profile from its points, straight between them and constant beyond the first and the last.
+
+    Parameters
+    ----------
+    roll : tuple of float
+        Roll lengths, ascending [m].
+    removed : tuple of float
+        Material missing there [m]; measuring machines draw the opposite sign.
+    """
+
+    roll: tuple[float, ...]
+    removed: tuple[float, ...]
+
+
+Modification = TipRelief | RootRelief | ProfileSlope | ProfileCrowning | MeasuredProfile
+
+
+@dataclass(frozen=True)
+class FlankForm:
+    """All modifications of one flank; they add up."""
+
+    modifications: tuple[Modification, ...] = ()
+
+
+def form_deviation(form: FlankForm, gear: Gear, roll):
+    """Material removed from a flank at roll lengths.
+
+    Parameters
+    ----------
+    form : FlankForm
+    gear : Gear
+    roll : array, any shape
+        Roll lengths [m]; beyond the ends of the involute flank the value of that end holds.
+
+    Returns
+    -------
+    array of the shape of `roll`
+        Separation along the flank normal [m], positive where material is missing.
+    """
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    roll = np.clip(np.asarray(roll, float), low, high)
+    total = np.zeros(roll.shape)
+    for modification in form.modifications:
+        total = total + _removed(modification, gear, roll)
+    return total
+
+
+def _removed(modification: Modification, gear: Gear, roll: np.ndarray) -> np.ndarray:
+    if isinstance(modification, MeasuredProfile):
+        return np.interp(roll, modification.roll, modification.removed)
+    start, end = modification_range(modification, gear)
+    t = (roll - start) / (end - start)
+    if isinstance(modification, ProfileSlope):
+        return modification.amount * (0.5 - t)
+    if isinstance(modification, ProfileCrowning):
+        return modification.amount * (2.0 * t - 1.0) ** 2
+    return modification.amount * np.maximum(t, 0.0) ** modification.power
+
+
+def modification_range(modification: Modification, gear: Gear) -> tuple[float, float]:
+    """Roll lengths [m] of start and end of a law, of the first and the last point of a measured profile."""
+    if isinstance(modification, MeasuredProfile):
+        return modification.roll[0], modification.roll[-1]
+    root, tip = gear.form_roll, gear.tip_roll
+    default_end = root if isinstance(modification, RootRelief) else tip
+    start = root if modification.start is None else modification.start
+    return start, default_end if modification.end is None else modification.end
+
+
+def check_form(form: FlankForm, gear: Gear) -> None:
+    """Refuse modifications that the flank of the gear cannot have.
+
+    Raises
+    ------
+    GeometryError
+        E-MODIFICATION: numbers that are not finite, amounts over `LARGEST_DEVIATION` modules, laws that
+        start or end outside the involute or run the wrong way, unordered points.
+    """
+    for number, modification in enumerate(form.modifications):
+        problem = _problem(modification, gear)
+        if problem is not None:
+            message, value, limit = problem
+            raise GeometryError(
+                f"{gear.name}: {message}",
+                code="E-MODIFICATION",
+                key=f"{gear.name}.modifications[{number}]",
+                value=value,
+                limit=limit,
+                remedy="diameters, roll angles and roll lengths are those of the involute of this gear",
+            )
+
+
+def _problem(modification: Modification, gear: Gear):
+    """Message, value and limit of what is wrong with a modification, or None."""
+    most = LARGEST_DEVIATION * gear.module
+    if isinstance(modification, MeasuredProfile):
+        return _points_problem(modification, most)
+    if not (math.isfinite(modification.amount) and abs(modification.amount) <= most):
+        limit = f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.1f} um"
+        return "the amount is not plausible", f"{modification.amount * 1e6:.6g} um", limit
+    relief = isinstance(modification, TipRelief | RootRelief)
+    if relief and not 0.1 <= modification.power <= 20.0:
+        return "the power of the relief is not plausible", modification.power, "0.1 to 20"
+    start, end = modification_range(modification, gear)
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    tolerance = 1e-6 * gear.module
+    for name, value in (("start", start), ("end", end)):
+        if not low - tolerance <= value <= high + tolerance:
+            return f"the modification {name}s outside the involute flank", _place(gear, value), _flank(gear)
+    outwards = (end > start) == (gear.tip_roll > gear.form_roll)
+    if abs(end - start) < 1e-3 * (high - low) or outwards == isinstance(modification, RootRelief):
+        wanted = "root" if isinstance(modification, RootRelief) else "tip"
+        found = f"from {_place(gear, start)} to {_place(gear, end)}"
+        return "start and end coincide or are exchanged", found, f"from the start towards the {wanted}"
+    return None
+
+
+def _points_problem(profile: MeasuredProfile, most: float):
+    roll, removed = np.asarray(profile.roll, float), np.asarray(profile.removed, float)
+    if roll.ndim != 1 or roll.shape != removed.shape or len(roll) < 2:
+        return "a measured profile needs pairs of numbers", len(roll), "two points or more"
+    if not (np.isfinite(roll).all() and np.isfinite(removed).all() and np.all(np.diff(roll) > 0)):
+        return "the points of a measured profile are not finite or not in ascending order", None, "ascending"
+    if np.abs(removed).max() > most:
+        limit = f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.1f} um"
+        return "a measured deviation is not plausible", f"{np.abs(removed).max() * 1e6:.6g} um", limit
+    return None
+
+
+def _place(gear: Gear, roll: float) -> str:
+    diameter, angle = 2e3 * math.hypot(roll, gear.base_radius), math.degrees(roll / gear.base_radius)
+    return f"diameter {diameter:.4f} mm, roll angle {angle:.4f} deg"
+
+
+def _flank(gear: Gear) -> str:
+    return f"{_place(gear, gear.form_roll)} (form circle) to {_place(gear, gear.tip_roll)} (tip circle)"
