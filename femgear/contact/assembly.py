@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.contact.candidates import FlankPair, Windows, flank_pair, window_polynomials, windows
+from femgear.contact.flank_sides import BACK, DRIVE, flank_side, side_teeth
 from femgear.contact.flanks import LEFT, RIGHT, FlankCompliance, station_weights
 from femgear.contact.halfplane import hertz_line, surface_displacement
-from femgear.contact.teeth import tooth_numbers
 
 if TYPE_CHECKING:
     from femgear.contact.supports import MovingMembers
@@ -32,7 +32,9 @@ class Bodies:
 
 @dataclass(frozen=True)
 class MeshWindows:
-    """Contact windows of all meshes and positions; arrays lead with (2N, P, pairs).
+    """Contact windows of all meshes and positions; arrays lead with (meshes, P, pairs).
+
+    There are 2N meshes, or 4N with the back flanks.
 
     Parameters
     ----------
@@ -153,6 +155,7 @@ def mesh_windows(
     periods: int = 1,
     deviations: SetDeviations | None = None,
     planet_gaps=None,
+    both_flanks: bool = False,
 ) -> MeshWindows:
     """Windows of every mesh at every position.
 
@@ -174,21 +177,41 @@ def mesh_windows(
     deviations : SetDeviations, optional
     planet_gaps : (N,) array, optional
         Extra separation of the sun-side flanks of each planet [m].
+    both_flanks : bool
+        Back flanks as well, as meshes 2N .. 4N - 1.
     """
-    N = planetary_set.n_planets
-    pairs = mesh_pairs(planetary_set)
     pitch = planetary_set.sun.base_pitch
-    phase = np.asarray(planetary_set.mesh_phases)
+    pairs = mesh_pairs(planetary_set)
     tau = np.arange(positions * periods) / positions
     turns = np.floor(tau).astype(int)
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
-    first = np.floor(begin - phase - 1.0).astype(int) - 1
-    index = first[:, None] + np.arange(int(np.ceil(end - begin)) + 4)
-    zeta = pitch * ((tau - turns)[None, :, None] + phase[:, None, None] + index[:, None, :])
-    tooth = tooth_numbers(planetary_set, index)
-    shift = _pair_separations(planetary_set, deviations, planet_gaps, tooth, turns, tau)
-    found, areas, local = [], [], []
+    count = int(np.ceil(end - begin)) + 4
+    found, teeth = [], []
+    for direction in (DRIVE, BACK) if both_flanks else (DRIVE,):
+        side = flank_side(planetary_set, direction)
+        first = np.floor(begin - side.phase - 0.5 * (1.0 + direction)).astype(int) - 1
+        index = first[:, None] + np.arange(count)
+        passed = direction * (tau - turns)
+        zeta = pitch * (passed[None, :, None] + side.phase[:, None, None] + index[:, None, :])
+        tooth = side_teeth(planetary_set, index, direction)
+        shift = _pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
+        shift += side.clearance[:, None, None]
+        if direction > 0 and planet_gaps is not None:
+            shift[: planetary_set.n_planets] += np.asarray(planet_gaps, float)[:, None, None]
+        form = [_profile_form(planetary_set, deviations, kind, direction < 0) for kind in (0, 1)]
+        found += _side_windows(
+            planetary_set, bodies, pairs, zeta, shift, form, share, cells, nearest, contact
+        )
+        teeth.append(tooth)
+    tooth = tuple(np.concatenate([t[gear] for t in teeth]) for gear in (0, 1))
+    return _gather(found, tooth, turns, planetary_set.n_planets, bodies, cells)
+
+
+def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells, nearest, contact):
+    """Windows of both kinds of mesh on one side of the teeth."""
+    N = planetary_set.n_planets
+    found = []
     for kind, pair in enumerate(pairs):
         half_width = contact_half_width(pair, share / bodies.face_width, bodies.material)
         rows = slice(kind * N, (kind + 1) * N)
@@ -200,40 +223,38 @@ def mesh_windows(
                 cells=cells,
                 nearest=nearest,
                 line_of_action=contact == "line_of_action",
-                form=_profile_form(planetary_set, deviations, kind),
+                form=form[kind],
                 shift=shift[rows],
             )
         )
-        areas += [found[-1].cell * bodies.face_width] * N
-        local.append(local_compliance(found[-1].cell, cells, bodies))
-    return _gather(found, tooth, turns, N, np.array(areas), local)
+    return found
 
 
-def _profile_form(planetary_set, deviations, kind):
+def _profile_form(planetary_set, deviations, kind, back):
     """Separation by deviations of the profiles as a function of both roll lengths, or None."""
     if deviations is None:
         return None
     from femgear.gears.deviations import profile_separation
 
-    return lambda roll_1, roll_2: profile_separation(deviations, planetary_set, kind, roll_1, roll_2)
+    return lambda roll_1, roll_2: profile_separation(
+        deviations, planetary_set, kind, roll_1, roll_2, back=back
+    )
 
 
-def _pair_separations(planetary_set, deviations, planet_gaps, tooth, turns, tau) -> np.ndarray:
+def _pair_separations(planetary_set, deviations, tooth, turns, tau, *, back) -> np.ndarray:
     """Separations of whole tooth pairs by errors of pitch and position, shape (2N, P, pairs) [m]."""
     N = planetary_set.n_planets
     shift = np.zeros((2 * N, len(tau), tooth[0].shape[1]))
-    if planet_gaps is not None:
-        shift[:N] += np.asarray(planet_gaps, float)[:, None, None]
     if deviations is not None:
         from femgear.gears.deviations import body_separation, tooth_separation
 
-        shift += body_separation(deviations, planetary_set, tau)[:, :, None]
+        shift += body_separation(deviations, planetary_set, tau, back=back)[:, :, None]
         for mesh in range(2 * N):
             # with every mesh period the sun's teeth move on by one, those of planets and ring back
             sign = -1 if mesh < N else 1
             first = tooth[0][mesh][None, :] + sign * turns[:, None]
             second = tooth[1][mesh][None, :] + turns[:, None]
-            shift[mesh] += tooth_separation(deviations, mesh, first, second)
+            shift[mesh] += tooth_separation(deviations, mesh, first, second, back=back)
     return shift
 
 
@@ -248,15 +269,15 @@ def local_compliance(cell: float, cells: int, bodies: Bodies) -> np.ndarray:
     return toeplitz(2.0 * one / bodies.face_width)
 
 
-def _gather(found: list[Windows], tooth, turns, N, areas, local) -> MeshWindows:
-    """Join both kinds of mesh and drop the leading and trailing pairs that never come near."""
+def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows:
+    """Join all meshes and drop the leading and trailing pairs that never come near."""
     used = np.concatenate([w.near.any(axis=1) for w in found])
     # every mesh keeps the same number of pairs, starting at its own first candidate
     first = used.argmax(axis=1)
     count = int((used.shape[1] - used[:, ::-1].argmax(axis=1) - first).max())
     first = np.minimum(first, used.shape[1] - count)
     take = first[:, None] + np.arange(count)
-    row = np.arange(2 * N)[:, None]
+    row = np.arange(len(used))[:, None]
 
     def join(name):
         joined = np.concatenate([getattr(w, name) for w in found])
@@ -275,8 +296,8 @@ def _gather(found: list[Windows], tooth, turns, N, areas, local) -> MeshWindows:
         edge=(join("at_low_edge"), join("at_high_edge")),
         tooth=(tooth[0][row, take], tooth[1][row, take]),
         turns=turns,
-        local=np.stack(local),
-        cell_area=areas,
+        local=np.stack([local_compliance(w.cell, cells, bodies) for w in found[:2]]),
+        cell_area=np.repeat([w.cell * bodies.face_width for w in found], N),
     )
 
 
@@ -295,13 +316,14 @@ def assemble_contact(
     polynomials = window_polynomials(cells)
     n = len(mesh)
     H = np.einsum("ca,wavb,db->wcvd", polynomials, H, polynomials, optimize=True)
-    H[np.arange(n), :, np.arange(n), :] += setup.local[(mesh >= N).astype(int)]
+    H[np.arange(n), :, np.arange(n), :] += setup.local[mesh // N % 2]
     gap = setup.gap[mesh, position, pair].ravel()
     keep = np.isfinite(gap)
     H = H.reshape(n * cells, n * cells)[np.ix_(keep, keep)]
     of_cell = np.repeat(mesh, cells)[keep]
-    approach = rotation_approach(N)
-    supports = np.zeros((2 * N, 2 * N))
+    sides = setup.near.shape[0] // (2 * N)
+    approach = np.vstack([rotation_approach(N), -rotation_approach(N)])[: 2 * N * sides]
+    supports = np.zeros((len(approach), len(approach)))
     if members is not None:
         approach = np.hstack([approach, members.approach[:, members.free]])
         supports = members.compliance
@@ -333,18 +355,21 @@ def _regular_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair) -> n
     N = setup.n_planets
     n = len(mesh)
     S = np.zeros((n, 3, n, 3))
-    sun_side = mesh < N
+    # on the back side every gear carries on its other flank
+    back = mesh >= 2 * N
+    sun_side = mesh % (2 * N) < N
+    left, right = np.where(back, RIGHT, LEFT), np.where(back, LEFT, RIGHT)
     everything = np.arange(n)
     sun = everything[sun_side]
-    _add_body(S, bodies.sun, setup, position, mesh, pair, sun, np.zeros(len(sun), int), LEFT)
+    _add_body(S, bodies.sun, setup, position, mesh, pair, sun, np.zeros(len(sun), int), left[sun])
     for planet in range(N):
         members = everything[mesh % N == planet]
-        is_ring = mesh[members] >= N
+        is_ring = ~sun_side[members]
         # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
-        gear, side = np.where(is_ring, 0, 1), np.where(is_ring, RIGHT, LEFT)
+        gear, side = np.where(is_ring, 0, 1), np.where(is_ring, right[members], left[members])
         _add_body(S, bodies.planet, setup, position, mesh, pair, members, gear, side)
     ring = everything[~sun_side]
-    _add_body(S, bodies.ring, setup, position, mesh, pair, ring, np.ones(len(ring), int), LEFT)
+    _add_body(S, bodies.ring, setup, position, mesh, pair, ring, np.ones(len(ring), int), left[ring])
     return S
 
 
@@ -356,7 +381,7 @@ def _add_body(S, body: FlankCompliance, setup, position, mesh, pair, members, ge
     roll = np.where(gear[:, None] == 0, setup.roll[0][j, position, i], setup.roll[1][j, position, i])
     tooth = np.where(gear == 0, setup.tooth[0][j, i], setup.tooth[1][j, i])
     index, weight = station_weights(roll, body.roll)
-    index = index + np.broadcast_to(side, len(members))[:, None, None] * len(body.roll)
+    index = index + side[:, None, None] * len(body.roll)
     lag = (tooth[:, None] - tooth[None, :]) % len(body.regular)
     values = body.regular[
         lag[:, None, None, :, None, None],

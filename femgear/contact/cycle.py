@@ -39,7 +39,9 @@ class MeshCycle:
     sun_arc : (P,) array
         Rotation of the sun behind the unloaded, exact set, as an arc on its base circle [m].
     force : (2N, P) array
-        Mesh force, torque over base radius [N].
+        Force on the drive flanks of the mesh, torque over base radius [N].
+    back_force : (2N, P) array
+        Force on its back flanks [N]; zero where they were not looked at.
     stiffness : (2N, P) array
         Tangent mesh stiffness dF/d delta at constant loads of the other meshes [N/m].
     tooth_load : (2N, T, P) array
@@ -75,6 +77,7 @@ class MeshCycle:
     deflection: np.ndarray
     sun_arc: np.ndarray
     force: np.ndarray
+    back_force: np.ndarray
     stiffness: np.ndarray
     tooth_load: np.ndarray
     path: np.ndarray
@@ -109,8 +112,14 @@ class MeshCycle:
     def load_share(self) -> np.ndarray:
         """Share of every planet in the sun's torque, shape (N, P); zero without load."""
         n = len(self.force) // 2
-        total = self.force[:n].sum(axis=0)
-        return np.divide(self.force[:n], total, out=np.zeros((n, len(total))), where=total > 0)
+        carried = self.force[:n] - self.back_force[:n]
+        total = carried.sum(axis=0)
+        return np.divide(carried, total, out=np.zeros((n, len(total))), where=total > 0)
+
+    @property
+    def wedged(self) -> np.ndarray:
+        """Meshes that are loaded on both flanks at once, shape (2N, P)."""
+        return (self.force > 0) & (self.back_force > 0)
 
 
 def walk_mesh_cycle(
@@ -125,6 +134,7 @@ def walk_mesh_cycle(
     supports: Supports = RIGID,
     periods: int = 1,
     planet_gaps=None,
+    both_flanks: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> MeshCycle:
     """Static transmission error, load sharing and mesh stiffness over the mesh cycle.
@@ -155,6 +165,8 @@ def walk_mesh_cycle(
         `gears.deviations.common_period` of them.
     planet_gaps : (N,) array, optional
         Extra separation of the sun-side flanks of each planet [m].
+    both_flanks : bool
+        Look for contact on the back flanks as well.
     progress : callable, optional
         Called with (positions done, positions).
 
@@ -170,10 +182,10 @@ def walk_mesh_cycle(
     N = planetary_set.n_planets
     if not sun_torque > 0:
         return _unloaded(N, positions * periods, periods, contact)
-    members = moving_members(planetary_set, supports)
+    members = moving_members(planetary_set, supports, both_flanks=both_flanks)
     share = sun_torque / (planetary_set.sun.base_radius * N)
     enlarge, nearest = 1.0, 3.0 * share / (10e9 * planetary_set.sun.face_width)
-    for _ in range(6):
+    for _ in range(8):
         setup = mesh_windows(
             planetary_set,
             bodies,
@@ -185,16 +197,17 @@ def walk_mesh_cycle(
             periods=periods,
             deviations=deviations,
             planet_gaps=planet_gaps,
+            both_flanks=both_flanks,
         )
         cycle, overflow, missed = _walk(
             planetary_set, bodies, setup, sun_torque, members, contact, periods, progress
         )
         if not overflow and missed <= nearest:
             return cycle
-        enlarge *= 1.5 if overflow else 1.0
+        enlarge *= 2.0 if overflow else 1.0
         nearest = max(nearest, 1.2 * missed)
     raise ContactError(
-        "the contact windows do not contain the contact after five enlargements",
+        "the contact windows do not contain the contact after seven enlargements",
         code="E-CONTACT-WINDOW",
         remedy="reduce operation.torque or the errors",
     )
@@ -208,6 +221,7 @@ def _unloaded(N: int, positions: int, periods: int, contact: str) -> MeshCycle:
         deflection=zero,
         sun_arc=np.zeros(positions),
         force=zero,
+        back_force=zero,
         stiffness=zero,
         tooth_load=np.zeros((2 * N, 1, positions)),
         path=np.zeros((2 * N, 1, positions)),
@@ -231,9 +245,10 @@ def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, members, contac
     N, P = planetary_set.n_planets, setup.positions
     load = np.zeros(N + 1 + int(members.free.sum()))
     load[N] = sun_torque / planetary_set.sun.base_radius
-    out = {name: np.zeros((2 * N, P)) for name in ("deflection", "force", "stiffness", "max_pressure")}
-    out["edge_contact"] = np.zeros((2 * N, P), bool)
-    out["tooth_load"] = np.zeros((2 * N, setup.pairs, P))
+    out = {name: np.zeros((2 * N, P)) for name in ("deflection", "force", "back_force", "stiffness")}
+    meshes = setup.near.shape[0]
+    out["max_pressure"], out["edge_contact"] = np.zeros((meshes, P)), np.zeros((meshes, P), bool)
+    out["tooth_load"] = np.zeros((meshes, setup.pairs, P))
     out["member_motion"] = np.zeros((len(members.names), P))
     out["sun_arc"] = np.zeros(P)
     residual, iterations = np.zeros(P), np.zeros(P, int)
@@ -250,12 +265,17 @@ def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, members, contac
         missed = max(missed, _penetrated_outsider(setup, p, out["deflection"][:, p], contact))
         if progress is not None:
             progress(p + 1, P)
-    open_planets = out["force"][:N] <= 0.0
-    method = "all positions by the active set"
+    open_planets = out["force"][:N] + out["back_force"][:N] <= 0.0
+    wedged = (out["force"] > 0) & (out["back_force"] > 0)
+    message = "all positions by the active set"
+    message += "; some planets lose all load" if open_planets.any() else ""
+    message += "; some teeth are wedged between both flanks" if wedged.any() else ""
+    for name in ("tooth_load", "max_pressure", "edge_contact"):
+        out[name] = out[name][: 2 * N]
     cycle = MeshCycle(
         position=np.arange(P) * periods / P,
-        path=np.moveaxis(setup.zeta, 2, 1),
-        tooth=np.stack(setup.tooth),
+        path=np.moveaxis(setup.zeta[: 2 * N], 2, 1),
+        tooth=np.stack(setup.tooth)[:, : 2 * N],
         open_planets=open_planets,
         residual=residual,
         iterations=iterations,
@@ -263,7 +283,7 @@ def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, members, contac
         periods=periods,
         contact=contact,
         unknowns=unknowns,
-        message=method if not open_planets.any() else f"{method}; some planets lose all load",
+        message=message,
         **out,
     )
     return cycle, overflow, missed
@@ -271,10 +291,11 @@ def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, members, contac
 
 def _collect(problem: ContactProblem, state, setup: MeshWindows, members: MovingMembers, out, p):
     """Mesh quantities of one position."""
-    N = problem.n_planets
+    N, meshes = problem.n_planets, setup.near.shape[0]
     loads = state.loads
-    force = np.bincount(problem.mesh, weights=loads, minlength=2 * N)
-    out["force"][:, p] = force
+    force = np.bincount(problem.mesh, weights=loads, minlength=meshes)
+    out["force"][:, p] = force[: 2 * N]
+    out["back_force"][: meshes - 2 * N, p] = force[2 * N :]
     out["sun_arc"][p] = state.motions[N]
     # sprung members yield under the mesh forces, free ones are unknowns of the problem
     motion = np.zeros(len(members.names))
@@ -282,8 +303,10 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     sprung = ~members.free
     motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung]
     out["member_motion"][:, p] = motion
-    out["deflection"][:, p] = rotation_approach(N) @ state.motions[: N + 1] + members.approach @ motion
-    out["stiffness"][:, p] = tangent_stiffness(problem.H, state.active, problem.mesh, 2 * N)
+    moved = members.approach[: 2 * N] @ motion
+    out["deflection"][:, p] = rotation_approach(N) @ state.motions[: N + 1] + moved
+    tangents = tangent_stiffness(problem.H, state.active, problem.mesh, meshes)
+    out["stiffness"][:, p] = tangents.reshape(-1, 2 * N).sum(axis=0)
     np.add.at(out["tooth_load"][:, :, p], (problem.mesh, problem.pair), loads)
     at_edge = problem.at_flank_end(state.active, setup)
     np.logical_or.at(out["edge_contact"][:, p], problem.mesh, at_edge)
@@ -296,6 +319,8 @@ def _penetrated_outsider(setup: MeshWindows, p, deflection, contact) -> float:
     if contact == "line_of_action":
         return 0.0
     gap = setup.smallest_gap[:, p]
+    # a back flank approaches when its drive flank parts
+    deflection = np.concatenate([deflection, -deflection])[: len(gap)]
     penetrates = ~setup.near[:, p] & (gap < deflection[:, None])
     relative = deflection - gap.min(axis=1)
     return float(relative[penetrates.any(axis=1)].max(initial=0.0))

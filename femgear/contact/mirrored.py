@@ -7,22 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.contact.cycle import MeshCycle, walk_mesh_cycle
+from femgear.contact.mirror_image import mirrored_set
 
-
-def mirrored_set(planetary_set):
-    """The set seen from behind, and the place of each of its planets in the original one.
-
-    Returns
-    -------
-    PlanetarySet
-        Planet angles counted the other way round, ascending from the first planet.
-    order : (N,) int array
-        Mirrored planet ``i`` is original planet ``order[i]``.
-    """
-    angles = np.asarray(planetary_set.planet_angles)
-    turned = np.mod(angles[0] - angles, 2 * np.pi)
-    order = np.argsort(turned, kind="stable")
-    return replace(planetary_set, planet_angles=tuple(angles[0] + turned[order])), order
+__all__ = ["mirrored_set", "walk_either_flank"]
 
 
 def walk_either_flank(
@@ -50,6 +37,7 @@ def walk_either_flank(
         deflection=cycle.deflection[mesh][:, position],
         sun_arc=cycle.sun_arc[position],
         force=cycle.force[mesh][:, position],
+        back_force=cycle.back_force[mesh][:, position],
         stiffness=cycle.stiffness[mesh][:, position],
         # the pair that comes first along the path leaves first when the rotation is seen from behind
         tooth_load=cycle.tooth_load[mesh][:, ::-1][:, :, position],

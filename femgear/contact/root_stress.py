@@ -14,6 +14,7 @@ import numpy as np
 
 from femgear.contact.assembly import mesh_pairs
 from femgear.contact.flanks import LEFT, RIGHT, flank_load_columns, flank_stations, station_weights
+from femgear.errors import ContactError
 
 if TYPE_CHECKING:
     from femgear.contact.bodies import Sectors
@@ -90,6 +91,8 @@ class RootCycle:
         See `RootStress`.
     periods : int
         Mesh periods in the P positions.
+    reverse : bool
+        Whether the torque is negative.
     """
 
     kind: str
@@ -101,11 +104,38 @@ class RootCycle:
     arc: np.ndarray
     slope: np.ndarray
     periods: int
+    reverse: bool
+
+    @property
+    def tension(self) -> np.ndarray:
+        """Largest stress along the root of the loaded flank, shape (T, P) [Pa]."""
+        return self.stress[:, :, LOADED].max(axis=-1)
+
+    @property
+    def compression(self) -> np.ndarray:
+        """Lowest stress along the root of the back flank, shape (T, P) [Pa]."""
+        return self.stress[:, :, BACK].min(axis=-1)
+
+    @property
+    def worst(self) -> tuple[int, int, int]:
+        """Slot, position and root point of the largest stress in the root of the loaded flank."""
+        found = np.unravel_index(self.stress[:, :, LOADED].argmax(), self.stress[:, :, LOADED].shape)
+        return tuple(int(i) for i in found)
 
 
 @dataclass(frozen=True)
 class RootHistory:
-    """One tooth on its way through one mesh: path (S,) in base pitches, load (S,) [N], stress (S, 2, m) [Pa]."""
+    """One tooth on its way through one mesh.
+
+    Parameters
+    ----------
+    path : (S,) array
+        Path coordinate of its tooth pair in base pitches, 0 at the pitch point.
+    load : (S,) array
+        [N]
+    stress : (S, 2, m) array
+        Along the roots of the loaded and of the back flank [Pa].
+    """
 
     path: np.ndarray
     load: np.ndarray
@@ -165,14 +195,18 @@ def root_stress(
     both = np.hstack([along.columns, mirrored_columns(along.columns, mirror_nodes(grid))])
     influence = tooth_compliance(_with_cut(schur, grid, held, both))
     order = slice(None, None, -1 if gear.internal else 1)
-    m = len(along.arc)
-    influence = influence.reshape(gear.teeth, 2, m, -1)[:, :, order].reshape(gear.teeth, 2 * m, -1)
+    m, n = len(along.arc), len(stations.roll)
+    influence = influence.reshape(gear.teeth, 2, m, 2, n)[:, :, order].copy()
+    # flank and root share one node: right under a nodal force there the stress has no limit
+    end, beside = (n - 1, n - 2) if gear.internal else (0, 1)
+    for side in (LEFT, RIGHT):
+        influence[0, side, 0, side, end] = influence[0, side, 0, side, beside]
     return RootStress(
         roll=stations.roll,
         arc=np.abs(along.arc - along.arc[order][0])[order],
         points=along.points[order],
         slope=np.arccos(np.clip(np.abs(along.tangents[order, 0]), 0.0, 1.0)),
-        influence=influence,
+        influence=influence.reshape(gear.teeth, 2 * m, 2 * n),
     )
 
 
@@ -211,7 +245,19 @@ def root_stress_cycle(
     -------
     tuple of RootCycle
         Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on.
+
+    Raises
+    ------
+    ContactError
+        When back flanks carry load: the cycle has the loads of the teeth on the drive flanks only.
     """
+    if cycle.back_force.any():
+        raise ContactError(
+            f"back flanks carry up to {cycle.back_force.max():.4g} N, by teeth that the record does not name",
+            code="E-ROOT-BACK",
+            limit="contact on the drive flanks only",
+            remedy="give the set more backlash",
+        )
     N = planetary_set.n_planets
     found = {}
     meshes = range(N)
@@ -222,7 +268,9 @@ def root_stress_cycle(
     for kind, root, acting in bodies:
         loads = [_station_loads(planetary_set, root, cycle, *one, reverse) for one in acting]
         for mesh, gear, side in acting:
-            found[mesh, gear] = _one_mesh(planetary_set, kind, root, cycle, (mesh, gear, side), acting, loads)
+            found[mesh, gear] = _one_mesh(
+                planetary_set, kind, root, cycle, (mesh, gear, side), acting, loads, reverse
+            )
     return tuple(found[mesh, gear] for mesh in range(2 * N) for gear in (0, 1))
 
 
@@ -250,11 +298,9 @@ def _one_mesh(planetary_set, kind, root: RootStress, cycle, target, acting, load
     sense = -1 if reverse else 1
     total = np.zeros((len(teeth), root.influence.shape[1], len(cycle.position)))
     for (other, other_gear, _), forces in zip(acting, loads, strict=True):
-        for tooth, force in zip(
-            cycle.tooth[other_gear if other_gear == gear or True else gear, other], forces
-        ):
+        for tooth, force in zip(cycle.tooth[other_gear, other], forces, strict=True):
             if force.any():
-                total += root.influence[(teeth - tooth) % count] @ force
+                total += root.influence[sense * (teeth - tooth) % count] @ force
     stress = total.reshape(len(teeth), 2, -1, len(cycle.position)).transpose(0, 3, 1, 2)
     path = cycle.path[mesh] / planetary_set.sun.base_pitch
     load = np.zeros((len(teeth), len(cycle.position)))
@@ -269,6 +315,7 @@ def _one_mesh(planetary_set, kind, root: RootStress, cycle, target, acting, load
         arc=root.arc,
         slope=root.slope,
         periods=cycle.periods,
+        reverse=reverse,
     )
 
 
@@ -286,12 +333,28 @@ def tooth_history(root: RootCycle, *, start: int = 0) -> RootHistory:
     ----------
     root : RootCycle
     start : int
-        Mesh period of the record in which the tooth enters the first slot; records of one period serve
-        all teeth.
+        Mesh period of the record in which the tooth enters the first slot (with a negative torque, seen from
+        behind: leaves the last one); records of one period serve all teeth.
     """
     slots, positions = root.path.shape
     each = positions // root.periods
     slot = np.repeat(np.arange(slots), each)
-    period = (start + slot) % root.periods
-    position = period * each + np.tile(np.arange(each), slots)
+    position = (start + slot) % root.periods * each + np.tile(np.arange(each), slots)
+    if root.reverse:
+        slot, position = _seen_from_behind(root, slot[::-1], position[::-1])
     return RootHistory(root.path[slot, position], root.load[slot, position], root.stress[slot, position])
+
+
+def _seen_from_behind(root: RootCycle, slot, position):
+    """Slot and position of the mirrored record, in which a negative torque is a positive one."""
+    slots, positions = root.path.shape
+    return slots - 1 - slot, -position % positions
+
+
+def worst_history(root: RootCycle) -> RootHistory:
+    """History of the tooth with the largest stress in the root of its loaded flank."""
+    slot, position, _ = root.worst
+    if root.reverse:
+        slot, position = _seen_from_behind(root, slot, position)
+    period = position * root.periods // root.path.shape[1]
+    return tooth_history(root, start=(period - slot) % root.periods)

@@ -59,7 +59,7 @@ class MovingMembers:
     ----------
     names : tuple of str
         One a motion, such as ``"sun: x"``.
-    approach : (2N, m) array
+    approach : (2N, m) or, with back flanks, (4N, m) array
         Approach of the flanks of every mesh per unit motion.
     stiffness : (m,) array
         [N/m], 0 for free motions.
@@ -81,21 +81,30 @@ class MovingMembers:
         return (sprung / self.stiffness[~self.free]) @ sprung.T
 
 
-def force_directions(planetary_set: PlanetarySet) -> tuple[np.ndarray, np.ndarray]:
+def force_directions(planetary_set: PlanetarySet, *, back: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Unit forces on the planets (from the sun) and on the ring (from the planets), each of shape (N, 2).
 
-    For the flanks that a positive torque on the sun loads, in the frame of the carrier.
+    For the flanks that a positive torque on the sun loads, or the back flanks, in the frame of the carrier.
     """
-    psi = np.asarray(planetary_set.planet_angles)
-    on_planet = psi + np.pi / 2 - planetary_set.working_pressure_angle_sun_planet
-    on_ring = psi - np.pi / 2 + planetary_set.working_pressure_angle_planet_ring
-    return tuple(np.column_stack([np.cos(a), np.sin(a)]) for a in (on_planet, on_ring))
+    from femgear.gears.deviations import mesh_normals
+
+    normals = mesh_normals(planetary_set, back=back)
+    return normals[: planetary_set.n_planets], normals[planetary_set.n_planets :]
 
 
-def moving_members(planetary_set: PlanetarySet, supports: Supports) -> MovingMembers:
+def moving_members(
+    planetary_set: PlanetarySet, supports: Supports, *, both_flanks: bool = False
+) -> MovingMembers:
     """The motions that the supports allow, each with its effect on every mesh."""
+    sides = [_one_side(planetary_set, supports, back) for back in (False, True)[: 1 + both_flanks]]
+    names, _, stiffness = sides[0]
+    return MovingMembers(names, np.vstack([approach for _, approach, _ in sides]), stiffness)
+
+
+def _one_side(planetary_set, supports, back):
+    """Names, approach (2N, m) and stiffness of the motions for one side of the teeth."""
     N = planetary_set.n_planets
-    on_planet, on_ring = force_directions(planetary_set)
+    on_planet, on_ring = force_directions(planetary_set, back=back)
     zero = np.zeros((N, 2))
     names, columns, stiffness = [], [], []
     for member, value, effect in (
@@ -115,4 +124,4 @@ def moving_members(planetary_set: PlanetarySet, supports: Supports) -> MovingMem
             columns.append(effect)
             stiffness += [supports.planet, supports.planet]
     approach = np.hstack(columns) if columns else np.zeros((2 * N, 0))
-    return MovingMembers(tuple(names), approach, np.array(stiffness, float))
+    return tuple(names), approach, np.array(stiffness, float)

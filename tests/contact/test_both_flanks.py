@@ -1,0 +1,125 @@
+"""Back flanks: their clearance and teeth from geometry, reversal, wedging."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femgear.contact.assembly import mesh_pairs, mesh_windows
+from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.flank_sides import BACK, DRIVE, flank_side, side_teeth
+from femgear.contact.supports import Supports
+from femgear.contact.teeth import tooth_zero_angles
+from femgear.fe.elasticity import Material
+from femgear.gears import half_thickness_angle
+from femgear.validation.planetary import reference_set
+
+STEEL = Material(206e9, 0.3, 7850.0)
+TORQUE = 100.0
+
+
+@pytest.fixture(scope="module")
+def gears():
+    """The reference set with all teeth 40 um thinner."""
+    exact = reference_set()
+    return replace(
+        exact,
+        **{n: replace(getattr(exact, n), thickness_allowance=40e-6) for n in ("sun", "planet", "ring")},
+    )
+
+
+@pytest.fixture(scope="module")
+def bodies(gears):
+    return make_bodies(make_sectors(gears, STEEL, flank_elements=12), STEEL)
+
+
+def test_clearance_of_the_back_flanks_is_the_backlash(gears, bodies):
+    """80 um less thickness on two gears' reference circles is 80 cos(20 deg) um along the normal."""
+    setup = mesh_windows(
+        gears,
+        bodies,
+        share=2000.0,
+        positions=16,
+        cells=36,
+        nearest=20e-6,
+        contact="profile",
+        both_flanks=True,
+    )
+    nearest = setup.smallest_gap.min(axis=2)
+    assert nearest[:6] == pytest.approx(0.0, abs=1e-7)
+    assert nearest[6:] == pytest.approx(80e-6 * np.cos(np.deg2rad(20)), abs=2e-7)
+
+
+@pytest.mark.parametrize("direction", [DRIVE, BACK])
+@pytest.mark.parametrize("angles", [None, (0.0, 34, 67, 101)])
+def test_teeth_stand_where_their_flanks_touch(gears, direction, angles):
+    """Number, zero angle and rotation give the tooth's centre; its flank must pass the point of contact."""
+    if angles is not None:
+        gears = replace(gears, planet_angles=tuple(np.array(angles) * 2 * np.pi / 135))
+    N = gears.n_planets
+    side = flank_side(gears, direction)
+    index = np.floor(-side.phase).astype(int)[:, None] + np.arange(-1, 3)
+    teeth = side_teeth(gears, index, direction)
+    tau = 0.3
+    zeta = gears.base_pitch * (direction * tau + side.phase[:, None] + index)
+    sun_zero, planet_zero, ring_zero = tooth_zero_angles(gears, tau)
+    for j in range(2 * N):
+        kind, n = divmod(j, N)
+        pair = mesh_pairs(gears)[kind]
+        alpha, psi = pair.pressure_angle, gears.planet_angles[n]
+        roll_1 = pair.pitch_roll_1 + zeta[j]
+        roll_2 = pair.pitch_roll_2 - pair.sign * zeta[j]
+        # polar angle of the contact from the line of centres, counted with the rotation of gear 1
+        place_1 = np.arctan2(roll_1, pair.base_radius_1) - alpha
+        place_2 = np.arctan2(roll_2, pair.base_radius_2) - alpha
+        first, second = (gears.sun, gears.planet) if kind == 0 else (gears.planet, gears.ring)
+        turn = direction if kind == 0 else -direction
+        towards_1 = psi
+        towards_2 = psi + np.pi if kind == 0 else psi
+        centre_1 = towards_1 + turn * (
+            place_1 - half_thickness_angle(first, np.hypot(pair.base_radius_1, roll_1))
+        )
+        flank_2 = half_thickness_angle(second, np.hypot(pair.base_radius_2, roll_2))
+        # external gear 2 carries on the flank of the same hand; a ring's flank faces the planet
+        centre_2 = towards_2 + turn * (place_2 - flank_2 if kind == 0 else place_2 + flank_2)
+        zero_1 = sun_zero if kind == 0 else planet_zero[n]
+        zero_2 = planet_zero[n] if kind == 0 else ring_zero
+        slack = 40e-6 * 2 / first.reference_radius
+        for zero, teeth_of, centre, gear in (
+            (zero_1, teeth[0][j], centre_1, first),
+            (zero_2, teeth[1][j], centre_2, second),
+        ):
+            off = np.mod(zero + teeth_of * gear.pitch_angle - centre + np.pi, 2 * np.pi) - np.pi
+            assert np.abs(off).max() < (1e-9 if direction > 0 else slack)
+
+
+def test_backlash_keeps_the_back_flanks_out(gears, bodies):
+    one = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8)
+    two = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, both_flanks=True)
+    assert not two.back_force.any() and not two.wedged.any()
+    assert two.deflection == pytest.approx(one.deflection, rel=1e-9)
+    assert two.stiffness == pytest.approx(one.stiffness, rel=1e-9)
+
+
+def test_a_floating_sun_pushed_into_the_teeth_is_wedged(gears, bodies):
+    """A light torque, planets moved towards the sun by more than the backlash: both flanks carry."""
+    from femgear.gears.deviations import no_deviations
+
+    pushed = no_deviations(gears)
+    pushed = replace(pushed, pin_errors=np.array([[-105e-6, 0.0], [-105e-6, 0.0], [-105e-6, 0.0]]))
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=5.0, positions=4, both_flanks=True, deviations=pushed)
+    assert cycle.wedged[:3].all()
+    assert "wedged" in cycle.message
+    net = cycle.force - cycle.back_force
+    assert net[:3].sum(axis=0) == pytest.approx(5.0 / gears.sun.base_radius, rel=1e-9)
+    assert net[:3] == pytest.approx(net[3:], rel=1e-6)
+    assert cycle.residual.max() < 1e-9
+
+
+def test_floating_sun_rests_on_both_flanks_where_it_must(gears, bodies):
+    cycle = walk_mesh_cycle(
+        gears, bodies, sun_torque=TORQUE, positions=4, both_flanks=True, supports=Supports(sun=0.0)
+    )
+    assert cycle.load_share == pytest.approx(1 / 3, abs=1e-9)
+    assert not cycle.wedged.any()

@@ -1,0 +1,280 @@
+"""Root stresses: against direct finite-element analyses, ISO 6336-3, and the symmetries of a set."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.deformed import deformed_set
+from femgear.contact.flanks import flank_stations
+from femgear.contact.mirrored import walk_either_flank
+from femgear.contact.root_stress import (
+    BACK,
+    LOADED,
+    root_stress,
+    root_stress_cycle,
+    set_root_stress,
+    tooth_history,
+    worst_history,
+)
+from femgear.errors import ContactError
+from femgear.fe.compliance import symmetric_factor
+from femgear.fe.elasticity import Material, foundation, stiffness, stress
+from femgear.fe.grid import copy_nodes, mirror, rotated_copies
+from femgear.fe.meshing import mesh_outline
+from femgear.fe.stress import tangential_stress
+from femgear.gears import Gear, half_sector
+from femgear.gears.iso6336_stress import nominal_root_stress
+from femgear.validation.planetary import reference_set
+
+STEEL = Material(206e9, 0.3, 7850.0)
+ALPHA = math.radians(20)
+LOAD = 1000.0
+EXTERNAL = Gear(14, 3e-3, ALPHA, 0.3, 0.02, 0.009)
+INTERNAL = Gear(40, 3e-3, ALPHA, 0.0, 0.02, 0.072, internal=True)
+
+
+def sector(gear, *, flank_elements=24, refine=1.0):
+    return mirror(mesh_outline(half_sector(gear, flank_elements=flank_elements, refine=refine)))
+
+
+def direct(gear, place, *, flank_elements, refine):
+    """Largest and smallest principal stress in the roots of the loaded tooth of the whole gear [Pa].
+
+    The force acts at the flank station `place` (0 .. 1 along the roll length) of tooth 0. Stresses are those
+    of the elements, averaged at the nodes of the fillets.
+    """
+    one = sector(gear, flank_elements=flank_elements, refine=refine)
+    whole = rotated_copies(one, gear.teeth)
+    K = stiffness(whole, STEEL, state="plane strain", thickness=gear.face_width)
+    stations = flank_stations(one, gear)
+    i = round(place * (len(stations.roll) - 1))
+    first = copy_nodes(one, gear.teeth)[0]
+    force = np.zeros(2 * whole.n_nodes)
+    force[2 * first[stations.nodes[i]] + np.array([0, 1])] = LOAD * stations.normals[i]
+    held = np.unique(whole.boundaries["rim"])
+    free = np.setdiff1d(np.arange(len(force)), np.concatenate([2 * held, 2 * held + 1]))
+    u = np.zeros(len(force))
+    u[free] = symmetric_factor(K[free][:, free]).solve(force[free])
+    total, count = np.zeros((whole.n_nodes, 3)), np.zeros(whole.n_nodes)
+    np.add.at(total, whole.triangles, stress(whole, STEEL, u, state="plane strain"))
+    np.add.at(count, whole.triangles, 1)
+    mean = total / count[:, None]
+    roots = [first[np.unique(one.boundaries[f"fillet_{side}"])] for side in ("left", "right")]
+    return _principal(mean[roots[0]])[0].max(), _principal(mean[roots[1]])[1].min()
+
+
+def _principal(plane):
+    middle, radius = (
+        0.5 * (plane[:, 0] + plane[:, 1]),
+        np.hypot(0.5 * (plane[:, 0] - plane[:, 1]), plane[:, 2]),
+    )
+    return middle + radius, middle - radius
+
+
+def by_superposition(gear, place, **sizes):
+    root = root_stress(sector(gear, **sizes), gear, STEEL)
+    i, m = round(place * (len(root.roll) - 1)), len(root.arc)
+    column = LOAD * root.influence[0, :, i]
+    return column[:m].max(), column[m:].min()
+
+
+@pytest.mark.parametrize("place", [0.4, 0.8])
+def test_external_tooth_against_a_direct_analysis_of_a_finer_whole_gear(place):
+    reference = direct(EXTERNAL, place, flank_elements=16, refine=1.5)
+    assert by_superposition(EXTERNAL, place, flank_elements=24) == pytest.approx(reference, rel=0.01)
+
+
+def test_internal_tooth_against_a_direct_analysis_of_the_whole_gear():
+    reference = direct(INTERNAL, 0.3, flank_elements=12, refine=1.0)
+    assert by_superposition(INTERNAL, 0.3, flank_elements=12) == pytest.approx(reference, rel=0.02)
+
+
+@pytest.mark.parametrize("gear", [EXTERNAL, INTERNAL], ids=["external", "internal"])
+def test_a_force_at_the_foot_of_the_flank_makes_no_peak(gear):
+    """The stress under a nodal force has no limit; that of the roots stays of the size that bending makes."""
+    root = root_stress(sector(gear, flank_elements=16), gear, STEEL)
+    m, n = len(root.arc), len(root.roll)
+    for side in (0, 1):
+        own = root.influence[0, side * m : (side + 1) * m, side * n : (side + 1) * n]
+        assert np.abs(own[0]).max() < own.max() == np.abs(own).max()
+        # the largest of all comes from a force at the tip, not at the foot
+        assert abs(own.max(axis=0).argmax() - (0 if gear.internal else n - 1)) <= 3
+
+
+@pytest.mark.slow
+def test_external_tooth_against_a_direct_analysis_three_times_finer():
+    reference = direct(EXTERNAL, 0.6, flank_elements=8, refine=3.0)
+    assert by_superposition(EXTERNAL, 0.6, flank_elements=24) == pytest.approx(reference, rel=0.01)
+
+
+@pytest.mark.parametrize("gear", [EXTERNAL, INTERNAL], ids=["external", "internal"])
+def test_stress_converges_with_the_grid(gear):
+    """1.2 % on the default grid, 0.3 % with half the size, against a third of it."""
+    values = np.array([by_superposition(gear, 0.5, flank_elements=24, refine=r) for r in (1.0, 2.0, 3.0)])
+    error = np.abs(values[:2] / values[2] - 1).max(axis=1)
+    assert error[0] < 0.012
+    assert error[1] < 0.003
+
+
+def test_largest_stress_is_near_the_critical_section():
+    """The tangent of ISO 6336-3: 30 deg for external and 60 deg for internal gears, within 15 deg."""
+    for gear, tangent in ((EXTERNAL, 30.0), (INTERNAL, 60.0)):
+        root = root_stress(sector(gear), gear, STEEL)
+        column = root.influence[0, : len(root.arc), round(0.6 * len(root.roll))]
+        assert np.degrees(root.slope[column.argmax()]) == pytest.approx(tangent, abs=15.0)
+        # the tip end of the flank bends more than its foot; a tooth away there is little left
+        worst = root.influence[:, : len(root.arc)].max(axis=1)
+        assert worst[0].argmax() % len(root.roll) > 0.7 * len(root.roll) or gear.internal
+        assert worst[gear.teeth // 2].max() < 0.05 * worst[0].max()
+
+
+def test_roots_are_placed_as_documented():
+    root = root_stress(sector(EXTERNAL), EXTERNAL, STEEL)
+    radius = np.hypot(*root.points.T)
+    assert root.arc[0] == 0.0
+    assert (np.diff(root.arc) > 0).all()
+    assert radius[0] == pytest.approx(EXTERNAL.form_radius, rel=1e-3)
+    assert radius[-1] == pytest.approx(EXTERNAL.root_radius, rel=1e-6)
+    assert math.atan2(root.points[-1, 1], root.points[-1, 0]) == pytest.approx(0.5 * EXTERNAL.pitch_angle)
+    inner = root_stress(sector(INTERNAL), INTERNAL, STEEL)
+    assert np.hypot(*inner.points[0]) == pytest.approx(INTERNAL.form_radius, rel=1e-3)
+    assert np.hypot(*inner.points[-1]) == pytest.approx(INTERNAL.root_radius, rel=1e-6)
+    assert (np.diff(inner.arc) > 0).all()
+
+
+def test_elastic_constants_do_not_matter():
+    """Michell: plane stresses under given forces are those of any material; a held rim hardly sees it."""
+    grid = sector(EXTERNAL, flank_elements=12)
+    strain = root_stress(grid, EXTERNAL, STEEL).influence[0]
+    plane = root_stress(grid, EXTERNAL, STEEL, state="plane stress").influence[0]
+    soft = root_stress(grid, EXTERNAL, Material(1e9, 0.3, 1000.0)).influence[0]
+    assert soft == pytest.approx(strain, rel=1e-9, abs=1e-9 * np.abs(strain).max())
+    assert plane.max() == pytest.approx(strain.max(), rel=0.01)
+
+
+def test_an_elastic_support_bends_the_rim():
+    thin = replace(INTERNAL, rim_radius=0.068)
+    grid = sector(thin, flank_elements=12)
+    held = root_stress(grid, thin, STEEL).influence
+    springs = foundation(grid, "rim", 1e12, 1e12, thickness=thin.face_width)
+    rested = root_stress(grid, thin, STEEL, held=None, support=springs).influence
+    assert rested.max() > 1.01 * held.max()
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    gears = reference_set()
+    sectors = make_sectors(gears, STEEL)
+    bodies = make_bodies(sectors, STEEL)
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=100.0, positions=16)
+    roots = set_root_stress(sectors, STEEL)
+    return gears, sectors, bodies, cycle, roots, root_stress_cycle(gears, roots, cycle)
+
+
+def test_superposition_is_the_field_of_all_loads(loaded):
+    """The displacement field of the whole sun and planet under all loads gives the same stress."""
+    gears, sectors, _, cycle, _, stresses = loaded
+    position = 5
+    fields = {body.name: body for body in deformed_set(gears, sectors, cycle, position=position)}
+    for name, part, wanted in (
+        ("sun", sectors.sun, [stresses[0], stresses[2], stresses[4]]),
+        ("planet 1", sectors.planet, [stresses[1], stresses[6]]),
+    ):
+        along = tangential_stress(part.grid, STEEL, ("fillet_left", "root_left"), state="plane strain")
+        right = tangential_stress(part.grid, STEEL, ("root_right", "fillet_right"), state="plane strain")
+        for root in wanted:
+            loaded_left = root.mesh < 3
+            for slot, tooth in enumerate(cycle.tooth[root.gear, root.mesh]):
+                u = fields[name].displacement[tooth % part.gear.teeth].ravel()
+                sides = [along.columns.T @ u, (right.columns.T @ u)[::-1]]
+                found = root.stress[slot + 1, position]
+                scale = max(np.abs(found).max(), 1e7)
+                # the field puts loads linearly, the superposition cubically between the stations
+                expected = np.array(sides if loaded_left else sides[::-1])
+                assert np.abs(found - expected).max() < 0.01 * scale
+
+
+def test_equal_planets_give_equal_stresses(loaded):
+    *_, stresses = loaded
+    for first, others in ((0, (2, 4)), (1, (3, 5)), (6, (8, 10)), (7, (9, 11))):
+        for other in others:
+            assert np.sort(stresses[other].tension.ravel()) == pytest.approx(
+                np.sort(stresses[first].tension.ravel()), rel=1e-3, abs=1e4
+            )
+
+
+def test_history_of_a_tooth(loaded):
+    gears, _, _, cycle, _, stresses = loaded
+    for root in stresses[:2] + stresses[6:8]:
+        history = worst_history(root)
+        assert np.diff(history.path) == pytest.approx(1 / len(cycle.position), rel=1e-9)
+        assert history.load.max() == pytest.approx(cycle.tooth_load[root.mesh].max())
+        # it begins and ends without load of its own; what is left comes from the neighbours
+        assert history.load[0] == history.load[-1] == 0.0
+        tension = history.stress[:, LOADED].max(axis=-1)
+        assert tension[[0, -1]].max() < 0.2 * tension.max()
+        assert history.stress[:, BACK].min() < -tension.max()
+        assert root.tension[root.worst[:2]] == root.stress.max() == tension.max()
+    assert gears.n_planets == 3
+
+
+def test_order_of_magnitude_is_that_of_the_standard(loaded):
+    """sigma_F0 of ISO 6336-3 within 25 %, with the whole load at the outer point of single pair contact."""
+    gears, *_, roots, _ = loaded
+    for gear, root, ratio in (
+        (gears.sun, roots.sun, gears.contact_ratio_sun_planet),
+        (gears.planet, roots.planet, gears.contact_ratio_sun_planet),
+        (gears.planet, roots.planet, gears.contact_ratio_planet_ring),
+        (gears.ring, roots.ring, gears.contact_ratio_planet_ring),
+    ):
+        nominal = nominal_root_stress(gear, contact_ratio=ratio, tangential_force=LOAD * math.cos(ALPHA))
+        roll = math.sqrt(nominal.load_radius**2 - gear.base_radius**2)
+        largest = LOAD * root.influence[0, : len(root.arc), : len(root.roll)].max(axis=0)
+        assert np.interp(roll, root.roll, largest) == pytest.approx(nominal.stress, rel=0.25)
+
+
+def test_reversed_torque_is_the_mirror_image(loaded):
+    gears, _, bodies, _, roots, stresses = loaded
+    cycle = walk_either_flank(gears, bodies, sun_torque=-100.0, positions=16)
+    back = root_stress_cycle(gears, roots, cycle, reverse=True)
+    for one, other in zip(stresses, back, strict=True):
+        assert one.kind == other.kind
+        assert other.stress.max() == pytest.approx(one.stress.max(), rel=1e-3)
+        assert (np.diff(other.path, axis=0) > 0).all()
+        history = worst_history(other)
+        assert (np.diff(history.path) > 0).all()
+        assert history.stress.max() == other.stress.max()
+
+
+def test_no_torque_no_stress(loaded):
+    gears, _, bodies, _, roots, _ = loaded
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=0.0, positions=4)
+    for root in root_stress_cycle(gears, roots, cycle):
+        assert not root.stress.any()
+
+
+def test_load_on_the_back_flanks_is_refused(loaded):
+    gears, _, _, cycle, roots, _ = loaded
+    wedged = replace(cycle, back_force=np.full_like(cycle.force, 5.0))
+    with pytest.raises(ContactError) as caught:
+        root_stress_cycle(gears, roots, wedged)
+    assert caught.value.code == "E-ROOT-BACK"
+
+
+def test_records_of_several_periods_repeat(loaded):
+    gears, _, bodies, _, roots, _ = loaded
+    one, three = (
+        root_stress_cycle(
+            gears, roots, walk_mesh_cycle(gears, bodies, sun_torque=100.0, positions=8, periods=periods)
+        )
+        for periods in (1, 3)
+    )
+    for a, b in zip(one, three, strict=True):
+        for start in range(3):
+            short, long = tooth_history(a), tooth_history(b, start=start)
+            assert long.path == pytest.approx(short.path)
+            assert long.stress == pytest.approx(short.stress, rel=1e-6, abs=1.0)
