@@ -1,0 +1,143 @@
+"""Nominal stresses of ISO 6336 against a published calculation.
+
+Source: KISSsoft 03/2017 report of the NREL 5 MW gearbox, planetary stage 2 (ISO 6336:2006, method B):
+github.com/gfsReboucas/Drivetrain, @NREL_5MW/stage_02.rtf.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from femgear.errors import GeometryError
+from femgear.gears import Gear
+from femgear.gears.iso6336_stress import (
+    contact_ratio_factor,
+    elasticity_factor,
+    nominal_contact_stress,
+    nominal_root_stress,
+    stress_correction,
+    zone_factor,
+)
+from femgear.validation.planetary import nrel_set
+
+FORCE = 285900.438
+STEEL = {"youngs_modulus": 206e9, "poisson_ratio": 0.3}
+
+
+@pytest.fixture(scope="module")
+def nrel():
+    return nrel_set()
+
+
+def flank(s, mesh):
+    external = mesh == "sun-planet"
+    return nominal_contact_stress(
+        s.sun if external else s.planet,
+        s.planet if external else s.ring,
+        working_angle=s.working_pressure_angle_sun_planet
+        if external
+        else s.working_pressure_angle_planet_ring,
+        contact_ratio=s.contact_ratio_sun_planet if external else s.contact_ratio_planet_ring,
+        tangential_force=FORCE,
+        **STEEL,
+    )
+
+
+def test_contact_stress_of_the_published_stage(nrel):
+    printed = {"sun-planet": (573.40, 2.25, 0.936), "planet-ring": (312.44, 2.85, 0.891)}
+    for mesh, (stress, zone, ratio) in printed.items():
+        ours = flank(nrel, mesh)
+        assert ours.stress == pytest.approx(stress * 1e6, rel=1e-4)
+        assert ours.zone == pytest.approx(zone, abs=0.005)
+        assert ours.contact_ratio == pytest.approx(ratio, abs=0.0005)
+        assert ours.elasticity == pytest.approx(189.8e3, rel=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "mesh", "printed"),
+    [
+        # Y_F, Y_S, h_F, s_Fn, rho_F [mm], alpha_Fen [deg], single contact diameter [mm], sigma_F0 [MPa]
+        ("sun", "sun_planet", (1.47, 2.04, 24.33, 44.78, 9.52, 25.74, 408.342, 73.95)),
+        ("planet", "sun_planet", (1.38, 2.18, 25.73, 47.70, 8.69, 24.68, 794.110, 74.21)),
+        ("planet", "planet_ring", (1.01, 2.48, 18.48, 47.70, 8.69, 22.21, 780.889, 61.98)),
+        ("ring", "planet_ring", (1.20, 2.34, 30.32, 56.76, 8.78, 18.63, 1928.177, 69.12)),
+    ],
+)
+def test_root_stress_of_the_published_stage(nrel, name, mesh, printed):
+    ours = nominal_root_stress(
+        getattr(nrel, name), contact_ratio=getattr(nrel, f"contact_ratio_{mesh}"), tangential_force=FORCE
+    )
+    found = (
+        ours.form,
+        ours.correction,
+        1e3 * ours.arm,
+        1e3 * ours.chord,
+        1e3 * ours.fillet_radius,
+        math.degrees(ours.load_angle),
+        2e3 * ours.load_radius,
+        1e-6 * ours.stress,
+    )
+    half_digit = (0.005, 0.005, 0.005, 0.005, 0.005, 0.005, 0.0005, 0.005)
+    for value, reference, rounding in zip(found, printed, half_digit, strict=True):
+        assert value == pytest.approx(reference, rel=2e-4, abs=rounding)
+
+
+def test_contact_stress_is_the_hertz_stress_at_the_pitch_point(nrel):
+    """Without Z_eps sigma_H0 is Hertz's pressure of the whole normal force at the pitch point.
+
+    p^2 = F_n E / (2 pi b (1 - nu^2) rho), 1/rho = 1/(r_b1 tan alpha_w) +- 1/(r_b2 tan alpha_w)
+    (Johnson, "Contact Mechanics", eq. 4.45).
+    """
+    for mesh, one, two, angle, sign in (
+        ("sun-planet", nrel.sun, nrel.planet, nrel.working_pressure_angle_sun_planet, 1),
+        ("planet-ring", nrel.planet, nrel.ring, nrel.working_pressure_angle_planet_ring, -1),
+    ):
+        curvature = (1 / one.base_radius + sign / two.base_radius) / math.tan(angle)
+        normal = FORCE / math.cos(one.pressure_angle)
+        hertz = math.sqrt(normal * 206e9 * curvature / (2 * math.pi * one.face_width * (1 - 0.3**2)))
+        ours = flank(nrel, mesh)
+        assert ours.stress / ours.contact_ratio == pytest.approx(hertz, rel=1e-12)
+
+
+def test_factors():
+    # ISO 6336-2: Z_H = 2.495 for unshifted 20 deg gears; Z_E of steel 189.8 sqrt(N/mm^2)
+    twenty = math.radians(20)
+    assert zone_factor(twenty, twenty) == pytest.approx(2.495, abs=5e-4)
+    assert elasticity_factor(206e9, 0.3) == pytest.approx(189.8e3, rel=2e-4)
+    assert contact_ratio_factor(1.0) == 1.0
+    assert stress_correction(1.0, 1.0) == pytest.approx(1.33)
+
+
+def test_root_stress_is_linear_in_the_force_and_similar(nrel):
+    one = nominal_root_stress(nrel.sun, contact_ratio=1.4, tangential_force=1e5)
+    two = nominal_root_stress(nrel.sun, contact_ratio=1.4, tangential_force=2e5)
+    assert two.stress == pytest.approx(2 * one.stress)
+    assert two.form == one.form
+    small, large = (
+        nominal_root_stress(
+            Gear(20, m, math.radians(20), 0.1, 10 * m, 5 * m), contact_ratio=1.5, tangential_force=m**2
+        )
+        for m in (1e-3, 1e-2)
+    )
+    assert large.stress == pytest.approx(small.stress, rel=1e-12)
+
+
+def test_higher_contact_ratio_moves_the_load_inwards(nrel):
+    ratios = np.array([1.0, 1.3, 1.6, 1.9])
+    for gear, sign in ((nrel.sun, -1), (nrel.ring, 1)):
+        found = [nominal_root_stress(gear, contact_ratio=r, tangential_force=1.0) for r in ratios]
+        assert (np.diff([f.stress for f in found]) < 0).all()
+        assert (sign * np.diff([f.load_radius for f in found]) > 0).all()
+        assert found[0].load_radius == pytest.approx(gear.tip_radius)
+
+
+def test_numbers_outside_the_method_are_refused(nrel):
+    for ratio, force in ((0.9, 1.0), (2.5, 1.0), (math.nan, 1.0), (1.5, -1.0), (1.5, math.inf)):
+        with pytest.raises(GeometryError) as caught:
+            nominal_root_stress(nrel.sun, contact_ratio=ratio, tangential_force=force)
+        assert caught.value.code == "E-ISO6336"
+    with pytest.raises(GeometryError):
+        nominal_contact_stress(
+            nrel.ring, nrel.planet, working_angle=0.4, contact_ratio=1.5, tangential_force=1.0, **STEEL
+        )
