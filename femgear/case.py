@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from femgear.casefile import tomlfile
+from femgear.casefile.deviations import CarrierErrors, GearErrors, ModificationSection
 from femgear.casefile.problems import combine, translate
+from femgear.casefile.profiles import embed_profiles
 from femgear.casefile.sections import FORMAT, Case, PlanetSection, RingSection, SunSection, cross_check
 from femgear.errors import CaseError, GeometryError
 from femgear.gears import (
@@ -20,8 +25,36 @@ from femgear.gears import (
     close_set,
     equal_planet_angles,
 )
+from femgear.gears.deviation_checks import check_deviations
+from femgear.gears.deviations import (
+    FlankForm,
+    Ovality,
+    Runout,
+    SetDeviations,
+    no_deviations,
+    tooth_displacements,
+)
+from femgear.gears.modifications import (
+    MeasuredProfile,
+    Modification,
+    ProfileCrowning,
+    ProfileSlope,
+    RootRelief,
+    TipRelief,
+    check_form,
+    roll_at,
+)
 
-__all__ = ["Case", "case_schema", "parse_case", "planetary_set", "read_case", "to_toml", "with_value"]
+__all__ = [
+    "Case",
+    "case_schema",
+    "parse_case",
+    "planetary_set",
+    "read_case",
+    "set_deviations",
+    "to_toml",
+    "with_value",
+]
 
 
 def read_case(path: str | os.PathLike) -> Case:
@@ -64,7 +97,8 @@ def with_value(case: Case, key: str, value: object) -> Case:
     ----------
     case : Case
     key : str
-        Dotted key such as ``"operation.torque"``.
+        Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
+        ``"sun.modifications[0].amount"``.
     value : object
         As the file would hold it: ``"50 N m"``, 0.3, 27, a list or table of such; None leaves the entry out.
 
@@ -78,12 +112,13 @@ def with_value(case: Case, key: str, value: object) -> Case:
         As `read_case`; unknown keys are refused with the nearest valid one.
     """
     data = tomlfile.parse(case.source, case.name)
-    *tables, last = key.split(".")
+    parts = re.findall(r"\[\d{1,9}\]|[^.\[\]]+", key) or [key]
+    *tables, last = parts
     table = data
-    for part in tables:
-        table = table.setdefault(part, {})
-        if not isinstance(table, dict):
-            raise CaseError(f"{part} is not a table", code="E-KEY", key=key, file=case.name or None)
+    for part, following in zip(tables, parts[1:], strict=True):
+        table = _inside(table, part, key, case.name, wanted=list if following.startswith("[") else dict)
+    if last.startswith("["):
+        raise CaseError("a list is changed as a whole", code="E-KEY", key=key, file=case.name or None)
     if value is None:
         table.pop(last, None)
     else:
@@ -96,8 +131,25 @@ def with_value(case: Case, key: str, value: object) -> Case:
     return _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
 
 
+def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type) -> dict | list:
+    """Table or list under a part of a key; tables that are not there yet are made."""
+    if isinstance(table, list):
+        number = int(part[1:-1])
+        found = table[number] if number < len(table) else None
+    else:
+        found = table.setdefault(part, {}) if wanted is dict else table.get(part)
+    if not isinstance(found, wanted):
+        kind = "table" if wanted is dict else "list"
+        raise CaseError(f"{part} is not a {kind}", code="E-KEY", key=key, file=name or None)
+    return found
+
+
 def to_toml(case: Case) -> str:
-    """TOML text that gives this case when read; the text of its file as long as nothing was changed."""
+    """TOML text that gives this case when read.
+
+    The text of its file as long as nothing was changed and it names no measured profile; the points of such
+    profiles are in the text, so that it needs no other file.
+    """
     return case.source
 
 
@@ -169,6 +221,132 @@ def _gear(
     )
 
 
+def set_deviations(case: Case) -> SetDeviations:
+    """Modifications and errors of a case, as separations of the loaded flanks.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    SetDeviations
+
+    Raises
+    ------
+    GeometryError
+        Modifications that the flanks cannot have (E-MODIFICATION), with file and line, and what
+        `planetary_set` refuses.
+    """
+    s = planetary_set(case)
+    planets = [_planet_errors(case, n) for n in range(1, s.n_planets + 1)]
+    pitch = [_pitch(errors, s.planet) for errors in planets]
+    pins = np.zeros((s.n_planets, 2))
+    for pin in case.set.pin_errors:
+        pins[pin.planet - 1] = pin.radial, pin.tangential
+    found = replace(
+        no_deviations(s),
+        sun=_form(case, s.sun),
+        planet_sun_side=_form(case, s.planet, "sun side"),
+        planet_ring_side=_form(case, s.planet, "ring side"),
+        ring=_form(case, s.ring),
+        # a tooth that stands further on brings its left flank nearer to the mate, its right flank away
+        sun_pitch=-_pitch(case.sun.errors, s.sun),
+        planet_pitch=[-displaced for displaced in pitch],
+        planet_ring_side_pitch=pitch,
+        ring_pitch=-_pitch(case.ring.errors, s.ring),
+        sun_runout=_runout(case.sun.errors),
+        planet_runout=tuple(_runout(errors) for errors in planets),
+        ring_runout=_runout(case.ring.errors),
+        carrier_runout=_runout(case.carrier.errors),
+        pin_errors=pins,
+        ovality=_ovality(case),
+        sun_thickness=_thickness(case.sun.errors),
+        planet_thickness=[_thickness(errors) for errors in planets],
+        ring_thickness=_thickness(case.ring.errors),
+    )
+    check_deviations(found, s)
+    return found
+
+
+def _form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
+    """Form of a flank of a gear; planets have one on the side of the sun and one on that of the ring."""
+    found = []
+    for i, section in enumerate(getattr(case, gear.name).modifications):
+        if getattr(section, "flank", "both") not in (side, "both"):
+            continue
+        try:
+            found.append(_modification(section, gear))
+            check_form(FlankForm((found[-1],)), gear)
+        except GeometryError as error:
+            error.key = f"{gear.name}.modifications[{i}]"
+            error.file = case.location(error.key)
+            raise
+    return FlankForm(tuple(found))
+
+
+def _modification(section: ModificationSection, gear: Gear) -> Modification:
+    if section.kind == "measured profile":
+        angles, diameters = section.roll_angles or (), section.diameters or ()
+        rolls = [roll_at(gear, roll_angle=a) for a in angles] + [roll_at(gear, diameter=d) for d in diameters]
+        points = sorted(zip(rolls, section.deviations, strict=True))
+        return MeasuredProfile(tuple(r for r, _ in points), tuple(-e for _, e in points))
+    start, end = (
+        roll_at(
+            gear,
+            diameter=getattr(section, f"{name}_diameter"),
+            roll_angle=getattr(section, f"{name}_roll_angle"),
+            length=getattr(section, f"{name}_roll_length"),
+        )
+        for name in ("start", "end")
+    )
+    match section.kind:
+        case "tip relief":
+            return TipRelief(section.amount, start, end, section.exponent)
+        case "root relief":
+            return RootRelief(section.amount, start, end, section.exponent)
+        case "profile slope":
+            return ProfileSlope(section.amount, start, end)
+        case _:
+            return ProfileCrowning(section.amount, start, end)
+
+
+def _planet_errors(case: Case, number: int) -> GearErrors | None:
+    """Errors of one planet: those of all planets, replaced by what is given for this one."""
+    own = next((one for one in case.planet.individual if one.planet == number), None)
+    if own is None:
+        return case.planet.errors
+    values = {} if case.planet.errors is None else case.planet.errors.model_dump()
+    given = own.model_dump(exclude_unset=True, exclude={"planet"})
+    if "pitch" in given or "cumulative_pitch" in given:
+        values |= {"pitch": None, "cumulative_pitch": None}
+    return GearErrors.model_construct(**(GearErrors().model_dump() | values | given))
+
+
+def _pitch(errors: GearErrors | None, gear: Gear) -> np.ndarray:
+    """Displacement of every tooth on the base circle [m]."""
+    if errors is None:
+        return np.zeros(gear.teeth)
+    return tooth_displacements(gear, cumulative=errors.cumulative_pitch, single=errors.pitch)
+
+
+def _runout(errors: CarrierErrors | None) -> Runout:
+    if errors is None:
+        return Runout()
+    return Runout(errors.runout_amplitude or 0.0, errors.runout_phase or 0.0)
+
+
+def _thickness(errors: GearErrors | None) -> float:
+    return (errors.thickness_reduction or 0.0) if errors is not None else 0.0
+
+
+def _ovality(case: Case) -> Ovality:
+    given = case.ring.errors.ovality if case.ring.errors is not None else None
+    if given is None:
+        return Ovality()
+    return Ovality(given.nodal_diameter, given.amplitude, given.phase, given.inextensional)
+
+
 def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
@@ -182,6 +360,17 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
             file=name,
         )
     lines = text if numbered else ""
+    if embed_profiles(data, name):
+        text = tomlfile.write(data)
+        if len(text.encode()) > tomlfile.MAX_BYTES:
+            raise CaseError(
+                "the case is too long with the points of its measured profiles",
+                code="E-FILE",
+                value=f"{len(text.encode())} bytes",
+                limit=f"{tomlfile.MAX_BYTES} bytes",
+                remedy="measure at fewer points",
+                file=name or None,
+            )
     try:
         case = Case.model_validate(data)
     except ValidationError as error:

@@ -92,6 +92,10 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
         return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section [{key}]")
     if kind in ("tuple_type", "list_type"):
         return CaseError(f"a list is needed, not {described(value)}", code="E-TYPE", key=key, value=value)
+    if kind in ("bool_type", "string_type"):
+        wanted = "true or false" if kind == "bool_type" else "a text"
+        message = f"{wanted} is needed, not {described(value)}"
+        return CaseError(message, code="E-TYPE", key=key, value=value)
     if kind == "too_long":
         message = f"{context['actual_length']} entries are too many"
         return CaseError(message, code="E-RANGE", key=key, limit=f"{context['max_length']} entries")
@@ -132,6 +136,8 @@ def _section(model: type[BaseModel], location: tuple) -> type[BaseModel] | None:
     """Model of the table at ``location``, None where that is no table."""
     current: type[BaseModel] | None = model
     for part in location:
+        if isinstance(part, int):
+            continue
         field = current.model_fields.get(str(part)) if current else None
         candidates = (field.annotation, *getattr(field.annotation, "__args__", ())) if field else ()
         current = next((c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)), None)

@@ -7,6 +7,16 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr
 
+from femgear.casefile.deviations import (
+    CarrierErrors,
+    GearErrors,
+    IndividualPlanet,
+    ModificationSection,
+    PinError,
+    PlanetModificationSection,
+    RingErrors,
+    check_deviation_sections,
+)
 from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
 from femgear.casefile.tomlfile import line_of
 from femgear.casefile.units import (
@@ -53,6 +63,7 @@ class SetSection(_Section):
     face_width: Quantity(LENGTH, 1e-4, 5.0)
     planet_angles: tuple[Quantity(ANGLE, -2 * math.pi, 2 * math.pi), ...] | None = None
     backlash: Quantity(LENGTH, 0.0, 0.01) = 0.0
+    pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
 
 
 class RackSection(_Section):
@@ -91,6 +102,8 @@ class SunSection(_Section):
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
+    modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()
+    errors: GearErrors | None = None
 
 
 class PlanetSection(_Section):
@@ -105,6 +118,9 @@ class PlanetSection(_Section):
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
+    modifications: Annotated[tuple[PlanetModificationSection, ...], Field(max_length=20)] = ()
+    errors: GearErrors | None = None
+    individual: Annotated[tuple[IndividualPlanet, ...], Field(max_length=1000)] = ()
 
 
 class RingSection(_Section):
@@ -120,6 +136,8 @@ class RingSection(_Section):
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
+    modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()
+    errors: RingErrors | None = None
 
 
 class CarrierSection(_Section):
@@ -128,6 +146,7 @@ class CarrierSection(_Section):
     mass: Mass
     inertia: Inertia
     support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
+    errors: CarrierErrors | None = None
 
 
 class MachineSection(_Section):
@@ -264,7 +283,7 @@ class Case(_Section):
 
 def cross_check(case: Case) -> list[CaseError]:
     """What no entry shows alone."""
-    return [problem for check in (_check_operation, _check_set, _check_numbers) for problem in check(case)]
+    return [problem for check in _CHECKS for problem in check(case)]
 
 
 def _check_operation(case: Case):
@@ -329,3 +348,6 @@ def _check_numbers(case: Case):
             value=case.response_harmonics,
             limit=f"{2 * dynamics.mesh_harmonics} or more",
         )
+
+
+_CHECKS = (_check_operation, _check_set, _check_numbers, check_deviation_sections)

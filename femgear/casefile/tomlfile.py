@@ -150,8 +150,11 @@ def _duplicate(text: str, line: int) -> tuple[str | None, list[int]]:
 
 
 def _entries(text: str):
-    """Dotted key and line number of every table header and every key that starts a line."""
-    table, quoted = "", None
+    """Dotted key and line number of every table header and every key that starts a line.
+
+    Tables of a list are numbered: ``sun.modifications[0].amount``.
+    """
+    table, quoted, counts = "", None, {}
     for number, line in enumerate(text.splitlines(), start=1):
         starts_quoted = quoted
         for mark in re.findall(r'"""|\'\'\'', line):
@@ -162,8 +165,10 @@ def _entries(text: str):
         entry = _ENTRY.match(line)
         if header:
             table = _clean(header[2])
-            if header[1] == "[":
-                yield table, number
+            if header[1] == "[[":
+                counts[table] = counts.get(table, -1) + 1
+                table = f"{table}[{counts[table]}]"
+            yield table, number
         elif entry:
             yield ".".join(part for part in (table, _clean(entry[1])) if part), number
 
@@ -173,9 +178,16 @@ def _clean(key: str) -> str:
 
 
 def line_of(text: str, key: str) -> int | None:
-    """Line (from 1) that gives the dotted ``key``, or None where no line starts with it."""
-    wanted = key.split("[")[0]
-    return next((number for found, number in _entries(text) if found == wanted), None)
+    """Line (from 1) that gives the dotted ``key``, or None where no line starts with it.
+
+    Of an entry of a list it is the line of the entry, of its table, or of the list.
+    """
+    lines: dict[str, int] = {}
+    for found, number in _entries(text):
+        lines.setdefault(found, number)
+    table = key.rpartition("]")
+    wanted = (key, re.sub(r"(\[\d+\])+$", "", key), table[0] + table[1], key.split("[")[0], f"{key}[0]")
+    return next((lines[name] for name in wanted if name in lines), None)
 
 
 def _check_tree(data: dict, name: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Are the deviations of a set plausible, and do they fit its backlash: refusals with numbers, and warnings."""
+"""Are the deviations of a set plausible, do they fit its backlash: refusals with numbers, and warnings."""
 
 from __future__ import annotations
 
@@ -49,6 +49,10 @@ def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> 
     return tuple(_wedging(d, s))
 
 
+LONGEST_SEARCH = 4096
+"""Mesh periods that are searched for the least play."""
+
+
 def least_play(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[float, float]:
     """Lower bounds of the play that the deviations leave, along the line of action [m].
 
@@ -65,7 +69,7 @@ def least_play(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[
     """
     d, s = deviations, planetary_set
     N = s.n_planets
-    periods, _ = common_period(d, s)
+    periods, _ = common_period(d, s, limit=LONGEST_SEARCH)
     position = np.arange(4 * periods) / 4.0
     bodies = [body_separation(d, s, position, back=back) for back in (False, True)]
     drive = bodies[0] + _worst(d, s, back=False)[:, None]

@@ -23,6 +23,7 @@ from femgear.gears.modifications import FlankForm, Modification, form_deviation
 from femgear.gears.motion import orientations
 
 if TYPE_CHECKING:
+    from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "mesh_normals",
     "no_deviations",
     "profile_separation",
+    "tooth_displacements",
     "tooth_separation",
 ]
 
@@ -176,6 +178,27 @@ def no_deviations(planetary_set: PlanetarySet) -> SetDeviations:
     )
 
 
+def tooth_displacements(gear: Gear, *, cumulative=None, single=None) -> np.ndarray:
+    """Displacement (z,) of every tooth along the base circle [m], counter-clockwise positive.
+
+    Parameters
+    ----------
+    gear : Gear
+    cumulative : (z,) sequence, optional
+        Cumulative pitch deviations on the reference circle [m].
+    single : (z,) sequence, optional
+        Deviations of the pitches from tooth i - 1 to tooth i [m] where no cumulative ones are given; what
+        their sum misses zero by is spread over all pitches, and tooth 0 stays in place.
+    """
+    along = np.zeros(gear.teeth)
+    if cumulative is not None:
+        along = np.array(cumulative, float)
+    elif single is not None:
+        steps = np.asarray(single, float) - np.mean(single)
+        along = np.cumsum(steps) - steps[0]
+    return along * (gear.base_radius / gear.reference_radius)
+
+
 def profile_separation(
     deviations: SetDeviations, planetary_set: PlanetarySet, kind: int, roll_1, roll_2, *, back: bool = False
 ):
@@ -198,7 +221,7 @@ def profile_separation(
         [m]
     """
     d, s = deviations, planetary_set
-    planet = d.planet_sun_side if (kind == 0) is not back else d.planet_ring_side
+    planet = d.planet_sun_side if (kind == 0) != back else d.planet_ring_side
     one, two = ((d.sun, s.sun), (planet, s.planet)) if kind == 0 else ((planet, s.planet), (d.ring, s.ring))
     return form_deviation(*one, roll_1) + form_deviation(*two, roll_2)
 
@@ -222,7 +245,7 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
         [m]
     """
     d, N = deviations, len(deviations.planet_pitch)
-    planets = d.planet_pitch if (mesh < N) is not back else d.planet_ring_side_pitch
+    planets = d.planet_pitch if (mesh < N) != back else d.planet_ring_side_pitch
     planet, whole = planets[mesh % N], -1.0 if back else 1.0
     one, two = (whole * d.sun_pitch, planet) if mesh < N else (planet, whole * d.ring_pitch)
     return one[np.asarray(tooth_1) % len(one)] + two[np.asarray(tooth_2) % len(two)]

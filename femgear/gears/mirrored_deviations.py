@@ -25,8 +25,7 @@ def mirrored_deviations(
 
     Parameters
     ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
+    deviations, planetary_set : SetDeviations, PlanetarySet
     mirrored : PlanetarySet
         Planet angles ``2 psi_1 - psi``, ascending from the first planet.
     order : (N,) integer array
@@ -46,7 +45,7 @@ def mirrored_deviations(
         round((axis - angle - found.planets[n]) / s.planet.pitch_angle)
         for n, angle in zip(order, image.planets, strict=True)
     ]
-    pitch = s.planet.pitch_angle
+    runouts = [_reflected(d.planet_runout[n], k * s.planet.pitch_angle) for n, k in zip(order, planets)]
     return replace(
         d,
         planet_sun_side=d.planet_ring_side,
@@ -55,7 +54,7 @@ def mirrored_deviations(
         ring_pitch=-_turned(d.ring_pitch, ring),
         planet_pitch=[_turned(d.planet_ring_side_pitch[n], k) for n, k in zip(order, planets)],
         planet_ring_side_pitch=[_turned(d.planet_pitch[n], k) for n, k in zip(order, planets)],
-        planet_runout=tuple(_reflected(d.planet_runout[n], k * pitch) for n, k in zip(order, planets)),
+        planet_runout=tuple(runouts),
         sun_runout=_reflected(d.sun_runout, 0.0),
         ring_runout=_reflected(d.ring_runout, ring * s.ring.pitch_angle),
         carrier_runout=_reflected(d.carrier_runout, axis),

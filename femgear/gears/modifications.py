@@ -163,6 +163,33 @@ def modification_range(modification: Modification, gear: Gear) -> tuple[float, f
     return start, default_end if modification.end is None else modification.end
 
 
+def roll_at(
+    gear: Gear, *, diameter: float | None = None, roll_angle: float | None = None, length: float | None = None
+) -> float | None:
+    """Roll length [m] of a place on the flank from its diameter [m], roll angle [rad] or roll length [m].
+
+    ``r_b xi`` and ``sqrt(d^2/4 - r_b^2)`` (ISO 21771-1); None when nothing is given.
+
+    Raises
+    ------
+    GeometryError
+        E-MODIFICATION: a diameter inside the base circle.
+    """
+    if roll_angle is not None:
+        return roll_angle * gear.base_radius
+    if diameter is None:
+        return length
+    if diameter < 2.0 * gear.base_radius:
+        raise GeometryError(
+            f"{gear.name}: a diameter of {diameter * 1e3:.6g} mm lies inside the base circle",
+            code="E-MODIFICATION",
+            key=f"{gear.name}.modifications",
+            value=f"{diameter * 1e3:.6g} mm",
+            limit=f"at least {2e3 * gear.base_radius:.6g} mm",
+        )
+    return math.sqrt((0.5 * diameter - gear.base_radius) * (0.5 * diameter + gear.base_radius))
+
+
 def check_form(form: FlankForm, gear: Gear) -> None:
     """Refuse modifications that the flank of the gear cannot have.
 
