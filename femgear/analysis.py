@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case import Case, planetary_set
+from femgear.case import Case, planetary_set, set_deviations
 from femgear.errors import CaseError
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ class StaticResult:
     bodies: Bodies
     cycle: MeshCycle
     sun_torque: float
+    period_message: str = ""
 
     def dataset(self) -> xr.Dataset:
         """Contents of static.nc."""
@@ -127,21 +128,28 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
     from femgear.contact.mirrored import walk_either_flank
     from femgear.fe.elasticity import Material
     from femgear.gears import torques
+    from femgear.gears.deviations import common_period
 
     gears = planetary_set(case)
     material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
     sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
     bodies = make_bodies(sectors, material, depth=case.static.depth)
     sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
+    deviations = set_deviations(case)
+    periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
     cycle = walk_either_flank(
         gears,
         bodies,
         sun_torque=sun_torque,
         positions=case.static.positions,
         contact=case.static.contact,
+        deviations=None if deviations.ideal else deviations,
+        supports=_supports(case),
+        periods=periods,
+        both_flanks=case.static.back_flanks,
         progress=None if progress is None else lambda done, total: progress("contact", done, total),
     )
-    return StaticResult(gears, sectors, bodies, cycle, sun_torque)
+    return StaticResult(gears, sectors, bodies, cycle, sun_torque, period_message)
 
 
 def solve_modes(case: Case, static: StaticResult) -> ModesResult:
@@ -160,6 +168,7 @@ def solve_modes(case: Case, static: StaticResult) -> ModesResult:
     from femgear.solvers.modal import solve_modes as modal_basis
 
     _need_fixed_ring(case)
+    _need_one_period(static)
     gears, sector, cycle = static.planetary_set, static.sectors.ring, static.cycle
     side = 1.0 if static.sun_torque >= 0 else -1.0
     material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
@@ -315,6 +324,32 @@ def _need_fixed_ring(case: Case) -> None:
             limit='"ring"',
             remedy="run with --only static, or fix the ring",
         )
+
+
+def _need_one_period(static: StaticResult) -> None:
+    if static.cycle.periods > 1:
+        raise CaseError(
+            f"the errors of this set repeat only after {static.cycle.periods} mesh periods; modes, dynamics and "
+            "housing take one",
+            code="E-PERIODS",
+            key="static.longest_record",
+            value=static.cycle.periods,
+            limit="1",
+            remedy="run with --only static, leave pitch errors and runouts out, or set static.longest_record = 1",
+        )
+
+
+def _supports(case: Case):
+    """Supports of the static problem: rigid, or those of the case's bodies."""
+    from femgear.contact.supports import RIGID, Supports
+
+    if case.static.members == "fixed":
+        return RIGID
+    return Supports(
+        sun=case.sun.support_stiffness,
+        carrier=case.carrier.support_stiffness,
+        planet=case.planet.bearing_stiffness,
+    )
 
 
 def _backlash(gears: PlanetarySet) -> np.ndarray:

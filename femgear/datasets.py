@@ -34,6 +34,13 @@ def static_dataset(result: StaticResult) -> xr.Dataset:
             "static transmission error from sun to ring",
         ),
         "mesh_force": (mesh_position, cycle.force, "N", "mesh force along the line of action"),
+        "back_force": (mesh_position, cycle.back_force, "N", "force on the back flanks of the mesh"),
+        "member_motion": (
+            ("member", "position"),
+            cycle.member_motion,
+            "m",
+            "displacement of the axis of a member that moves",
+        ),
         "mesh_stiffness": (mesh_position, cycle.stiffness, "N/m", "tangent mesh stiffness"),
         "mesh_stiffness_secant": (mesh_position, cycle.secant_stiffness, "N/m", "secant mesh stiffness"),
         "tooth_load": (("mesh", "tooth", "position"), cycle.tooth_load, "N", "load of a tooth pair"),
@@ -57,8 +64,9 @@ def static_dataset(result: StaticResult) -> xr.Dataset:
         {name: _variable(*entry) for name, entry in variables.items()},
         coords={
             "mesh": _variable(("mesh",), list(gears.mesh_names), "1", "gear mesh"),
-            "position": _variable(("position",), cycle.position, "1", "fraction of one mesh period"),
+            "position": _variable(("position",), cycle.position, "1", "position in mesh periods"),
             "planet": _variable(("planet",), np.arange(1, gears.n_planets + 1), "1", "planet"),
+            "member": _variable(("member",), list(cycle.member_names), "1", "moving member and direction"),
             "tooth": _variable(("tooth",), np.arange(teeth), "1", "tooth pair in the order of the path"),
         },
         attrs={
@@ -74,6 +82,8 @@ def static_dataset(result: StaticResult) -> xr.Dataset:
             "teeth": np.array([gears.sun.teeth, gears.planet.teeth, gears.ring.teeth]),
             "sun_torque": result.sun_torque,
             "contact": cycle.contact,
+            "mesh_periods": cycle.periods,
+            "period": result.period_message,
             "pressure_cells": cycle.unknowns,
             "unknowns": np.array(
                 [b.unknowns for b in (result.bodies.sun, result.bodies.planet, result.bodies.ring)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool
 
 from femgear.casefile.deviations import (
     CarrierErrors,
@@ -192,6 +192,9 @@ class StaticSection(_Section):
     positions: Count(8, 4096) = 64
     contact: Literal["profile", "line_of_action"] = "profile"
     flank_elements: Count(4, 200) = 24
+    members: Literal["fixed", "elastic"] = "fixed"
+    back_flanks: StrictBool = False
+    longest_record: Count(1, 4096) = 256
     depth: Quantity(LENGTH, 0.0, 0.1, open_low=True) | None = None
 
 
