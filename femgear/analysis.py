@@ -13,8 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.analysis_checks import (
+    check_dynamic_case,
+    highest_frequency,
+    max_nodal_diameter,
+    static_warnings,
+)
 from femgear.case import Case, planetary_set, set_deviations
-from femgear.errors import CaseError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,6 +47,11 @@ class StaticResult:
     cycle: MeshCycle
     sun_torque: float
     period_message: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What an engineer should not overlook in this result."""
+        return static_warnings(self.cycle, self.planetary_set.sun.module)
 
     def dataset(self) -> xr.Dataset:
         """Contents of static.nc."""
@@ -162,18 +172,15 @@ def solve_modes(case: Case, static: StaticResult) -> ModesResult:
     """
     from femgear.contact.bodies import active_flank_load
     from femgear.fe.elasticity import Material, foundation, mass
-    from femgear.gears import speeds
     from femgear.models.elastic import elastic_set, mesh_excitation, ring_mesh_compliance
     from femgear.models.ring import ring_model
     from femgear.solvers.modal import solve_modes as modal_basis
 
-    _need_fixed_ring(case)
-    _need_one_period(static)
     gears, sector, cycle = static.planetary_set, static.sectors.ring, static.cycle
+    check_dynamic_case(case, gears)
     side = 1.0 if static.sun_torque >= 0 else -1.0
     material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-    fastest = speeds(gears, input=case.operation.input, fixed="ring", speed=max(case.operation.speeds))
-    top = 2.0 * case.response_harmonics * fastest.mesh_frequency
+    top = highest_frequency(case, gears)
     diameter = max_nodal_diameter(case)
     thickness = gears.ring.face_width
     ring = ring_model(
@@ -307,36 +314,6 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
         signal=fixed_sensor_signal(linear),
         points=case.housing.points,
     )
-
-
-def max_nodal_diameter(case: Case) -> int:
-    """Largest nodal diameter of the ring model: what the housing points resolve, at least 2."""
-    return max(min((case.housing.points - 1) // 2, case.ring.teeth // 2 - 1), 2)
-
-
-def _need_fixed_ring(case: Case) -> None:
-    if case.operation.fixed != "ring":
-        raise CaseError(
-            "modes, dynamics and housing need a fixed ring: it is the housing of this model",
-            code="E-FIXED-MEMBER",
-            key="operation.fixed",
-            value=case.operation.fixed,
-            limit='"ring"',
-            remedy="run with --only static, or fix the ring",
-        )
-
-
-def _need_one_period(static: StaticResult) -> None:
-    if static.cycle.periods > 1:
-        raise CaseError(
-            f"the errors of this set repeat only after {static.cycle.periods} mesh periods; modes, dynamics and "
-            "housing take one",
-            code="E-PERIODS",
-            key="static.longest_record",
-            value=static.cycle.periods,
-            limit="1",
-            remedy="run with --only static, leave pitch errors and runouts out, or set static.longest_record = 1",
-        )
 
 
 def _supports(case: Case):

@@ -89,6 +89,7 @@ def static_dataset(result: StaticResult) -> xr.Dataset:
                 [b.unknowns for b in (result.bodies.sun, result.bodies.planet, result.bodies.ring)]
             ),
             "message": cycle.message,
+            "warnings": " ".join(result.warnings),
         },
     )
 

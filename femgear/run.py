@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear import analysis
+from femgear.case import planetary_set
 from femgear.storage import finish, write_dataset, write_text
 
 if TYPE_CHECKING:
@@ -53,6 +54,8 @@ def run_case(
     from threadpoolctl import threadpool_limits
 
     cache = grid_cache()
+    if only != "static":
+        analysis.check_dynamic_case(case, planetary_set(case))
     last = STAGES.index(only) if only else len(STAGES) - 1
     write_text(case.source, folder / "case.toml")
     names, timings, convergence = ["case.toml"], {}, {}
@@ -130,7 +133,6 @@ def report_again(folder: Path) -> None:
     folder : path
         Results of a complete run.
     """
-    from femgear.case import planetary_set
     from femgear.pictures import write_figures
     from femgear.report import write_report
     from femgear.storage import open_results

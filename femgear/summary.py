@@ -11,6 +11,8 @@ import numpy as np
 
 from femgear.gears import check_set, speeds, tooth_thickness, torques
 from femgear.gears.checks import tip_clearances
+from femgear.gears.deviation_checks import check_deviations
+from femgear.models.ring import MAX_DIAMETER
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,12 +69,20 @@ def describe_case(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
 def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
     """What is allowed but deserves a look, in sentences."""
     found = [str(warning) for warning in check_set(planetary)] + list(case.notices)
+    from femgear.case import set_deviations
+
+    found += [str(warning) for warning in check_deviations(set_deviations(case), planetary)]
     if case.operation.torque == 0:
         found.append(
             "[W-TORQUE] operation.torque: without torque no tooth touches; only static results exist"
         )
     if case.operation.torque < 0:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
+    if case.housing.points <= 2 * MAX_DIAMETER:
+        found.append(
+            f"[W-POINTS] housing.points: {case.housing.points} points do not resolve the ring's "
+            f"{MAX_DIAMETER} nodal diameters; use more than {2 * MAX_DIAMETER}"
+        )
     return tuple(found)
 
 
@@ -187,7 +197,7 @@ def _static(data: xr.Dataset) -> Block:
                 f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
                 f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
                 f"{one.mesh_force.values.mean():.3f}",
-                f"{one.max_pressure.values.max() / 1e6:.1f}",
+                f"{one.max_pressure.values.max() / 1e6:.1f}" if one.max_pressure.values.any() else "-",
             )
         )
     share = data.load_share.values
@@ -200,11 +210,15 @@ def _static(data: xr.Dataset) -> Block:
         "force [N]",
         "p max [MPa]",
     )
-    notes = (
+    notes = [
         f"load share of a planet {share.min():.4f} to {share.max():.4f} "
         f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
-    )
-    return Block("Static", header, tuple(rows), notes)
+    ]
+    if data.attrs.get("mesh_periods", 1) > 1:
+        notes.append(str(data.attrs["period"]))
+    if warnings := str(data.attrs.get("warnings", "")):
+        notes += [f"[{text.strip()}" for text in warnings.split("[") if text]
+    return Block("Static", header, tuple(rows), tuple(notes))
 
 
 def _modes(data: xr.Dataset) -> Block:

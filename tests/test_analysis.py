@@ -121,6 +121,42 @@ def test_progress_counts_the_positions(case):
     assert seen[-1] == ("contact", 13, 13)
 
 
-@pytest.mark.parametrize(("points", "expected"), [(54, 26), (7, 3), (1000, 53)])
-def test_nodal_diameters_are_those_that_the_points_resolve(case, points, expected):
-    assert max_nodal_diameter(with_value(case, "housing.points", points)) == expected
+@pytest.mark.parametrize(("points", "teeth", "expected"), [(7, 108, 26), (1000, 108, 26), (54, 40, 19)])
+def test_nodal_diameters_do_not_depend_on_the_points_of_the_housing(case, points, teeth, expected):
+    changed = case.model_copy(
+        update={
+            "housing": case.housing.model_copy(update={"points": points}),
+            "ring": case.ring.model_copy(update={"teeth": teeth}),
+        }
+    )
+    assert max_nodal_diameter(changed) == expected
+
+
+def test_what_the_dynamics_cannot_represent_is_refused_before_computing(case):
+    from femgear.analysis import check_dynamic_case
+    from femgear.case import planetary_set
+    from femgear.errors import CaseError
+
+    for key, value, code in (
+        ("operation.fixed", "carrier", "E-FIXED-MEMBER"),
+        ("operation.torque", "0 N m", "E-NO-LOAD"),
+        ("operation.speeds", ["1e6 rpm"], "E-FREQUENCY"),
+        ("sun.errors", {"runout_amplitude": "5 um"}, "E-PERIODS"),
+    ):
+        changed = with_value(case, key, value)
+        with pytest.raises(CaseError, match=code):
+            check_dynamic_case(changed, planetary_set(changed))
+    check_dynamic_case(case, planetary_set(case))
+
+
+def test_slow_sets_keep_their_modes(case, static):
+    slow = solve_modes(with_value(case, "operation.speeds", ["0.1 rpm"]), static)
+    assert len(slow.modes.frequency) > 15
+
+
+def test_overload_is_said(case):
+    overload = solve_static(
+        with_value(with_value(case, "operation.torque", "20000 N m"), "static.positions", 16)
+    )
+    words = " ".join(overload.warnings)
+    assert "W-PRESSURE" in words and "W-DEFLECTION" in words

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from femgear.gears import PlanetarySet
 
 RADIAL, TANGENTIAL = 0, 1
+# nodal diameters of the ring model: their amplitudes fall fast, and 54 points of the housing resolve them
+MAX_DIAMETER = 26
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,119 @@
+"""What the pipeline refuses before it computes, and what it warns of afterwards."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case import Case, set_deviations
+from femgear.errors import CaseError
+
+if TYPE_CHECKING:
+    from femgear.contact.cycle import MeshCycle
+    from femgear.gears import PlanetarySet
+
+# the wavelength of shear in steel at 200 kHz is 16 mm: shorter waves are no matter of plane gear bodies
+HIGHEST_RESPONSE = 200e3
+# however slow the set turns, its modes up to here are kept [Hz]
+LOWEST_TOP = 10e3
+
+
+def max_nodal_diameter(case: Case) -> int:
+    """Largest nodal diameter of the ring model; beyond half the teeth there are none."""
+    from femgear.models.ring import MAX_DIAMETER
+
+    return max(min(MAX_DIAMETER, case.ring.teeth // 2 - 1), 2)
+
+
+def highest_frequency(case: Case, gears: PlanetarySet) -> float:
+    """Frequency up to which ring and set have modes of their own [Hz]: twice the highest of the response.
+
+    Raises
+    ------
+    CaseError
+        When the response reaches beyond what a plane model of the ring means anything for.
+    """
+    from femgear.gears import speeds
+
+    fastest = speeds(gears, input=case.operation.input, fixed="ring", speed=max(case.operation.speeds))
+    response = case.response_harmonics * fastest.mesh_frequency
+    if response > HIGHEST_RESPONSE:
+        allowed = max(case.operation.speeds) * HIGHEST_RESPONSE / response
+        raise CaseError(
+            f"{case.response_harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
+            code="E-FREQUENCY",
+            key="operation.speeds",
+            value=f"{max(case.operation.speeds) * 30 / np.pi:.6g} rpm",
+            limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed * 30 / np.pi:.4g} rpm here",
+            remedy="leave the highest speeds out, or fewer dynamics.response_harmonics",
+        )
+    return max(2.0 * response, LOWEST_TOP)
+
+
+def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
+    """Refuse what modes, dynamics and housing cannot represent, before anything is computed.
+
+    Raises
+    ------
+    CaseError
+        The ring is not the fixed member, there is no torque, the errors span several mesh periods, or the
+        response reaches beyond `HIGHEST_RESPONSE`.
+    """
+    from femgear.gears.deviations import common_period
+
+    if case.operation.fixed != "ring":
+        raise CaseError(
+            "modes, dynamics and housing need a fixed ring: it is the housing of this model",
+            code="E-FIXED-MEMBER",
+            key="operation.fixed",
+            value=case.operation.fixed,
+            limit='"ring"',
+            remedy="run with --only static, or fix the ring",
+        )
+    if case.operation.torque == 0:
+        raise CaseError(
+            "without torque no tooth carries load, so there is no mesh stiffness for the dynamic model",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero for modes, dynamics and housing",
+            remedy="give a torque, or run with --only static",
+        )
+    periods, _ = common_period(set_deviations(case), gears, limit=case.static.longest_record)
+    if periods > 1:
+        raise CaseError(
+            f"the errors of this set span {periods} mesh periods; modes, dynamics and housing take one",
+            code="E-PERIODS",
+            key="static.longest_record",
+            value=case.static.longest_record,
+            limit="errors that repeat with every tooth",
+            remedy="run with --only static, or leave pitch errors and runouts out",
+        )
+    highest_frequency(case, gears)
+
+
+def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
+    """What is wrong with a static result in an engineer's eyes, in sentences."""
+    found = []
+    if cycle.max_pressure.max(initial=0.0) > 4e9:
+        found.append(
+            f"[W-PRESSURE] the contact pressure reaches {cycle.max_pressure.max() * 1e-6:.0f} MPa: no steel "
+            "carries that, and the model stays elastic"
+        )
+    if np.abs(cycle.deflection).max(initial=0.0) > 0.05 * module:
+        found.append(
+            f"[W-DEFLECTION] the teeth deflect by {np.abs(cycle.deflection).max() * 1e6:.0f} um, more than "
+            "5 % of the module: small displacements no longer hold"
+        )
+    edges = (cycle.force > 0) & (cycle.max_pressure <= 0)
+    if edges.any():
+        found.append(
+            "[W-EDGE] at some positions every contact of a mesh lies at the end of a flank: its pressure has "
+            "no limit and is not given"
+        )
+    if cycle.open_planets.any() and cycle.force.any():
+        planets = ", ".join(str(n + 1) for n in np.flatnonzero(cycle.open_planets.any(axis=1)))
+        found.append(f"[W-OPEN] planet {planets} carries nothing at some positions")
+    if cycle.wedged.any():
+        found.append("[W-WEDGED] some meshes are loaded on both flanks at once")
+    return tuple(found)
