@@ -232,7 +232,8 @@ def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells,
 
 def _profile_form(planetary_set, deviations, kind, back):
     """Separation by deviations of the profiles as a function of both roll lengths, or None."""
-    if deviations is None:
+    forms = ("sun", "planet_sun_side") if kind == 0 else ("planet_ring_side", "ring")
+    if deviations is None or not any(getattr(deviations, name).modifications for name in forms):
         return None
     from femgear.gears.deviations import profile_separation
 
