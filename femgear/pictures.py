@@ -14,13 +14,20 @@ if TYPE_CHECKING:
     from femgear.analysis import DynamicsResult, ModesResult, Progress, StaticResult
     from femgear.case import Case
     from femgear.gears import PlanetarySet
+    from femgear.gears.deviations import SetDeviations
 
 # pictures need no converged stresses: a sector of some thousand nodes keeps the files small
 PICTURE_FLANK_ELEMENTS = 6
 PICTURE_REFINE = 0.35
 
 
-def write_figures(folder: Path, gears: PlanetarySet, data: dict[str, xr.Dataset]) -> list[str]:
+def write_figures(
+    folder: Path,
+    gears: PlanetarySet,
+    data: dict[str, xr.Dataset],
+    *,
+    deviations: SetDeviations | None = None,
+) -> list[str]:
     """Figures of the stages in `data`, by stage name.
 
     Parameters
@@ -29,6 +36,8 @@ def write_figures(folder: Path, gears: PlanetarySet, data: dict[str, xr.Dataset]
     gears : PlanetarySet
     data : dict of str to Dataset
         Contents of static.nc, modes.nc, dynamics.nc and housing.nc, as far as computed.
+    deviations : SetDeviations, optional
+        Charted when they are not zero.
 
     Returns
     -------
@@ -59,6 +68,11 @@ def write_figures(folder: Path, gears: PlanetarySet, data: dict[str, xr.Dataset]
             figures[f"housing_signal_{name}"] = plots.housing_signal(housing, speed_index=s, ring_teeth=teeth)
             figures[f"order_spectrum_{name}"] = plots.order_spectrum(housing, speed_index=s, ring_teeth=teeth)
             figures[f"modulation_{name}"] = plots.modulation_polar(housing, speed_index=s, ring_teeth=teeth)
+    if deviations is not None and not deviations.ideal:
+        from femgear.plots.deviations import pitch_chart, profile_chart
+
+        figures["profile_deviations"] = profile_chart(deviations, gears)
+        figures["pitch_deviations"] = pitch_chart(deviations, gears)
     for name, figure in figures.items():
         plots.save_figure(figure, folder / f"{name}.png")
     return [f"{name}.png" for name in figures]
@@ -201,7 +215,9 @@ def write_pictures(
     progress: Progress | None = None,
 ) -> list[str]:
     """Everything that a run shows; returns the names of the files."""
-    steps = [lambda: write_figures(folder, static.planetary_set, data)]
+    from femgear.case import set_deviations
+
+    steps = [lambda: write_figures(folder, static.planetary_set, data, deviations=set_deviations(case))]
     if static.cycle.force.any():
         steps.append(lambda: write_deformed_set(folder, case, static, cache=cache))
     if modes is not None:

@@ -50,6 +50,16 @@ _CAPTIONS = (
         "Load of one tooth pair from its first to its last contact.",
     ),
     (
+        "profile_deviations",
+        "Static",
+        "Deviations of the loaded flanks from the involute over the roll angle, positive with more material.",
+    ),
+    (
+        "pitch_deviations",
+        "Static",
+        "Cumulative pitch deviations of the loaded flanks over the tooth number.",
+    ),
+    (
         "deformed_set",
         "Static",
         "Deformed set under the static load, magnified; at rest in grey.",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear import analysis
-from femgear.case import planetary_set
+from femgear.case import planetary_set, set_deviations
 from femgear.storage import finish, write_dataset, write_text
 
 if TYPE_CHECKING:
@@ -142,7 +142,9 @@ def report_again(folder: Path) -> None:
     names = [name for name in manifest.files if name != "report.html"]
     if not any(name.endswith(".png") for name in names):
         data = {stage: getattr(results, stage) for stage in results.stages}
-        names += write_figures(results.folder, planetary_set(results.case), data)
+        names += write_figures(
+            results.folder, planetary_set(results.case), data, deviations=set_deviations(results.case)
+        )
         finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
     write_report(folder)
     finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)

@@ -232,7 +232,9 @@ def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells,
 
 def _profile_form(planetary_set, deviations, kind, back):
     """Separation by deviations of the profiles as a function of both roll lengths, or None."""
-    forms = ("sun", "planet_sun_side") if kind == 0 else ("planet_ring_side", "ring")
+    # on the back side a planet meets sun and ring with its other flanks
+    planet = "planet_sun_side" if (kind == 0) != back else "planet_ring_side"
+    forms = (planet, "ring" if kind else "sun")
     if deviations is None or not any(getattr(deviations, name).modifications for name in forms):
         return None
     from femgear.gears.deviations import profile_separation
