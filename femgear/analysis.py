@@ -143,7 +143,8 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
     gears = planetary_set(case)
     material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
     sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
-    bodies = make_bodies(sectors, material, depth=case.static.depth)
+    foundation = _ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
+    bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
     sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
     deviations = set_deviations(case)
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
@@ -171,7 +172,7 @@ def solve_modes(case: Case, static: StaticResult) -> ModesResult:
         Without torque, or when the ring, which is the housing of this model, is not the fixed member.
     """
     from femgear.contact.bodies import active_flank_load
-    from femgear.fe.elasticity import Material, foundation, mass
+    from femgear.fe.elasticity import Material, mass
     from femgear.models.elastic import elastic_set, mesh_excitation, ring_mesh_compliance
     from femgear.models.ring import ring_model
     from femgear.solvers.modal import solve_modes as modal_basis
@@ -188,17 +189,12 @@ def solve_modes(case: Case, static: StaticResult) -> ModesResult:
         sector.grid,
         sector.stiffness,
         mass(sector.grid, material, thickness),
-        foundation(
-            sector.grid,
-            "rim",
-            case.ring.foundation_radial,
-            case.ring.foundation_tangential,
-            thickness=thickness,
-        ),
+        _ring_foundation(case, sector),
         active_flank_load(sector.grid, gears, side),
         max_diameter=diameter,
         max_frequency=top,
         side=side,
+        static_on_foundation=case.static.members == "elastic",
     )
     compliance = ring_mesh_compliance(
         ring.held_compliance, np.arange(diameter + 1), gears.ring.teeth, gears.planet_angles
@@ -314,6 +310,14 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
         signal=fixed_sensor_signal(linear),
         points=case.housing.points,
     )
+
+
+def _ring_foundation(case: Case, sector):
+    """Elastic foundation of one sector of the ring [N/m]."""
+    from femgear.fe.elasticity import foundation
+
+    ring, width = case.ring, sector.gear.face_width
+    return foundation(sector.grid, "rim", ring.foundation_radial, ring.foundation_tangential, thickness=width)
 
 
 def _supports(case: Case):

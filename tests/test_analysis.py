@@ -160,3 +160,25 @@ def test_overload_is_said(case):
     )
     words = " ".join(overload.warnings)
     assert "W-PRESSURE" in words and "W-DEFLECTION" in words
+
+
+def test_with_elastic_members_standstill_is_the_static_state_even_with_pin_errors(case):
+    """Unequal loads, every spring of the dynamic model in the static one: forces agree at 1 rpm."""
+    for key, value in {
+        "static.positions": 16,
+        "static.members": "elastic",
+        "operation.speeds": ["1 rpm"],
+        "dynamics.response_harmonics": 14,
+        "dynamics.mesh_harmonics": 7,
+        "set.pin_errors": [{"planet": 1, "tangential": "12 um"}, {"planet": 2, "radial": "6 um"}],
+    }.items():
+        case = with_value(case, key, value)
+    static = solve_static(case)
+    result = solve_dynamics(case, static, solve_modes(case, static))
+    assert np.ptp(static.cycle.load_share.mean(axis=1)) > 0.02
+    mean = static.cycle.force.mean(axis=1)
+    assert result.response.force[0, :, 0].real == pytest.approx(mean, rel=1e-4)
+    force = sample(result.response.force[0], 32)[:, ::2]
+    spectrum = np.fft.rfft(static.cycle.force, axis=1)
+    spectrum[:, 8] = 0.0
+    assert force == pytest.approx(np.fft.irfft(spectrum, 16, axis=1), rel=2e-3)

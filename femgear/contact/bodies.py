@@ -77,7 +77,9 @@ def make_sectors(
     return Sectors(*sectors)
 
 
-def make_bodies(sectors: Sectors, material: Material, *, depth: float | None = None) -> Bodies:
+def make_bodies(
+    sectors: Sectors, material: Material, *, depth: float | None = None, ring_foundation=None
+) -> Bodies:
     """Flank compliances with sun and planets held at their bores and the ring at its outer surface.
 
     Parameters
@@ -86,11 +88,18 @@ def make_bodies(sectors: Sectors, material: Material, *, depth: float | None = N
     material : Material
     depth : float, optional
         Largest depth at which body and half plane are joined [m].
+    ring_foundation : sparse matrix, optional
+        Stiffness of an elastic foundation of the ring, which then is not held [N/m].
     """
     compliances = [
         flank_compliance(s.grid, s.gear, material, s.stiffness, held="rim", depth=depth)
-        for s in (sectors.sun, sectors.planet, sectors.ring)
+        for s in (sectors.sun, sectors.planet)
     ]
+    ring, held = sectors.ring, "rim"
+    stiffness = ring.stiffness
+    if ring_foundation is not None:
+        stiffness, held = stiffness + ring_foundation, None
+    compliances.append(flank_compliance(ring.grid, ring.gear, material, stiffness, held=held, depth=depth))
     return Bodies(*compliances, material=material, face_width=sectors.sun.gear.face_width)
 
 

@@ -34,7 +34,8 @@ class RingModel:
     load_angle : float
         Angle from a planet to the centre of the ring tooth that it loads [rad].
     held_compliance : (n_max + 1,) array
-        Compliance of each nodal diameter at the load with the outer surface held [m/N].
+        Compliance of each nodal diameter at the load [m/N], the outer surface as in the static meshes: held,
+        or on its foundation.
     """
 
     modes: CyclicModes
@@ -62,6 +63,7 @@ def ring_model(
     max_diameter: int,
     max_frequency: float,
     side: float = 1.0,
+    static_on_foundation: bool = False,
 ) -> RingModel:
     """Ring modes for nodal diameters 0..max_diameter.
 
@@ -79,6 +81,8 @@ def ring_model(
         Modes beyond are represented by their static part [Hz].
     side : float
         Sign of the sun's torque: which flanks carry.
+    static_on_foundation : bool
+        Whether the static meshes contain the ring on its foundation rather than held at its outer surface.
     """
     from femgear.fe.compliance import condense_sector, cyclic_harmonics
     from femgear.fe.reduction import cyclic_modes, sector_basis
@@ -95,7 +99,8 @@ def ring_model(
         outputs=outer_surface_outputs(grid),
         max_frequency=max_frequency,
     )
-    held = condense_sector(grid, stiffness, count=ring.teeth, held="rim", loads=load, observations=load)
+    matrix, boundary = (stiffness + foundation, None) if static_on_foundation else (stiffness, "rim")
+    held = condense_sector(grid, matrix, count=ring.teeth, held=boundary, loads=load, observations=load)
     pitch_radius = ring.base_radius / np.cos(planetary_set.working_pressure_angle_planet_ring)
     return RingModel(
         modes=modes,

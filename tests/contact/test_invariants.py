@@ -1,0 +1,129 @@
+"""Properties that hold for any errors: permutation, rotation, scaling, superposition, monotony."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.supports import Supports
+from femgear.fe.elasticity import Material
+from femgear.gears.deviations import no_deviations
+from femgear.validation.planetary import reference_set
+
+STEEL = Material(206e9, 0.3, 7850.0)
+TORQUE = 100.0
+micrometres = st.floats(-4.0, 4.0)
+pins = st.lists(st.tuples(micrometres, micrometres), min_size=3, max_size=3)
+supports = st.sampled_from([Supports(), Supports(sun=0.0), Supports(sun=5e7, carrier=2e8, planet=3e8)])
+few = settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+
+
+@pytest.fixture(scope="module")
+def gears():
+    return reference_set()
+
+
+@pytest.fixture(scope="module")
+def bodies(gears):
+    return make_bodies(make_sectors(gears, STEEL, flank_elements=8), STEEL)
+
+
+def errors_of(gears, values):
+    return replace(no_deviations(gears), pin_errors=1e-6 * np.array(values))
+
+
+def walk(gears, bodies, values, held, *, torque=TORQUE, positions=2):
+    return walk_mesh_cycle(
+        gears,
+        bodies,
+        sun_torque=torque,
+        positions=positions,
+        deviations=errors_of(gears, values),
+        supports=held,
+    )
+
+
+@few
+@given(pins, supports)
+def test_every_solution_is_in_equilibrium(gears, bodies, values, held):
+    cycle = walk(gears, bodies, values, held)
+    total = TORQUE / gears.sun.base_radius
+    assert np.abs(cycle.force[:3].sum(axis=0) / total - 1).max() < 1e-9
+    assert np.abs(cycle.force[:3] - cycle.force[3:]).max() < 1e-9 * total
+    assert cycle.force.min() >= 0.0
+    assert cycle.residual.max() < 1e-9
+
+
+@few
+@given(pins, supports)
+def test_passing_the_errors_on_to_the_next_planet_passes_the_loads_on(gears, bodies, values, held):
+    """Three equal planets in phase: a rotation of the set by 120 deg."""
+    one = walk(gears, bodies, values, held)
+    two = walk(gears, bodies, values[1:] + values[:1], held)
+    assert two.force[:3] == pytest.approx(one.force[[1, 2, 0]], rel=1e-6, abs=1e-6 * one.force.max())
+    assert two.sun_arc == pytest.approx(one.sun_arc, rel=1e-8)
+
+
+@few
+@given(pins, supports, st.floats(0.1, 10.0))
+def test_lengths_scale(gears, bodies, values, held, scale):
+    """All lengths times s, E fixed: torque s^3, errors s, forces s^2, deflections s."""
+    large = replace(
+        gears,
+        centre_distance=scale * gears.centre_distance,
+        **{
+            name: replace(
+                gear,
+                module=scale * gear.module,
+                rim_radius=scale * gear.rim_radius,
+                face_width=scale * gear.face_width,
+            )
+            for name, gear in (("sun", gears.sun), ("planet", gears.planet), ("ring", gears.ring))
+        },
+    )
+    grown = make_bodies(make_sectors(large, STEEL, flank_elements=8), STEEL)
+    softer = Supports(
+        **{
+            name: None if (k := getattr(held, name)) is None else k * scale
+            for name in ("sun", "carrier", "planet", "ring")
+        }
+    )
+    one = walk(gears, bodies, values, held)
+    two = walk(large, grown, [(scale * a, scale * b) for a, b in values], softer, torque=scale**3 * TORQUE)
+    assert two.force == pytest.approx(scale**2 * one.force, rel=1e-6, abs=1e-6 * scale**2 * one.force.max())
+    assert two.sun_arc == pytest.approx(scale * one.sun_arc, rel=1e-6)
+
+
+@few
+@given(pins, st.floats(0.2, 5.0))
+def test_modulus_and_torque_scale_together(gears, bodies, values, factor):
+    """E and torque times f: the same deflections under the same errors."""
+    material = Material(206e9 * factor, 0.3, 7850.0)
+    stiff = make_bodies(make_sectors(gears, material, flank_elements=8), material)
+    one = walk(gears, bodies, values, Supports())
+    two = walk(gears, stiff, values, Supports(), torque=factor * TORQUE)
+    assert two.sun_arc == pytest.approx(one.sun_arc, rel=1e-6)
+    assert two.stiffness == pytest.approx(factor * one.stiffness, rel=1e-6)
+
+
+@few
+@given(pins, supports, st.floats(1.05, 3.0))
+def test_more_torque_turns_the_sun_further_and_stiffens_the_path(gears, bodies, values, held, factor):
+    """Contact only stiffens: the sun turns further, but by less for each further newton metre."""
+    turns = [
+        walk(gears, bodies, values, held, torque=t * TORQUE).sun_arc for t in (1.0, factor, 2 * factor - 1)
+    ]
+    assert np.all(turns[1] > turns[0])
+    assert np.all(turns[2] - turns[1] <= (turns[1] - turns[0]) * (1 + 1e-6))
+
+
+@few
+@given(st.tuples(micrometres, micrometres))
+def test_the_same_error_everywhere_changes_no_load(gears, bodies, value):
+    plain = walk(gears, bodies, [(0.0, 0.0)] * 3, Supports())
+    moved = walk(gears, bodies, [value] * 3, Supports())
+    assert moved.force == pytest.approx(plain.force, rel=1e-6)
