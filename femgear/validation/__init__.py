@@ -11,8 +11,9 @@ FAILED = 3
 
 
 def validate(
-    output: str | os.PathLike,
+    output: str | os.PathLike | None,
     *,
+    theme: str | None = None,
     quick: bool = False,
     progress: Callable[[str, float, float], None] | None = None,
 ) -> int:
@@ -20,8 +21,10 @@ def validate(
 
     Parameters
     ----------
-    output : path
-        Markdown file.
+    output : path or None
+        Markdown file; None writes none.
+    theme : str, optional
+        Compute this theme alone and print each of its rows.
     quick : bool
         Leave out what takes long.
     progress : callable, optional
@@ -34,15 +37,37 @@ def validate(
 
     Raises
     ------
+    CaseError
+        No theme has this name (E-THEME).
     StorageError
         When the file cannot be written.
     """
-    from femgear.validation.page import summary, write_page
+    from femgear.validation.page import row_line, summary, write_page
     from femgear.validation.run import run_validation
     from femgear.validation.themes import THEMES
 
-    validation = run_validation(THEMES, quick=quick, progress=progress)
-    write_page(validation, output)
+    chosen = THEMES if theme is None else tuple(one for one in THEMES if one.name == theme)
+    if not chosen:
+        raise _unknown_theme(theme, [one.name for one in THEMES])
+    validation = run_validation(chosen, quick=quick, progress=progress)
+    if output is not None:
+        write_page(validation, output)
+    if theme is not None:
+        print("\n".join(row_line(row) for row in validation.rows if row.verdict != "FAILS"))
     print(summary(validation))
-    print(f"written: {os.fspath(output)}")
+    if output is not None:
+        print(f"written: {os.fspath(output)}")
     return FAILED if validation.failures else 0
+
+
+def _unknown_theme(theme, names):
+    from femgear.errors import CaseError
+
+    return CaseError(
+        "there is no such theme of the validation",
+        code="E-THEME",
+        key="--theme",
+        value=theme,
+        limit=", ".join(names),
+        remedy="name one of these, or leave --theme out for all",
+    )

@@ -72,13 +72,21 @@ def table(rows: tuple[Row, ...]) -> str:
 def summary(validation: Validation) -> str:
     """Rows that fail, or one line that none does, for the terminal."""
     verdicts = Counter(row.verdict for row in validation.rows)
-    lines = [
-        f"FAILS {row.case}: {row.quantity}: reference {_reference(row)}, femgear {_ours(row)}, "
-        f"error {_error(row)}, gate {_gate(row)}. {row.note}".rstrip()
-        for row in validation.failures
-    ]
+    lines = [f"{row_line(row)}. {row.note}".rstrip() for row in validation.failures]
     counted = ", ".join(f"{count} {verdict}" for verdict, count in sorted(verdicts.items()))
     return "\n".join([*lines, f"{len(validation.rows)} rows: {counted}"])
+
+
+def row_line(row: Row) -> str:
+    """One row as one line of text, with its verdict first."""
+    parts = (
+        ("reference", _reference(row)),
+        ("femgear", _ours(row)),
+        ("error", _error(row)),
+        ("gate", _gate(row)),
+    )
+    shown = ", ".join(f"{name} {text}" for name, text in parts if text)
+    return f"{row.verdict} {row.case}: {row.quantity}: {shown}"
 
 
 def write_page(validation: Validation, path: str | os.PathLike) -> None:

@@ -12,6 +12,7 @@ from femgear.validation import (
     elasticity,
     geometry,
     housing,
+    members,
     modulation,
     parametric,
     planetary,
@@ -96,6 +97,12 @@ THEMES = (
         "with one numerical parameter changed.",
         (static.equilibrium, static.iso_stiffness, static.planet_gaps, static.some_random_problems),
         (static.numerical_parameters, static.element_size, static.random_problems),
+    ),
+    Theme(
+        "members",
+        "Relief, errors and moving members",
+        "The same set with tip relief, pin errors, a floating sun, planet bearings and reversed torque.",
+        (members.sharing, members.relief, members.nominal_stress),
     ),
     Theme(
         "ring",
