@@ -46,4 +46,5 @@ bench: environment
 clean:
 	rm -rf out dist .pytest_cache .ruff_cache .hypothesis .benchmarks
 	find . -name __pycache__ -type d -not -path "./.venv/*" -prune -exec rm -rf {} +
-	find meshes -type f \( -name "*.vtu" -o -name "*.msh" \) -not -name "reference_*" -delete
+	@if git rev-parse --is-inside-work-tree >/dev/null 2>&1; then git clean -fdXq meshes; \
+	else find meshes -type f \( -name "*.vtu" -o -name "*.msh" \) -not -name "reference_*" -delete; fi

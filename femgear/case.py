@@ -12,8 +12,10 @@ from pydantic import ValidationError
 
 from femgear.casefile import tomlfile
 from femgear.casefile.deviations import CarrierErrors, GearErrors, ModificationSection
+from femgear.casefile.given import in_terms_of_the_case, notices
 from femgear.casefile.problems import combine, translate
 from femgear.casefile.profiles import embed_profiles
+from femgear.casefile.published import without_uncomputed
 from femgear.casefile.sections import FORMAT, Case, PlanetSection, RingSection, SunSection, cross_check
 from femgear.errors import CaseError, GeometryError
 from femgear.gears import (
@@ -93,6 +95,8 @@ def parse_case(text: str, *, name: str = "") -> Case:
 def with_value(case: Case, key: str, value: object) -> Case:
     """The case with one entry changed, checked again as a whole.
 
+    Published lines whose speed or harmonic is not computed any more are left out; ``notices`` says so.
+
     Parameters
     ----------
     case : Case
@@ -128,7 +132,15 @@ def with_value(case: Case, key: str, value: object) -> Case:
     except CaseError as error:
         error.key, error.file = key, case.name or None
         raise
-    return _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
+    try:
+        return _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
+    except CaseError as error:
+        if key.startswith("housing") or not (notice := without_uncomputed(data, error)):
+            raise
+    text = tomlfile.write(data)
+    changed = _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
+    changed._notices += (notice,)
+    return changed
 
 
 def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type) -> dict | list:
@@ -191,7 +203,7 @@ def planetary_set(case: Case) -> PlanetarySet:
         )
         check_set(closed)
     except GeometryError as error:
-        error.file = case.location(error.key or "")
+        in_terms_of_the_case(error, case)
         raise
     return closed
 
@@ -354,7 +366,7 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
             "the file is written for a newer femgear",
             code="E-FORMAT",
             key="format",
-            value=tomlfile.shown(version),
+            value=tomlfile.found(version),
             limit=f"up to {FORMAT}",
             remedy="update femgear",
             file=name,
@@ -378,15 +390,5 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     problems = cross_check(case)
     if problems:
         raise combine(problems, lines, name)
-    case._source, case._lines, case._name, case._notices = text, lines, name, _notices(data)
+    case._source, case._lines, case._name, case._notices = text, lines, name, notices(data)
     return case
-
-
-def _notices(data: dict) -> tuple[str, ...]:
-    teeth = data["ring"]["teeth"]
-    if teeth > 0:
-        return ()
-    return (
-        f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
-        "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)",
-    )

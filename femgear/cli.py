@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Literal
-
-from cyclopts import App, CycloptsError, Parameter
-
-from femgear import __version__
-from femgear.errors import FemgearError
-from femgear.files import storage_error
 
 INTERRUPTED = 130
+
+try:
+    from pathlib import Path
+    from typing import Annotated, Literal
+
+    from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
+
+    from femgear import __version__
+    from femgear.errors import CaseError, FemgearError
+    from femgear.files import storage_error
+except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
+    sys.stderr.write("interrupted\n")
+    raise SystemExit(INTERRUPTED) from None
 
 app = App(
     name="femgear",
@@ -77,6 +83,34 @@ def _fail(error: FemgearError) -> int:
     return error.exit_code
 
 
+def wrong_arguments(error: CycloptsError, program: str = "femgear") -> CaseError:
+    """What is wrong with a command line, in one sentence.
+
+    Parameters
+    ----------
+    error : CycloptsError
+    program : str
+        Name of the program, for the remedy.
+    """
+    absent = isinstance(error, MissingArgumentError) and not (error.argument and error.argument.tokens)
+    message = " ".join(str(error).split())
+    if absent and error.argument is not None and "--" + error.argument.name.lstrip("-") not in _given(error):
+        message = f"{error.argument.name} is required"
+    command = " ".join((program, *(error.command_chain or ())))
+    return CaseError(message, code="E-ARGUMENTS", remedy=f"{command} --help")
+
+
+def _given(error: CycloptsError) -> list[str]:
+    """Arguments as typed; ``-o`` counts as ``--output``."""
+    return ["--output" if token == "-o" else token for token in error.root_input_tokens or ()]
+
+
+def show_warning(message, category, filename, lineno, file=None, line=None) -> None:
+    """Print a warning as one line on standard error; takes the place of `warnings.showwarning`."""
+    text = message if category is UserWarning else f"{message} ({category.__name__}, {filename}:{lineno})"
+    print(f"warning: {text}", file=sys.stderr)
+
+
 @app.command
 def check(case: Path, /) -> int:
     """Read a case, check its gears and print what they are.
@@ -117,23 +151,22 @@ def run(
     pictures
         Draw figures, fields and report.
     force
-        Replace the results that the folder holds.
+        Replace the results that the folder holds, once the new ones are complete.
     """
     from femgear.case import planetary_set, read_case
     from femgear.run import run_case
-    from femgear.storage import open_results, prepare_output
+    from femgear.storage import open_results, run_folder
     from femgear.summary import describe_results
 
     data = read_case(case)
     planetary_set(data)  # refuse before the folder is touched
-    folder = prepare_output(output, force=force)
-    with _Progress() as progress:
+    with run_folder(output, force=force) as folder, _Progress() as progress:
         run_case(data, folder, only=only, pictures=pictures, progress=progress)
-    results = open_results(folder)
+    results = open_results(output)
     _print(describe_results(results))
-    print(f"results: {folder}")
-    if (folder / "report.html").is_file():
-        print(f"report:  {folder / 'report.html'}")
+    print(f"results: {output}")
+    if "report.html" in results.manifest.files:
+        print(f"report:  {output / 'report.html'}")
     return 0
 
 
@@ -156,7 +189,8 @@ def report(folder: Path, /) -> int:
 @app.command
 def validate(
     *,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("docs/validation.md"),
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    theme: str | None = None,
     quick: bool = False,
 ) -> int:
     """Compute the validation tables and write them; exit code 3 if a row fails.
@@ -164,14 +198,18 @@ def validate(
     Parameters
     ----------
     output
-        Markdown file.
+        Markdown file; docs/validation.md unless a theme is chosen.
+    theme
+        Compute this theme alone and print each of its rows.
     quick
         Leave out what takes long.
     """
     from femgear.validation import validate as compute
 
+    if output is None and theme is None:
+        output = Path("docs/validation.md")
     with _Progress() as progress:
-        return compute(output, quick=quick, progress=progress)
+        return compute(output, theme=theme, quick=quick, progress=progress)
 
 
 @app.command
@@ -200,10 +238,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        result = app(tokens, exit_on_error=False, result_action="return_value")
+        with warnings.catch_warnings():
+            warnings.showwarning = show_warning
+            result = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         return result if isinstance(result, int) else 0
-    except CycloptsError:
-        return 2
+    except CycloptsError as error:
+        return _fail(wrong_arguments(error))
     except FemgearError as error:
         return _fail(error)
     except KeyboardInterrupt:

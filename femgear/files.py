@@ -15,7 +15,7 @@ from femgear.errors import StorageError
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
-_MARGIN = 1_000_000
+_RESERVE = 1_000_000
 
 
 @contextlib.contextmanager
@@ -36,6 +36,55 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
         file=None if path is None else os.fsdecode(path),
         remedy="free some space or name another folder" if full else None,
     )
+
+
+@contextlib.contextmanager
+def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
+    """Hold a lock file for the block; the system releases it when the process ends, however it ends.
+
+    Advisory (``flock``): it keeps those out that ask for it. Where the system has no ``flock`` (Windows)
+    nothing is locked.
+
+    Raises
+    ------
+    StorageError
+        ``E-LOCKED``: another process, or another block of this one, holds it.
+    """
+    path = Path(path)
+    with storage_errors(path):
+        descriptor = _locked(path)
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+def _locked(path: Path) -> int | None:
+    try:
+        import fcntl
+    except ImportError:
+        return None
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # whoever held it before may have removed the file that is open here
+            if path.exists() and os.path.samestat(os.stat(path), os.fstat(descriptor)):
+                return descriptor
+        except BlockingIOError:
+            os.close(descriptor)
+            raise StorageError(
+                "another run is writing into this folder",
+                code="E-LOCKED",
+                file=str(path.parent),
+                remedy="wait until it has ended, or name another folder",
+            ) from None
+        except BaseException:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)
 
 
 def is_safe_path(name: str) -> bool:
@@ -98,11 +147,13 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
     with storage_errors(path):
         free = shutil.disk_usage(path.parent).free
-        if free < size + _MARGIN:
+        if free < size + _RESERVE:
             raise StorageError(
-                f"{size / 1e6:.1f} MB to write, {free / 1e6:.1f} MB left on the disk",
+                f"{size / 1e6:.1f} MB to write, {free / 1e6:.1f} MB left on the disk, of which "
+                f"{_RESERVE / 1e6:.0f} MB are kept in reserve",
                 code="E-DISK-FULL",
                 file=str(path),
+                limit=f"{(size + _RESERVE) / 1e6:.1f} MB free",
                 remedy="free some space or name another folder",
             )
         try:

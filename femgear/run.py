@@ -11,7 +11,7 @@ import numpy as np
 
 from femgear import analysis
 from femgear.case import planetary_set, set_deviations
-from femgear.storage import finish, write_dataset, write_text
+from femgear.storage import finish, record, write_dataset, write_text
 
 if TYPE_CHECKING:
     from femgear.case import Case
@@ -43,7 +43,7 @@ def run_case(
     ----------
     case : Case
     folder : path
-        Made ready by `storage.prepare_output`.
+        From `storage.run_folder`; its manifest says after every stage what is there.
     only : {"static", "modes", "dynamics", "housing"}, optional
         Last stage to compute.
     pictures : bool
@@ -59,6 +59,7 @@ def run_case(
     last = STAGES.index(only) if only else len(STAGES) - 1
     write_text(case.source, folder / "case.toml")
     names, timings, convergence = ["case.toml"], {}, {}
+    record(folder, names, timings=timings, convergence=convergence)
     results, data = {}, {}
     # two BLAS threads on these small matrices cost more than they gain
     with threadpool_limits(1):
@@ -72,6 +73,7 @@ def run_case(
             write_dataset(data[stage], folder / f"{stage}.nc")
             names.append(f"{stage}.nc")
             convergence[stage] = _convergence(stage, results[stage])
+            record(folder, names, timings=timings, convergence=convergence)
             if progress is not None:
                 progress(stage, 1, 1)
     if pictures:
@@ -135,16 +137,17 @@ def report_again(folder: Path) -> None:
     """
     from femgear.pictures import write_figures
     from femgear.report import write_report
-    from femgear.storage import open_results
+    from femgear.storage import folder_lock, open_results
 
-    results = open_results(folder)
-    manifest = results.manifest
-    names = [name for name in manifest.files if name != "report.html"]
-    if not any(name.endswith(".png") for name in names):
-        data = {stage: getattr(results, stage) for stage in results.stages}
-        names += write_figures(
-            results.folder, planetary_set(results.case), data, deviations=set_deviations(results.case)
-        )
-        finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
-    write_report(folder)
-    finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)
+    with folder_lock(folder):
+        results = open_results(folder, partial=False)
+        manifest = results.manifest
+        names = [name for name in manifest.files if name != "report.html"]
+        if not any(name.endswith(".png") for name in names):
+            data = {stage: getattr(results, stage) for stage in results.stages}
+            names += write_figures(
+                results.folder, planetary_set(results.case), data, deviations=set_deviations(results.case)
+            )
+            finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
+        write_report(folder)
+        finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)

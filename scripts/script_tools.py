@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -31,10 +32,12 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
     from cyclopts import App, CycloptsError
     from threadpoolctl import threadpool_limits
 
+    from femgear.cli import show_warning, wrong_arguments
     from femgear.files import storage_error
 
+    program = Path(sys.argv[0]).name
     app = App(
-        name=Path(sys.argv[0]).name,
+        name=program,
         version_flags=(),
         help_format="plaintext",
         suppress_keyboard_interrupt=False,
@@ -42,15 +45,17 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
     app.default(command)
     try:
         # two BLAS threads on these small matrices cost more than they gain
-        with threadpool_limits(1):
+        with threadpool_limits(1), warnings.catch_warnings():
+            warnings.showwarning = show_warning
             app(
                 sys.argv[1:] if arguments is None else list(arguments),
                 exit_on_error=False,
+                print_error=False,
                 result_action="return_value",
             )
         return 0
-    except CycloptsError:
-        return 2
+    except CycloptsError as error:
+        return _fail(wrong_arguments(error, program))
     except FemgearError as error:
         return _fail(error)
     except KeyboardInterrupt:

@@ -344,7 +344,7 @@ def test_names_with_control_characters_stay_on_one_line(tmp_path):
 
 def test_a_newer_format_is_refused(tmp_path):  # bad input 17
     error = refused(replaced("format = 1", "format = 2\nunheard_of = 1"), tmp_path)
-    assert error.code == "E-FORMAT" and error.value == "2" and "update femgear" in error.remedy
+    assert error.code == "E-FORMAT" and error.value == 2 and "update femgear" in error.remedy
 
 
 # --- units and values ----------------------------------------------------------------------------
@@ -468,3 +468,62 @@ def test_several_problems_come_in_one_error(tmp_path):
     for problem in error.problems:
         number = int(problem.file.rsplit(":", 1)[1])
         assert lines[number - 1].startswith(problem.key.split(".")[1])
+
+
+# --- messages that say what the file says ----------------------------------------------------------
+
+
+def test_an_angle_beyond_a_turn_is_not_taken_for_radians():
+    error = changed("housing.sensor_angle", "480 deg")
+    assert error.code == "E-RANGE" and error.remedy is None and error.limit == "-360 deg to 360 deg"
+    assert "rad would be plausible" in changed("sun.pressure_angle", "0.35 deg").remedy
+    assert "deg would be plausible" in changed("sun.pressure_angle", "20 rad").remedy
+
+
+def test_numbers_that_are_not_finite_are_shown_with_their_lines(tmp_path):
+    text = replaced("damping_ratio = 0.05", "damping_ratio = 1e999").replace(
+        "tolerance = 1e-6", "tolerance = nan"
+    )
+    error = refused(text, tmp_path)
+    lines = text.splitlines()
+    first, second = (
+        1 + next(i for i, t in enumerate(lines) if t.startswith(k)) for k in ("damping", "tolerance")
+    )
+    assert error.code == "E-FINITE" and error.value == math.inf
+    assert error.file.endswith(f":{first}") and f"dynamics.tolerance (line {second})" in str(error)
+
+
+def test_integers_are_shown_as_numbers(tmp_path):
+    assert "found:   4\n" in str(changed("sun.teeth", 4))
+    assert "found:   99\n" in str(refused(replaced("format = 1", "format = 99"), tmp_path))
+
+
+def test_empty_orders_and_entries_that_are_no_tables(tmp_path):
+    error = refused(replaced("orders = [105, 111]", "orders = []"), tmp_path)
+    assert error.code == "E-RANGE" and "0 entries are too few" in str(error) and "Tuple" not in str(error)
+    error = refused(TEXT.split("[[housing.published]]")[0] + "published = [3]\n", tmp_path)
+    assert "[[housing.published]]" in error.remedy
+
+
+@pytest.mark.parametrize("torque", ["1e-300 N m", "-9e-7 N m"])
+def test_a_torque_of_next_to_nothing(torque):
+    assert changed("operation.torque", torque).code == "E-RANGE"
+
+
+def test_the_joining_depth_has_a_least_value():
+    assert changed("static.depth", "1e-9 mm").limit == "0.001 mm to 100 mm"
+
+
+def test_published_lines_need_their_speed_and_harmonic(tmp_path):
+    error = refused(replaced('speeds = ["250 rpm", "3100 rpm"]', 'speeds = ["250 rpm"]'), tmp_path)
+    assert [p.key for p in error.problems] == [f"housing.published[{i}].speed" for i in (1, 2)]
+    assert {p.code for p in error.problems} == {"E-PUBLISHED"} and error.problems[0].value == "3100 rpm"
+    error = refused(replaced("harmonic = 6", "harmonic = 19"), tmp_path)
+    assert error.key == "housing.published[2].harmonic" and "1 to 18" in error.limit
+
+
+def test_published_lines_that_a_change_leaves_behind_are_dropped_and_said():
+    case = with_value(read_case(CASE), "operation.speeds", ["250 rpm"])
+    assert [entry.harmonic for entry in case.housing.published] == [1]
+    assert any("2 of 3 entries housing.published" in notice for notice in case.notices)
+    assert parse_case(to_toml(case)) == case

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -155,6 +156,22 @@ def test_gears_that_cannot_be_are_refused_with_numbers(check, number, text, code
     assert out == "" and "Traceback" not in err
 
 
+def test_refusals_name_what_the_file_gives_and_keys_that_exist(check):
+    _, _, err = check(TEXT.replace('"51 mm"', '"50.9 mm"'))
+    assert "set.backlash" in err and "thickness allowance" not in err
+    _, _, err = check(TEXT.replace("planets = 3", "planets = 4"))
+    assert "set.planets" in err and "found:   4\n" in err
+    angles = 'planet_angles = ["0 deg", "121 deg", "240 deg"]\nplanets = 3'
+    _, _, err = check(TEXT.replace("planets = 3", angles, 1))
+    assert "found:   '0, 121, 240 deg'" in err
+    # a shift that was left out is not what the user should change
+    for distance, code in (("53 mm", "E-POINTED"), ("56 mm", "E-SHIFT")):
+        text = TEXT.replace("profile_shift = 0.52681\n", "").replace('"51 mm"', f'"{distance}"')
+        _, _, err = check(text.replace("profile_shift = 0.0         # positive", "# positive"))
+        assert code in err and ": set.centre_distance: " in err and f"found:   '{distance}'" in err
+        assert "closes the set" in err and "not in mm" not in err
+
+
 def test_not_coaxial(check):  # bad input 46: 27 + 2 x 40 is not 108, and no shift makes up for it
     text = TEXT.replace('centre_distance = "51 mm"', "").replace("0.52681", "0.0")
     status, _, err = check(text)
@@ -202,7 +219,15 @@ def test_the_installed_program(tmp_path):
 )
 def test_wrong_arguments(arguments, capsys):
     assert cli.main(arguments) == 2
-    assert capsys.readouterr().err != ""
+    err = capsys.readouterr().err
+    assert "[E-ARGUMENTS]" in err and "--help" in err
+
+
+def test_an_argument_that_is_missing_is_named(capsys):
+    cli.main(["run", "x.toml"])
+    assert "--output is required" in capsys.readouterr().err
+    cli.main(["run", "x.toml", "-o"])
+    assert "-o requires an argument" in capsys.readouterr().err
 
 
 def test_no_arguments_and_version(capsys):
@@ -285,6 +310,65 @@ def test_a_bad_case_makes_no_folder(tmp_path, capsys, pipeline):
     path.write_text(edited(("set.planets", 5)))
     assert cli.main(["run", str(path), "-o", str(tmp_path / "out")]) == 2
     assert "E-NEIGHBOURS" in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+def test_force_keeps_the_old_results_until_the_new_ones_are_there(tmp_path, capsys, pipeline):
+    out = tmp_path / "out"
+    assert cli.main(["run", str(CASE), "-o", str(out), "--only", "static"]) == 0
+    for function, code in ((_diverge, 3), (_interrupt, 130), (_fill, 4)):
+        pipeline(function)
+        assert cli.main(["run", str(CASE), "-o", str(out), "--force"]) == code
+        assert open_results(out).stages == ("static",) and len(list(out.iterdir())) == 3
+    pipeline(fake_run)
+    assert cli.main(["run", str(CASE), "-o", str(out), "--force"]) == 0
+    assert len(open_results(out).stages) == 4
+    assert f"results: {out}\n" in capsys.readouterr().out
+
+
+def test_two_runs_on_one_folder(tmp_path, capsys, pipeline):
+    def second(case, out, **options):
+        assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out"), "--force"]) == 4
+        fake_run(case, out, **options)
+
+    pipeline(second)
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "out")]) == 0
+    assert "E-LOCKED" in capsys.readouterr().err
+
+
+def test_an_interrupted_run_says_how_far_it_came(tmp_path, capsys, monkeypatch):
+    data = synthetic()
+
+    def compute(stage, *_):
+        if stage == "dynamics":
+            raise KeyboardInterrupt
+        dataset = getattr(data, stage)()
+        for name in dataset.coords:
+            dataset[name].attrs |= {"units": "1", "long_name": str(name)}
+        return SimpleNamespace(dataset=lambda: dataset)
+
+    monkeypatch.setattr(run_module, "_compute", compute)
+    monkeypatch.setattr(run_module, "_convergence", lambda *_: {})
+    out = tmp_path / "out"
+    assert cli.main(["run", str(CASE), "-o", str(out)]) == 130
+    assert cli.main(["report", str(out)]) == 4
+    err = capsys.readouterr().err
+    assert "the run was interrupted after: static, modes" in err
+    assert f"femgear run {out / 'case.toml'} -o {out}" in err
+    with pytest.warns(UserWarning, match="interrupted after: static, modes"):
+        results = open_results(out)
+    assert results.static.sizes["planet"] == 3 and results.case.title == "Planetary set 27/40/108"
+
+
+def test_ctrl_c_while_the_program_is_loaded(tmp_path):
+    (tmp_path / "cyclopts.py").write_text("raise KeyboardInterrupt\n")
+    done = subprocess.run(
+        [sys.executable, "-c", "import sys; from femgear.cli import main; sys.exit(main())"],
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 130 and done.stderr == "interrupted\n"
 
 
 def _diverge(*_, **__):

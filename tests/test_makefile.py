@@ -108,6 +108,26 @@ def test_targets(target, expected):
         assert done.stdout.index("setup_environment.sh") < done.stdout.index(expected)
 
 
+@pytest.mark.skipif(shutil.which("git") is None, reason="needs git")
+@pytest.mark.parametrize("checkout", [True, False])
+def test_clean_keeps_the_grids_of_the_repository(tmp_path, checkout):
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    grids = tmp_path / "meshes"
+    grids.mkdir()
+    for name in ("README.md", "tracked.msh", "generated.msh", "generated.vtu"):
+        (grids / name).write_text(name)
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("MAKE", "GIT"))}
+    environment["GIT_CEILING_DIRECTORIES"] = str(tmp_path.parent)
+    done = {"cwd": tmp_path, "env": environment, "capture_output": True, "timeout": 60, "check": True}
+    if checkout:
+        (tmp_path / ".gitignore").write_text("meshes/*.msh\nmeshes/*.vtu\n")
+        subprocess.run(["git", "init", "-q"], **done)
+        subprocess.run(["git", "add", "-f", "meshes/README.md", "meshes/tracked.msh"], **done)
+    subprocess.run(["make", "clean"], **done)
+    kept = {path.name for path in grids.iterdir()}
+    assert kept == ({"README.md", "tracked.msh"} if checkout else {"README.md"})
+
+
 def test_ci_runs_the_tests_and_stops_at_the_first_failure():
     lines = (ROOT / ".ci" / "run").read_text().splitlines()
     assert "set -euo pipefail" in lines

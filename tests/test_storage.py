@@ -3,6 +3,8 @@
 import errno
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -16,10 +18,13 @@ from femgear.storage import (
     MANIFEST,
     Manifest,
     finish,
+    folder_lock,
     open_results,
     prepare_output,
     read_dataset,
     read_manifest,
+    record,
+    run_folder,
     verify,
     write_dataset,
     write_manifest,
@@ -104,7 +109,7 @@ def test_a_full_or_failing_disk_leaves_the_old_file(tmp_path, monkeypatch, code)
 def test_too_little_space_is_seen_before_writing(tmp_path, monkeypatch):
     usage = files.shutil.disk_usage(tmp_path)
     monkeypatch.setattr(files.shutil, "disk_usage", lambda path: usage._replace(free=1000))
-    with pytest.raises(StorageError, match="left on the disk") as info:
+    with pytest.raises(StorageError, match="1 MB are kept in reserve") as info:
         write_text("x", tmp_path / "a.txt")
     assert info.value.code == "E-DISK-FULL" and not list(tmp_path.iterdir())
 
@@ -285,31 +290,157 @@ def test_other_peoples_files_are_never_touched(tmp_path):
     folder.mkdir()
     (folder / "chapter.txt").write_text("years of work")
     for force in (False, True):
-        with pytest.raises(StorageError) as info:
-            prepare_output(folder, force=force)
+        with pytest.raises(StorageError) as info, run_folder(folder, force=force):
+            pass
         assert info.value.code == "E-OUTPUT" and info.value.exit_code == 4
     assert [path.name for path in folder.iterdir()] == ["chapter.txt"]
     with pytest.raises(StorageError, match="not a folder"):
         prepare_output(folder / "chapter.txt")
 
 
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def write_case(folder, text="new"):
+    """Results that are a case file only."""
+    write_text(text, folder / "case.toml")
+    return finish(folder, ["case.toml"], timings={}, convergence={})
+
+
 def test_complete_results_are_replaced_only_when_asked_and_added_files_stay(tmp_path):
     folder = tmp_path / "out"
     finished(folder)
     (folder / "notes.txt").write_text("mine")
-    with pytest.raises(StorageError, match="holds results") as info:
-        prepare_output(folder)
-    assert "--force" in info.value.remedy
+    with pytest.raises(StorageError, match="holds results") as info, run_folder(folder):
+        pass
+    assert "--force" in info.value.remedy and open_results(folder).stages == ("static",)
+    with run_folder(folder, force=True) as working:
+        write_case(working)
+        # until the new results are complete the old ones can be read
+        assert working != folder and open_results(folder).static.sizes["position"] == 64
+    assert names(folder) == ["case.toml", MANIFEST, "notes.txt"]
+    assert (folder / "case.toml").read_text() == "new" and verify(folder) == ()
+
+
+def test_results_that_somebody_changed_are_not_replaced(tmp_path):
+    folder = tmp_path / "out"
+    finished(folder)
     (folder / "case.toml").write_text("changed by hand")
-    prepare_output(folder, force=True)
-    assert sorted(path.name for path in folder.iterdir()) == ["case.toml", MANIFEST, "notes.txt"]
-    assert not read_manifest(folder).complete
+    with pytest.raises(StorageError, match=r"case\.toml changed") as info, run_folder(folder, force=True):
+        pass
+    assert info.value.code == "E-OUTPUT" and (folder / "case.toml").read_text() == "changed by hand"
+    (folder / "case.toml").unlink()  # what was deleted cannot be lost
+    with run_folder(folder, force=True) as working:
+        write_case(working)
+    assert names(folder) == ["case.toml", MANIFEST]
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, StorageError("x"), OSError(errno.EIO, "x")])
+def test_a_run_that_fails_leaves_the_results_it_should_replace(tmp_path, error):
+    folder = tmp_path / "out"
+    finished(folder)
+    before = read_manifest(folder)
+    with (
+        pytest.raises(error if isinstance(error, type) else type(error)),
+        run_folder(folder, force=True) as new,
+    ):
+        write_text("new", new / "case.toml")
+        record(new, ["case.toml"], timings={}, convergence={})
+        raise error
+    assert read_manifest(folder) == before and verify(folder) == ()
+    assert names(folder) == ["case.toml", MANIFEST, "static.nc"]
+
+
+def test_results_are_replaced_as_a_whole_even_if_the_process_is_killed_in_between(tmp_path, monkeypatch):
+    folder = tmp_path / "out"
+    finished(folder)
+    replace, calls = os.replace, []
+
+    def killed(source, target):
+        if Path(target) == folder / "b.txt":
+            calls.append(source)
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    with pytest.raises(KeyboardInterrupt), run_folder(folder, force=True) as working:
+        for name in ("case.toml", "b.txt"):
+            write_text("new", working / name)
+        finish(working, ["case.toml", "b.txt"], timings={}, convergence={})
+        monkeypatch.setattr(os, "replace", killed)
+    assert calls and not (folder / "b.txt").exists()
+    monkeypatch.undo()
+    with pytest.raises(StorageError, match="holds results"), run_folder(folder):
+        pass
+    assert names(folder) == ["b.txt", "case.toml", MANIFEST] and verify(folder) == ()
+
+
+def test_what_a_killed_run_left_is_cleared_by_the_next(tmp_path):
+    folder = tmp_path / "out"
+    finished(folder)
+    (folder / ".running").mkdir()
+    (folder / ".running" / "static.nc").write_bytes(b"half")
+    with run_folder(folder, force=True) as working:
+        assert names(working) == [MANIFEST]
+        write_case(working)
+    assert names(folder) == ["case.toml", MANIFEST]
 
 
 def test_an_interrupted_run_may_be_repeated(tmp_path):
+    with pytest.raises(KeyboardInterrupt), run_folder(tmp_path / "out") as folder:
+        (folder / "static.nc").write_bytes(b"half")
+        raise KeyboardInterrupt
+    with run_folder(tmp_path / "out") as again:
+        assert again == folder
+
+
+def test_an_interrupted_run_can_be_read_as_far_as_it_came(tmp_path):
     folder = prepare_output(tmp_path / "out")
-    (folder / "static.nc").write_bytes(b"half")
-    assert prepare_output(folder) == folder
+    write_dataset(dataset(), folder / "static.nc")
+    record(folder, ["static.nc"], timings={"static": 1.0}, convergence={})
+    with pytest.warns(UserWarning, match="interrupted after: static"):
+        results = open_results(folder)
+    assert results.static.sizes["mesh"] == 6
+    with pytest.raises(StorageError, match="interrupted after: static") as info:
+        _ = results.modes
+    assert info.value.code == "E-RESULTS-INCOMPLETE" and f"-o {folder}" in info.value.remedy
+    with pytest.raises(StorageError, match="interrupted after: static"):
+        open_results(folder, partial=False)
+    (folder / "static.nc").write_bytes(b"mine")
+    with pytest.raises(StorageError, match=r"static\.nc changed"):
+        prepare_output(folder)
+
+
+def test_two_runs_cannot_write_into_one_folder(tmp_path):
+    folder = tmp_path / "out"
+    with run_folder(folder) as working:
+        with pytest.raises(StorageError) as info, run_folder(folder, force=True):
+            pass
+        assert info.value.code == "E-LOCKED" and info.value.exit_code == 4 and "wait" in info.value.remedy
+        write_case(working)
+        assert open_results(folder).manifest.complete
+    assert names(folder) == ["case.toml", MANIFEST]
+    with folder_lock(folder), pytest.raises(StorageError, match="another run"), folder_lock(folder):
+        pass
+
+
+def test_the_lock_of_a_killed_process_is_free(tmp_path):
+    code = (
+        "import os, sys\nfrom femgear.files import exclusive_lock\n"
+        "with exclusive_lock(sys.argv[1]):\n    print('held', flush=True)\n    sys.stdin.read()\n"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path / ".lock")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout.readline() == b"held\n"
+        with pytest.raises(StorageError) as info, folder_lock(tmp_path):
+            pass
+        assert info.value.code == "E-LOCKED"
+        process.kill()
+        process.wait()
+    assert names(tmp_path) == [".lock"]
+    with folder_lock(tmp_path):
+        pass
+    assert names(tmp_path) == []
 
 
 @pytest.mark.parametrize("name", ["a:b", "NUL", "con.txt", "x" * 101, "dot.", "new\nline", "..."])

@@ -107,6 +107,22 @@ def test_exit_code_and_page_of_the_command(tmp_path, monkeypatch, capsys, row, c
     assert "1 rows" in out
 
 
+def test_one_theme_prints_its_rows_and_writes_no_page(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    themes = tuple(
+        Theme(name, name, "", (lambda row=row: (row,),)) for name, row in (("a", GOOD), ("b", BAD))
+    )
+    monkeypatch.setattr(registry, "THEMES", themes)
+    assert main(["validate", "--theme", "a"]) == 0
+    out = capsys.readouterr().out
+    assert f"passes {GOOD.case}: {GOOD.quantity}" in out and BAD.quantity not in out
+    assert main(["validate", "--theme", "b"]) == 3
+    assert capsys.readouterr().out.count(f"FAILS {BAD.case}: {BAD.quantity}") == 1
+    assert main(["validate", "--theme", "c"]) == 2
+    assert "allowed: a, b" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("old")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from femgear.casefile.tomlfile import shown
+from femgear.casefile.tomlfile import found, shown
 from femgear.casefile.units import ANGLE, Dimension, to_si
 from femgear.errors import CaseError
 
@@ -60,7 +60,7 @@ def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = 
             ) from None
         if not (low < number <= high if open_low else low <= number <= high):
             message = f"{dimension.name} of {dimension.show(number)} is not plausible"
-            hint = _factor_hint(number, low, high, dimension)
+            hint = _factor_hint(number, low, high, dimension, value)
             raise refuse(message, code="E-RANGE", value=value, limit=limit, remedy=hint)
         return number
 
@@ -68,11 +68,11 @@ def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = 
     return Annotated[float, BeforeValidator(convert), WithJsonSchema(schema)]
 
 
-def _factor_hint(number: float, low: float, high: float, dimension: Dimension) -> str | None:
+def _factor_hint(number: float, low: float, high: float, dimension: Dimension, text: str) -> str | None:
     """Guess of the mistaken unit where a usual factor brings the number into its window."""
     if dimension is ANGLE:
-        for factor, read in ((math.pi / 180, "deg"), (180 / math.pi, "rad")):
-            if low <= number * factor <= high:
+        for factor, read, written in ((math.pi / 180, "deg", "rad"), (180 / math.pi, "rad", "deg")):
+            if written in text and low <= number * factor <= high:
                 return f"degrees and radians seem to be mixed up: {read} would be plausible"
         return None
     for factor in (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9):
@@ -109,7 +109,7 @@ def Number(
             raise refuse(
                 f"the number is out of range{': ' + note if note else ''}",
                 code="E-RANGE",
-                value=shown(value) if isinstance(value, int) else value,
+                value=found(value) if isinstance(value, int) else value,
                 limit=limit,
             )
         return float(value)
@@ -138,12 +138,11 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Any:
             )
         number = abs(value) if signed else value
         if not low <= number <= high:
-            text = shown(value)
             why = note if number > high else ""
             raise refuse(
-                f"{text} is out of range{': ' + why if why else ''}",
+                f"{shown(value)} is out of range{': ' + why if why else ''}",
                 code="E-RANGE",
-                value=text,
+                value=found(value),
                 limit=f"{low} to {high}",
             )
         return number

@@ -89,7 +89,8 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
         )
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         message = f"a table is needed, not {described(value)}"
-        return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section [{key}]")
+        section = f"[[{key.partition('[')[0]}]]" if key.endswith("]") else f"[{key}]"
+        return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section {section}")
     if kind in ("tuple_type", "list_type"):
         return CaseError(f"a list is needed, not {described(value)}", code="E-TYPE", key=key, value=value)
     if kind in ("bool_type", "string_type"):
@@ -98,8 +99,11 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
         return CaseError(message, code="E-TYPE", key=key, value=value)
     if kind == "too_long":
         message = f"{context['actual_length']} entries are too many"
-        return CaseError(message, code="E-RANGE", key=key, limit=f"{context['max_length']} entries")
-    return CaseError(item["msg"], key=key, value=value)
+        return CaseError(message, code="E-RANGE", key=key, limit=f"at most {context['max_length']}")
+    if kind == "too_short":
+        message = f"{context['actual_length']} entries are too few"
+        return CaseError(message, code="E-RANGE", key=key, limit=f"{context['min_length']} or more")
+    return CaseError(f"not what is needed here: {item['msg'].lower()}", key=key, value=value)
 
 
 def _unknown_key(location: tuple, key: str, model: type[BaseModel]) -> CaseError:

@@ -18,6 +18,7 @@ from femgear.casefile.deviations import (
     check_deviation_sections,
 )
 from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.casefile.published import check_published
 from femgear.casefile.tomlfile import line_of
 from femgear.casefile.units import (
     ANGLE,
@@ -36,6 +37,7 @@ from femgear.errors import CaseError
 
 FORMAT = 1
 RPM = SPEED.scale
+LEAST_TORQUE = 1e-6
 _MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
 
 Member = Literal["sun", "ring", "carrier"]
@@ -195,7 +197,7 @@ class StaticSection(_Section):
     members: Literal["fixed", "elastic"] = "fixed"
     back_flanks: StrictBool = False
     longest_record: Count(1, 4096) = 256
-    depth: Quantity(LENGTH, 0.0, 0.1, open_low=True) | None = None
+    depth: Quantity(LENGTH, 1e-6, 0.1) | None = None
 
 
 class DynamicsSection(_Section):
@@ -286,7 +288,8 @@ class Case(_Section):
 
 def cross_check(case: Case) -> list[CaseError]:
     """What no entry shows alone."""
-    return [problem for check in _CHECKS for problem in check(case)]
+    problems = [problem for check in _CHECKS for problem in check(case)]
+    return problems or list(check_published(case))
 
 
 def _check_operation(case: Case):
@@ -301,6 +304,14 @@ def _check_operation(case: Case):
         )
     if len(set(operation.speeds)) < len(operation.speeds):
         yield CaseError("a speed is given twice", code="E-DUPLICATE", key="operation.speeds")
+    if 0.0 < abs(operation.torque) < LEAST_TORQUE:
+        yield CaseError(
+            "the torque is too small to be told from none",
+            code="E-RANGE",
+            key="operation.torque",
+            value=f"{operation.torque:g} N m",
+            limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
+        )
     if operation.fixed == "ring" and ring.foundation_tangential == 0.0:
         yield CaseError(
             "the ring is the fixed member but nothing keeps it from turning",

@@ -78,7 +78,7 @@ def parse(text: str, name: str) -> dict:
     ------
     CaseError
         ``E-TOML`` (syntax, with line and column), ``E-TOML-DUPLICATE`` (with both lines), ``E-TOML-DEPTH``,
-        ``E-FINITE`` (with the keys).
+        ``E-FINITE`` (with keys and lines).
     """
     if _LONG_KEY.search(text):
         raise _too_deep(name)
@@ -98,11 +98,15 @@ def parse(text: str, name: str) -> dict:
         raise _too_deep(name) from None
     infinite = _check_tree(data, name)
     if infinite:
+        (key, value), *others = infinite.items()
+        line = line_of(text, key)
+        also = "".join(f", nor is {other} (line {line_of(text, other)})" for other, _ in others)
         raise CaseError(
-            f"not a finite number: {', '.join(infinite)}",
+            f"not a finite number{also}",
             code="E-FINITE",
-            key=infinite[0],
-            file=name,
+            key=key,
+            value=value,
+            file=f"{name}:{line}" if name and line else name,
             limit="finite numbers (no nan, no inf, nothing beyond 1.8e308)",
         )
     return data
@@ -190,9 +194,9 @@ def line_of(text: str, key: str) -> int | None:
     return next((lines[name] for name in wanted if name in lines), None)
 
 
-def _check_tree(data: dict, name: str) -> list[str]:
-    """Keys of the numbers that are not finite; refuses what is too deep (without recursion)."""
-    infinite, pending = [], [("", data, 1)]
+def _check_tree(data: dict, name: str) -> dict[str, float]:
+    """Keys and values of the numbers that are not finite; refuses what is too deep (without recursion)."""
+    infinite, pending = {}, [("", data, 1)]
     while pending:
         key, value, depth = pending.pop()
         if depth > MAX_DEPTH:
@@ -203,7 +207,7 @@ def _check_tree(data: dict, name: str) -> list[str]:
         elif isinstance(value, list):
             pending += [(f"{key}[{i}]", v, depth + 1) for i, v in reversed(list(enumerate(value)))]
         elif isinstance(value, float) and not math.isfinite(value):
-            infinite.append(key)
+            infinite[key] = value
     return infinite
 
 
@@ -266,6 +270,11 @@ def shown(number: int) -> str:
     if abs(number) < 10**15:
         return str(number)
     return f"{'-' if number < 0 else ''}about 2^{abs(number).bit_length()}"
+
+
+def found(number: int) -> int | str:
+    """An integer as messages show it: itself, or the size of one of thousands of digits."""
+    return number if abs(number) < 10**15 else shown(number)
 
 
 def printable(text: str) -> str:

@@ -326,21 +326,25 @@ def _check_residual(matrix, solution, rhs):
 
 def cyclic_harmonics(schur, harmonics):
     """Compliance ``H_n`` of each cyclic harmonic, shape (len(harmonics), n_observations, n_loads)."""
-    n = np.asarray(harmonics)
-    phase = np.exp(2j * np.pi * n / schur.count)[:, None, None]
     Q, S = schur.rotation, schur.S
-    RL = S[0, 1] @ Q
-    A = S[0, 0] + Q.T @ S[1, 1] @ Q + phase * RL + np.conj(phase) * RL.T
-    _check_held(A)
-    P_f = schur.load_cut[0] + np.conj(phase) * (Q.T @ schur.load_cut[1])
-    P_d = schur.observation_cut[0] + np.conj(phase) * (Q.T @ schur.observation_cut[1])
-    return schur.C + np.conj(P_d.transpose(0, 2, 1)) @ np.linalg.solve(A, P_f)
+    RL, own = S[0, 1] @ Q, S[0, 0] + Q.T @ S[1, 1] @ Q
+    tied_load, tied_observation = (Q.T @ part[1] for part in (schur.load_cut, schur.observation_cut))
+    result = np.empty((len(harmonics), *schur.C.shape), complex)
+    for row, n in enumerate(harmonics):  # one at a time: all the matrices of a deep body would take gigabytes
+        phase = np.exp(2j * np.pi * n / schur.count)
+        A = own + phase * RL + np.conj(phase) * RL.T
+        if n % schur.count in (0, 1, schur.count - 1):  # rotation is the harmonic 0, translation the first
+            _check_held(A)
+        P_f = schur.load_cut[0] + np.conj(phase) * tied_load
+        P_d = schur.observation_cut[0] + np.conj(phase) * tied_observation
+        result[row] = schur.C + P_d.conj().T @ np.linalg.solve(A, P_f)
+    return result
 
 
 def _check_held(tied):
     """Refuse a body that can move as a whole: a tied sector without stiffness in some direction."""
     values = np.linalg.eigvalsh(tied)
-    if (values[:, 0] < 1e-13 * values[:, -1]).any():
+    if values[0] < 1e-13 * values[-1]:
         raise GridError(
             "the body can move without straining: nothing holds it",
             code="E-GRID-FREE",

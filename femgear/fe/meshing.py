@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from importlib import metadata
 from pathlib import Path
@@ -23,10 +24,9 @@ from femgear.fe.grid import (
     mirror,
     ordered_nodes,
     quality,
-    read_grid,
     rotated_copies,
-    write_grid,
 )
+from femgear.fe.grid_files import read_grid, write_grid
 from femgear.fe.outline import Outline, check_outline, estimate_elements
 
 __all__ = [
@@ -78,7 +78,8 @@ def mesh_outline(
     outline : Outline
         Or any object with ``curves`` and ``interfaces`` of the same form.
     cache : path, optional
-        Folder in which grids are kept under the hash of their content; None to keep nothing.
+        Folder in which grids are kept under the hash of their content; None to keep nothing. Where it cannot
+        be written there is a warning.
     time_limit : float
         Seconds after which the mesh generator is killed.
     max_elements : int
@@ -112,7 +113,7 @@ def mesh_outline(
 
 def _mesh_cached(plan, folder, time_limit):
     path = folder / f"{_content_hash(plan)}.msh"
-    if path.exists():
+    if os.path.exists(path):
         try:
             return _check_cached(read_grid(path), plan)
         except (StorageError, GridError):
@@ -120,10 +121,17 @@ def _mesh_cached(plan, folder, time_limit):
     grid = _mesh_plan(plan, time_limit)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(f"cannot make the folder {folder}: {error}", code="E-GRID-WRITE") from error
-    write_grid(path, grid)
+        write_grid(path, grid)
+    except (OSError, StorageError) as error:
+        _warn_uncached(folder, error)
     return grid
+
+
+def _warn_uncached(folder, error):
+    """Say that grids are not kept; the same text is shown once."""
+    cause = error if isinstance(error, OSError) else error.__cause__
+    reason = "no folder" if folder.exists() and not folder.is_dir() else getattr(cause, "strerror", error)
+    warnings.warn(f"grids are made but not kept: cannot write into {folder} ({reason})", stacklevel=2)
 
 
 def _check_cached(grid, plan):

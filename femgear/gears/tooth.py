@@ -16,6 +16,10 @@ FILLET_SIZE = 0.05
 FINEST_SIZE = 0.02
 INNER_SIZE = 0.1
 LARGEST_SIZE = 0.5
+RIM_SHARE = 0.35  # of the width of the half sector
+NEAR = 12.0  # modules from the root circle; elements beyond grow with the distance
+FAR_SHARE = 1.0  # of the same width, far from the teeth
+MOST_CUT_NODES = 400  # the dense matrices of a sector have twice as many rows
 SHORTEST_ROOT = 0.025
 GROWTH = 0.11  # increase of the spacing per unit length along a curve
 
@@ -70,7 +74,8 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     Raises
     ------
     GeometryError
-        Less than 2 flank elements or a factor that is not positive (E-SIZE).
+        Less than 2 flank elements or a factor that is not positive (E-SIZE), a body so deep that more than
+        400 nodes, times `refine`, would lie on a cut (E-GRID-COST).
     """
     _check_sizes(flank_elements, refine)
     count = max(2, round(flank_elements * refine))
@@ -102,12 +107,15 @@ class _Sizes:
     unit: float
     growth: float
 
-    def spacing(self, length: float, start: float, end: float, *, largest: float) -> np.ndarray:
+    def spacing(self, length: float, start: float, end: float, *, largest) -> np.ndarray:
         """Positions (2 k + 1,) in 0 .. 1 of vertices and mid points; edges grow from both ends (sizes in m).
 
-        The number of edges is the integral of 1/size; the vertices divide that integral equally.
+        `largest` is a size or a function that gives it at distances from the start. The number of edges is
+        the integral of 1/size; the vertices divide that integral equally.
         """
         s = np.linspace(0.0, length, 2001)
+        if callable(largest):
+            largest = largest(s)
         grown = np.minimum(start + self.growth * s, end + self.growth * (length - s))
         density = 1.0 / np.minimum(grown, largest)
         integral = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
@@ -225,19 +233,54 @@ def _tooth_base(end: np.ndarray, sizes: _Sizes) -> np.ndarray:
     return points
 
 
+def _far_size(gear: Gear, sizes: _Sizes, distance) -> np.ndarray:
+    """Largest element size [m] at distances [m] from the root circle towards the rim.
+
+    Strains that differ from tooth to tooth die out within a pitch, so that far away elements may grow, up to
+    a share of the width of the half sector: their number then grows with the logarithm of the radius only.
+    """
+    beyond = np.maximum(np.asarray(distance) / gear.module - NEAR, 0.0)
+    share = np.minimum(RIM_SHARE * (1.0 + GROWTH * beyond), FAR_SHARE)
+    radius = gear.root_radius + np.asarray(distance) * math.copysign(1.0, gear.rim_radius - gear.root_radius)
+    width = share * math.pi / gear.teeth * radius / gear.module
+    return np.minimum(LARGEST_SIZE + GROWTH * beyond, width) * sizes.unit
+
+
 def _rim_size(gear: Gear, sizes: _Sizes) -> float:
-    """Element size at the rim [m]: a third of the half sector at most."""
-    return min(LARGEST_SIZE, 0.35 * math.pi / gear.teeth * gear.rim_radius / gear.module) * sizes.unit
+    """Element size at the rim [m]."""
+    return float(_far_size(gear, sizes, abs(gear.rim_radius - gear.root_radius)))
 
 
 def _cut(gear: Gear, sizes: _Sizes, *, start: float) -> np.ndarray:
     """Radial line at pi/z from the root circle to the rim."""
     length, size = abs(gear.root_radius - gear.rim_radius), _rim_size(gear, sizes)
-    fractions = sizes.spacing(length, min(start, size), size, largest=LARGEST_SIZE * sizes.unit)
+
+    def largest(s):
+        return np.maximum(_far_size(gear, sizes, s), LARGEST_SIZE * sizes.unit)
+
+    fractions = sizes.spacing(length, min(start, size), size, largest=largest)
+    _check_cost(gear, len(fractions), sizes)
     radius = gear.root_radius + (gear.rim_radius - gear.root_radius) * fractions
     radius[-1] = gear.rim_radius
     angle = math.pi / gear.teeth
     return np.column_stack([radius * math.cos(angle), radius * math.sin(angle)])
+
+
+def _check_cost(gear: Gear, cut_nodes: int, sizes: _Sizes) -> None:
+    """Refuse a body so deep that its sector could not be condensed in reasonable time and memory."""
+    limit = round(MOST_CUT_NODES * max(1.0, gear.module / sizes.unit))
+    if cut_nodes <= limit:
+        return
+    word, size = ("outer", "smaller") if gear.internal else ("bore", "larger")
+    raise GeometryError(
+        f"the body of the {gear.name} reaches from {1e3 * gear.root_radius:.6g} mm to "
+        f"{1e3 * gear.rim_radius:.6g} mm: its sector would have {cut_nodes} nodes on each cut",
+        code="E-GRID-COST",
+        key=f"{gear.name}.{word}_radius",
+        value=f"{1e3 * gear.rim_radius:.6g} mm",
+        limit=f"at most {limit} nodes",
+        remedy=f"give a {size} {word} radius: material this far from the teeth hardly moves",
+    )
 
 
 def _rim(gear: Gear, sizes: _Sizes) -> np.ndarray:
@@ -252,7 +295,11 @@ def _rim(gear: Gear, sizes: _Sizes) -> np.ndarray:
 def _symmetry(gear: Gear, base_radius: float, sizes: _Sizes, *, tip: float, base: float) -> np.ndarray:
     """Line on the x axis from the rim to the tip with a vertex where the tooth base begins."""
     rim, top = gear.rim_radius, gear.tip_radius
-    largest = LARGEST_SIZE * sizes.unit
+    depth = abs(gear.root_radius - rim)
+
+    def largest(s):
+        return np.maximum(_far_size(gear, sizes, np.maximum(depth - s, 0.0)), LARGEST_SIZE * sizes.unit)
+
     inner = sizes.spacing(abs(base_radius - rim), _rim_size(gear, sizes), base, largest=largest)
     outer = sizes.spacing(abs(top - base_radius), base, tip, largest=INNER_SIZE * sizes.unit)
     x = np.concatenate([rim + (base_radius - rim) * inner, (base_radius + (top - base_radius) * outer)[1:]])

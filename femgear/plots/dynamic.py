@@ -10,6 +10,7 @@ from femgear.plots.style import (
     BLACK,
     BLUE,
     COLOURS,
+    GREY,
     SIZE,
     SKY,
     VERMILION,
@@ -132,29 +133,37 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     -------
     Figure
     """
-    figure, (top, bottom) = new_figure(rows=2, height=6.4, sharex=True)
+    figure, (top, bottom) = new_figure(rows=2, height=7.0, sharex=True)
     order = np.argsort(dynamics["speed"].values)
     speed = dynamics["speed"].values[order]
     h = dynamics["harmonic"].values
     rms = np.sqrt(0.5 * (np.abs(harmonics_of(dynamics, "dte")[order][:, :, h > 0]) ** 2).sum(axis=2)) * 1e6
     marker = {"marker": "o", "markersize": 4} if len(speed) < 40 else {}
-    for i, (text, row) in enumerate(distinct_lines(dynamics["mesh"].values, rms.T)):
+    lines = distinct_lines(dynamics["mesh"].values, rms.T)
+    for i, (text, row) in enumerate(lines):
         top.plot(speed, rms[:, row], label=text, **marker, **line_style(i))
     failed = ~dynamics["converged"].values[order].astype(bool)
     if failed.any():
         top.plot(
             speed[failed], rms[failed].max(axis=1), "x", color=BLACK, markersize=8, label="not converged"
         )
-    label(top, y="RMS of the transmission error [µm]")
+    top.set_ylim(bottom=0)
+    label(top, y="RMS [µm]", title="fluctuation of the transmission error")
     for name, text, colour, dash in (
-        ("spectral_radius", "spectral radius of the fixed point (contracts below 1)", BLUE, "-"),
-        ("floquet_multiplier", "largest Floquet multiplier (stable below 1)", VERMILION, "--"),
+        ("spectral_radius", "spectral radius of the fixed point", BLACK, "-"),
+        ("floquet_multiplier", "largest Floquet multiplier", GREY, "--"),
     ):
         bottom.plot(speed, dynamics[name].values[order], dash, color=colour, label=text, **marker)
-    bottom.axhline(1.0, color=BLACK, linewidth=0.8, linestyle=":")
+    bottom.axhline(1.0, color=BLACK, linewidth=0.8, linestyle=":", label="limit")
     bottom.set_ylim(bottom=0)
-    label(bottom, "input speed [rpm]", "magnitude [1]")
-    legend_below(figure, columns=2)
+    label(
+        bottom,
+        "input speed [rpm]",
+        "magnitude [1]",
+        "the iteration contracts and the motion is stable below 1",
+    )
+    for ax, place in ((top, "outside upper center"), (bottom, "outside lower center")):
+        figure.legend(*ax.get_legend_handles_labels(), loc=place, ncols=3, fontsize=SIZE - 1, frameon=False)
     return figure
 
 

@@ -1,5 +1,6 @@
 """Meshing outlines: exact boundaries, cache, processes, and every outline that must be refused."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import GridError
-from femgear.fe import meshing
+from femgear.fe import grid_files, meshing
 from femgear.fe.meshing import Outline, check_outline, estimate_elements, mesh_outline, mesh_outlines, quality
 
 
@@ -76,9 +77,44 @@ def test_cache_is_used_and_damaged_files_are_made_again(tmp_path, monkeypatch):
     place = whole.index(np.float64(0.25).tobytes())
     file.write_bytes(whole[:place] + np.float64(0.26).tobytes() + whole[place + 8 :])
     assert np.array_equal(mesh_outline(outline, cache=tmp_path / "meshes").points, first.points)
+    # a node inside that was moved by little: no check of the geometry can tell
+    inside = next(p for p in first.points if 0 < p.min() and p.max() < 1 and p[0] not in (0.25, 0.5, 0.75))
+    place = whole.index(inside[0].tobytes())
+    file.write_bytes(whole[:place] + np.float64(inside[0] + 1e-3).tobytes() + whole[place + 8 :])
+    assert np.array_equal(mesh_outline(outline, cache=tmp_path / "meshes").points, first.points)
+    assert file.read_bytes() == whole
+    # a file without checksum
+    file.write_bytes(whole[: whole.rindex(b"$Comments")])
+    mesh_outline(outline, cache=tmp_path / "meshes")
+    assert file.read_bytes() == whole
     monkeypatch.setattr(meshing, "_run_gmsh", None)
     third = mesh_outline(outline, cache=tmp_path / "meshes")
     assert np.array_equal(first.points, third.points) and np.array_equal(first.triangles, third.triangles)
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
+    outline = polygon(SQUARE, divide=4)
+    (tmp_path / "file").write_text("")
+    for cache in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.warns(UserWarning, match="not kept") as warned:
+            assert mesh_outline(outline, cache=cache).n_nodes > 8
+        assert str(cache) in str(warned[0].message)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(grid_files.os, "replace", full)
+    with pytest.warns(UserWarning, match="No space left"):
+        mesh_outline(outline, cache=tmp_path / "meshes")
+    assert list((tmp_path / "meshes").iterdir()) == []
+
+
+def test_the_sealed_file_is_read_by_others(tmp_path):
+    import meshio
+
+    grid = mesh_outline(polygon(SQUARE, divide=4), cache=tmp_path)
+    (file,) = tmp_path.iterdir()
+    assert len(meshio.read(file).get_cells_type("triangle6")) == len(grid.triangles)
 
 
 def fake_gmsh(folder, monkeypatch, text):

@@ -170,6 +170,36 @@ def test_arrays_are_read_only():
         sector.flank_roll[0] = 1.0
 
 
+def ring(outer_radius):
+    return Gear(108, 1.5e-3, ALPHA, 0.0, 25e-3, outer_radius, internal=True, name="ring")
+
+
+def test_cut_of_a_thick_ring_grows_with_the_logarithm_of_its_radius():
+    count = [len(half_sector(ring(r)).curve("cut")) for r in (0.25, 0.5, 1.0, 2.0)]
+    # edges of half the sector's width: ln 2 / (pi / 108) of them, each with its mid point
+    assert np.diff(count) == pytest.approx(2 * math.log(2) / (math.pi / 108), abs=4)
+
+
+def test_edges_grow_only_far_from_the_teeth():
+    thin, thick = (half_sector(ring(r)).curve("cut")[::-1] for r in (0.1, 0.3))
+    one, two = (np.linalg.norm(np.diff(points[::2], axis=0), axis=1) / 1.5e-3 for points in (thin, thick))
+    near = np.hypot(*thick[2::2].T) < 82.875e-3 + 11 * 1.5e-3
+    assert two[near].max() < 0.505
+    assert abs(len(one) - near.sum()) <= 4
+    assert two[~near].max() == pytest.approx(math.pi / 108 * 200, rel=0.05)
+
+
+def test_a_body_too_deep_for_its_sector_is_refused():
+    with pytest.raises(GeometryError) as caught:
+        half_sector(ring(10.0))
+    error = caught.value
+    assert (error.code, error.key, error.exit_code) == ("E-GRID-COST", "ring.outer_radius", 2)
+    assert "smaller outer radius" in error.remedy and "400 nodes" in error.limit
+    with pytest.raises(GeometryError) as caught:
+        half_sector(Gear(400, 1.5e-3, ALPHA, 0.0, 25e-3, 5e-3, name="sun"))
+    assert (caught.value.code, caught.value.key) == ("E-GRID-COST", "sun.bore_radius")
+
+
 @pytest.mark.parametrize("sizes", [(1, 1.0), (24, 0.0), (24, math.nan)])
 def test_unusable_sizes_are_refused(sizes):
     with pytest.raises(GeometryError) as caught:

@@ -1,0 +1,74 @@
+"""Refusals of the gears, in terms of what the case file gives."""
+
+from __future__ import annotations
+
+import math
+
+from femgear.casefile.sections import Case
+from femgear.errors import GeometryError
+
+
+def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
+    """Let a refusal name the entries that the user gave, their values, and keys that exist.
+
+    Parameters
+    ----------
+    error : GeometryError
+        Its fields are changed, ``file`` (with the line) among them.
+    case : Case
+    """
+    if error.code == "E-BACKLASH":
+        gear = (error.key or "").partition(".")[0]
+        error.remedy = (
+            f"leave {gear}.profile_shift out so that it is found, give set.backlash, or another "
+            "set.centre_distance"
+        )
+    if error.code == "E-ASSEMBLY":
+        _assembly(error, case)
+    _shift_left_out(error, case)
+    error.file = case.location(error.key or "")
+
+
+def _assembly(error: GeometryError, case: Case) -> None:
+    angles = case.set.planet_angles
+    if angles is None:
+        error.key, error.value = "set.planets", case.set.planets
+        return
+    error.value = ", ".join(f"{math.degrees(angle):.6g}" for angle in angles[:24]) + " deg"
+
+
+def _shift_left_out(error: GeometryError, case: Case) -> None:
+    """A shift that was found is no entry to change: name the one that it follows from."""
+    sections = {"sun": case.sun, "ring": case.ring}
+    gear, _, entry = (error.key or "").partition(".")
+    if gear not in sections or entry != "profile_shift" or sections[gear].profile_shift is not None:
+        return
+    if case.set.centre_distance is not None:
+        error.key, given = "set.centre_distance", f"{1e3 * case.set.centre_distance:.6g} mm"
+        remedy = "change the centre distance or the tooth numbers"
+    else:
+        other = "ring" if gear == "sun" else "sun"
+        error.key, given = f"{other}.profile_shift", sections[other].profile_shift
+        remedy = f"change the {other}'s profile shift or the tooth numbers"
+    found = f"{error.value:.5g}" if isinstance(error.value, float) else error.value
+    error.message += f" (the {gear}'s profile shift of {found} is what closes the set)"
+    if error.code == "E-SHIFT":
+        error.limit = f"such that the {gear}'s shift is {error.limit}"
+    error.value, error.remedy = given, remedy
+
+
+def notices(data: dict) -> tuple[str, ...]:
+    """Remarks on what was read in a way that deserves to be said.
+
+    Parameters
+    ----------
+    data : dict
+        Tables of a case file that was checked.
+    """
+    teeth = data["ring"]["teeth"]
+    if teeth > 0:
+        return ()
+    return (
+        f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
+        "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)",
+    )
