@@ -143,6 +143,16 @@ def test_load_sharing_under_negative_torque_keeps_the_planet_numbers(quick_case,
     assert shares[1] < 0.27 and shares[0] == pytest.approx(shares[2], rel=1e-6)
 
 
+def _largest_line(path):
+    """Largest acceleration of any order at the first speed of a case."""
+    from femgear import read_case, solve_dynamics, solve_housing, solve_modes, solve_static
+
+    case = read_case(path)
+    static = solve_static(case)
+    housing = solve_housing(case, solve_dynamics(case, static, solve_modes(case, static)))
+    return np.abs(housing.exact.acceleration[0]).max()
+
+
 def test_housing_modulation(quick_case, tmp_path):
     import pyvista as pv
 
@@ -153,9 +163,10 @@ def test_housing_modulation(quick_case, tmp_path):
     lines = table(tmp_path / "lines.csv")
     strongest = lines["carrier order"][np.argsort(-lines["exact [m/s^2]"])[:2]]
     assert set(strongest) == {105, 111}
-    # identical planets: nothing where the order is no multiple of their number
+    # identical planets: nothing beside the largest line where the order is no multiple of their number;
+    # rounding of the static forces, 1e-13 of 1750 N, is what remains
     others = lines["carrier order"] % 3 != 0
-    assert lines["exact [m/s^2]"][others].max() < 1e-8 * lines["exact [m/s^2]"].max()
+    assert lines["exact [m/s^2]"][others].max() < 1e-8 * _largest_line(quick_case)
     for name in ("order_spectrum.png", "envelope.png", "modulation.png"):
         assert is_png(tmp_path / name)
     surface = pv.read(tmp_path / "ring_deflection.vtu")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.contact.halfplane import depth_displacement
-from femgear.errors import GridError
+from femgear.errors import CaseError
 
 if TYPE_CHECKING:
     from femgear.fe.elasticity import Material
@@ -128,7 +128,7 @@ def flank_compliance(
 
     Raises
     ------
-    GridError
+    CaseError
         When the depth reaches out of the tooth or the sector can move freely.
     """
     from femgear.fe.compliance import tooth_compliance
@@ -203,7 +203,7 @@ def _check_depth(depth: float | None, stations: FlankStations) -> None:
     """Under half an element below a nodal load the finite-element field is still that of the single node."""
     spacing = float(np.linalg.norm(np.diff(stations.points, axis=0), axis=1).max())
     if depth is not None and not depth >= 0.5 * spacing:
-        raise GridError(
+        raise CaseError(
             f"a joining depth of {1e3 * depth:.4g} mm is within the elements at the flank",
             code="E-DEPTH",
             key="static.depth",
