@@ -42,6 +42,9 @@ def validate(
     StorageError
         When the file cannot be written.
     """
+    import scipy.linalg  # noqa: F401  its BLAS is limited only if it is loaded before
+    from threadpoolctl import threadpool_limits
+
     from femgear.validation.page import row_line, summary, write_page
     from femgear.validation.run import run_validation
     from femgear.validation.themes import THEMES
@@ -49,7 +52,8 @@ def validate(
     chosen = THEMES if theme is None else tuple(one for one in THEMES if one.name == theme)
     if not chosen:
         raise _unknown_theme(theme, [one.name for one in THEMES])
-    validation = run_validation(chosen, quick=quick, progress=progress)
+    with threadpool_limits(1):  # sums of several threads differ in the last digits
+        validation = run_validation(chosen, quick=quick, progress=progress)
     if output is not None:
         write_page(validation, output)
     if theme is not None:

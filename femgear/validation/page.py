@@ -12,13 +12,16 @@ from femgear.files import storage_errors, write_text
 from femgear.validation.rows import ROUNDING, Row
 from femgear.validation.run import Validation
 
+FAR_BELOW = 0.01  # of its gate: a relative error below is not shown in figures
+
 INTRODUCTION = """\
 # Validation
 
 Every number in the column *femgear* is computed by the program when this page is written; every
 number in the column *reference* comes from the source named beside it: a closed form, a standard, a
 published table or an independent method. The error is relative, in percent of the reference, or absolute
-where it carries the mark "abs."; an error below {rounding:g} is rounding and is shown so. The gate is the
+where it carries the mark "abs."; an error below {rounding:g} is rounding and is shown so, a relative one
+below a hundredth of its gate by that bound. The gate is the
 largest error that passes; references of which only printed digits are known are gated at half a unit
 of their last digit. *differs* marks a disagreement that is understood and explained in the last column;
 *information* has no gate. The names of the cases are those of `tests/validation` and of the functions behind
@@ -122,11 +125,22 @@ def _number(value: float, decimals: int | None = None) -> str:
     return f"{value:.8g}"
 
 
+def _digits(row: Row) -> int:
+    """Significant digits of a computed number: more than six only where the gate is below 1e-4."""
+    relative = row.gate if row.relative else 0.0
+    if row.gate is None or relative >= 1e-4:
+        return 6
+    return 8
+
+
 def _size(value: float) -> str:
-    """A quantity that should vanish: rounding differs between machines, so small ones by their decade."""
-    if abs(value) >= 1e-5:
+    """A quantity that should vanish: rounding differs between machines, so small ones by a bound."""
+    if abs(value) >= 1e-3:
         return f"{value:.2g}"
-    return f"< 1e{math.floor(math.log10(abs(value))) + 1}"
+    decade = math.floor(math.log10(abs(value)))
+    if abs(value) < 1e-5:
+        return f"< 1e{decade + 1}"
+    return f"< {next(step for step in (2, 5, 10) if abs(value) < step * 10.0**decade) * 10.0**decade:.0e}"
 
 
 def _decimals(row: Row) -> int | None:
@@ -152,7 +166,8 @@ def _ours(row: Row) -> str:
         return f"< {ROUNDING:g}"
     if row.reference is None:
         return _size(row.ours)
-    return _number(row.ours, _decimals(row))
+    decimals = _decimals(row)
+    return f"{row.ours:.{_digits(row)}g}" if decimals is None else _number(row.ours, decimals)
 
 
 def _error(row: Row) -> str:
@@ -166,7 +181,11 @@ def _error(row: Row) -> str:
     scale = max(1.0, abs(row.reference)) if absolute else 1.0
     if abs(row.error) < ROUNDING * scale:
         return f"< {ROUNDING:g}"
-    return f"{row.error:+.1e} abs." if absolute else f"{100 * row.error:+.2g} %"
+    if absolute:
+        return f"{row.error:+.1e} abs."
+    if row.gate and abs(row.error) < FAR_BELOW * row.gate:
+        return f"< {100 * FAR_BELOW * row.gate:.2g} %"
+    return f"{100 * row.error:+.2g} %"
 
 
 def _gate(row: Row) -> str:
