@@ -111,6 +111,8 @@ def test_check_echoes_negative_ring_teeth(check):  # bad input 32
         (("sun.tip_diameter", "45.6 mm"), "W-CLEARANCE"),  # 40
         (("set.backlash", "1 mm"), "W-TIP-THIN"),  # 35
         (("set.planets", 1), "W-PLANETS"),  # 47
+        (("set.pin_errors", [{"planet": 1, "tangential": "20 um"}]), "W-WEDGING"),  # 50
+        (("housing.points", 7), "W-POINTS"),
     ],
 )
 def test_check_warns(check, change, words):
