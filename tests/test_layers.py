@@ -14,7 +14,7 @@ LAYERS = (
     ("system", "gears", "fe", "casefile", "netcdf"),
     ("contact", "models", "solvers", "housing", "case"),
     ("storage", "datasets", "plots", "scene"),
-    ("analysis", "summary"),
+    ("analysis", "design", "summary"),
     ("report", "sweep", "validation", "pictures"),
     ("run",),
     ("cli",),

@@ -10,7 +10,14 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-SCRIPTS = ("mesh_stiffness.py", "load_sharing.py", "housing_modulation.py")
+SCRIPTS = (
+    "mesh_stiffness.py",
+    "load_sharing.py",
+    "housing_modulation.py",
+    "harris_map.py",
+    "tip_relief_design.py",
+    "pin_error_load_sharing.py",
+)
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 
 
@@ -68,6 +75,16 @@ def test_help(name, tmp_path):
         ("housing_modulation.py", ["--harmonic", "50"], 2, "1 to 18"),
         ("housing_modulation.py", ["--speed", "5 Hz"], 2, "not a unit of speed"),
         ("housing_modulation.py", ["-o", "/dev/null/x"], 4, "E-STORAGE"),
+        ("harris_map.py", ["--relief=-1 um"], 2, "not a plausible relief"),
+        ("harris_map.py", ["--torque", "0 N m"], 2, "without torque"),
+        ("harris_map.py", ["--length", "3"], 2, "0.05 to 1.3"),
+        ("tip_relief_design.py", ["--points", "1"], 2, "3 to 100"),
+        ("tip_relief_design.py", ["--largest", "2 mm"], 2, "not a plausible relief"),
+        ("tip_relief_design.py", ["--also=-50 N m"], 2, "both signs"),
+        ("pin_error_load_sharing.py", ["--samples", "0"], 2, "1 to 1000000"),
+        ("pin_error_load_sharing.py", ["--tangential=-1 um"], 2, "negative"),
+        ("pin_error_load_sharing.py", ["--position", "2"], 2, "0 to 1"),
+        ("pin_error_load_sharing.py", ["--support", "soft"], 2, "soft"),
     ],
 )
 def test_bad_input_ends_in_a_message(name, arguments, code, message, tmp_path):
@@ -177,3 +194,49 @@ def test_housing_modulation(quick_case, tmp_path):
     assert abs(twist) == pytest.approx(400 / (1e10 * 0.1**2 * 2 * np.pi * 0.1 * 0.025) * 0.1, rel=0.01)
     curve = pv.read(tmp_path / "modulation.vtp")
     assert "envelope [m/s^2]" in curve.point_data
+
+
+def test_harris_map(quick_case, tmp_path):
+    arguments = ("--relief", "0 um", "--relief", "4 um", "--length", "0.9", "--positions", "16")
+    torques = [word for value in (50, 100, 200) for word in ("--torque", f"{value} N m")]
+    done = run("harris_map.py", quick_case, *arguments, *torques, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert is_png(tmp_path / "harris_map.png")
+    data = table(tmp_path / "harris_map.csv")
+    curve = data["sun-planet STE peak to peak [m]"].reshape(2, 3)
+    # a relief for 100 N m: less there than at half and at twice the torque, and than without it
+    assert curve[1].argmin() == 1 and np.all(np.diff(curve[0]) > 0)
+    assert curve[1, 1] < 0.35 * curve[0, 1]
+
+
+def test_tip_relief_design(quick_case, tmp_path):
+    arguments = ("--points", "4", "--positions", "16", "--also", "60 N m", "--largest", "6 um")
+    done = run("tip_relief_design.py", quick_case, *arguments, "-o", tmp_path / "o", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert is_png(tmp_path / "o" / "tip_relief.png")
+    data = table(tmp_path / "o" / "tip_relief.csv")
+    assert len(data["relief [m]"]) == 2 * 4 * 4
+    pasted = tmp_path / "relieved.toml"
+    pasted.write_text(quick_case.read_text() + "\n" + (tmp_path / "o" / "relief.toml").read_text())
+    from femgear import read_case, solve_static
+
+    peaks = [np.ptp(solve_static(read_case(path)).cycle.deflection[0]) for path in (pasted, quick_case)]
+    assert peaks[0] < 0.25 * peaks[1]
+
+
+def test_pin_error_load_sharing(quick_case, tmp_path):
+    arguments = ("--samples", "400", "--tolerance", "9 um", "--seed", "5", "--support", "fixed", "floating")
+    done = run("pin_error_load_sharing.py", quick_case, *arguments, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "400 samples, seed 5; standard deviations 3 um radial" in done.stdout
+    assert is_png(tmp_path / "load_sharing_histogram.png")
+    data = table(tmp_path / "load_sharing_samples.csv")
+    assert data["tangential error of pin 2 [m]"].std() == pytest.approx(3e-6, rel=0.15)
+    fixed = np.array([data[f"share of planet {n}, fixed [1]"] for n in (1, 2, 3)])
+    np.testing.assert_allclose(fixed.sum(axis=0), 1.0, rtol=1e-7)
+    np.testing.assert_allclose(data["load sharing factor, fixed [1]"], 3 * fixed.max(axis=0), rtol=1e-8)
+    np.testing.assert_allclose(data["load sharing factor, floating [1]"], 1.0, rtol=1e-8)
+    # statics: more load on planets whose pins stand back against the torque
+    errors = np.array([data[f"tangential error of pin {n} [m]"] for n in (1, 2, 3)])
+    late = errors - errors.mean(axis=0)
+    assert np.corrcoef(late.ravel(), fixed.ravel())[0, 1] < -0.9

@@ -1,0 +1,131 @@
+#!/usr/bin/env python3
+"""Harris map: transmission error peak to peak over torque for several tip reliefs of sun and planets."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
+
+from femgear.errors import CaseError
+
+HEADER = (
+    "relief [m]",
+    "torque [N m]",
+    "sun-planet STE peak to peak [m]",
+    "planet-ring STE peak to peak [m]",
+    "sun-ring STE peak to peak [m]",
+)
+
+
+def main(
+    case: Path = REFERENCE_CASE,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/harris_map"),
+    relief: Annotated[tuple[str, ...], Parameter(negative="")] = ("0 um", "2 um", "4 um", "6 um", "8 um"),
+    length: float = 1.0,
+    torque: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    positions: int = 32,
+) -> None:
+    """Compute the transmission error over torque for each tip relief: a table, a picture and a CSV file.
+
+    Parameters
+    ----------
+    case
+        TOML case file; the reference set when left out. The reliefs add to its modifications.
+    output
+        Folder of the results.
+    relief
+        Linear tip relief of sun and planets (sun side) with its unit, such as "4 um"; may be repeated.
+    length
+        Of the reliefs, in lengths of two-pair contact: 1 starts at the ends of single-pair contact.
+    torque
+        Torque of the input with its unit; may be repeated. Default: 11 from a tenth to twice the case's.
+    positions
+        Positions over one mesh period.
+    """
+    from femgear import planetary_set, read_case
+    from femgear.casefile.units import LENGTH, TORQUE, to_si
+    from femgear.design.basis import design_basis, sun_torque
+    from femgear.design.relief import harris_map, relief_starts, with_tip_relief
+    from femgear.plots.design import harris_curves
+    from femgear.plots.style import save_figure
+    from femgear.run import grid_cache
+
+    data = read_case(case)
+    if not 4 <= positions <= 2048:
+        raise CaseError("too few or too many positions", code="E-RANGE", key="--positions", value=positions)
+    amounts = [_checked(to_si(text, LENGTH), text, data.sun.module) for text in relief]
+    gears = planetary_set(data)
+    relief_starts(gears, length=length)
+    given = [to_si(text, TORQUE) for text in torque]
+    inputs = np.array(given or data.operation.torque * np.append(0.1, np.linspace(0.2, 2.0, 10)))
+    on_sun = [sun_torque(data, gears, float(value)) for value in inputs]
+    folder = ready_folder(output)
+    with Progress() as progress:
+        progress("compliance", 0, 1)
+        basis = design_basis(data, cache=grid_cache())
+        progress("compliance", 1, 1)
+        options = {"length": length, "back": on_sun[0] < 0}
+        variants = [with_tip_relief(basis.deviations, gears, amount=a, **options) for a in amounts]
+        found = harris_map(
+            gears,
+            basis.bodies,
+            torques=on_sun,
+            deviations=variants,
+            positions=positions,
+            contact=data.static.contact,
+            supports=basis.supports,
+            progress=lambda done, total: progress("contact", done, total),
+        )
+    write_csv(folder / "harris_map.csv", HEADER, _records(amounts, inputs, found))
+    names = [f"relief {a * 1e6:g} µm" for a in amounts]
+    figure = harris_curves(inputs, found.peak_to_peak, names, design=data.operation.torque)
+    save_figure(figure, folder / "harris_map.png")
+    _print_summary(amounts, inputs, found)
+    print(f"largest residual of all contact problems: {found.residual:.1e}")
+    say_files(folder, ["harris_map.csv", "harris_map.png"])
+
+
+def _checked(amount: float, text: str, module: float) -> float:
+    if not 0 <= amount <= 0.2 * module:
+        limit = f"0 to 0.2 modules, {0.2e6 * module:.6g} um"
+        raise CaseError("not a plausible relief", code="E-RANGE", key="--relief", value=text, limit=limit)
+    return amount
+
+
+def _records(amounts, inputs, found):
+    for v, amount in enumerate(amounts):
+        for t, torque in enumerate(inputs):
+            yield (
+                float(amount),
+                float(torque),
+                *(float(x) for x in found.peak_to_peak[v, :, t]),
+                float(found.overall[v, t]),
+            )
+
+
+def _print_summary(amounts, inputs, found):
+    rows = []
+    for v, amount in enumerate(amounts):
+        curve = found.peak_to_peak[v, 0] * 1e6
+        lowest = int(curve.argmin())
+        ends = (f"{curve[0]:.3f}", f"{curve[-1]:.3f}")
+        rows.append((f"{amount * 1e6:g}", f"{inputs[lowest]:g}", f"{curve[lowest]:.3f}", *ends))
+    header = (
+        "relief [um]",
+        "least at [N m]",
+        "STE p-p there [um]",
+        f"at {inputs[0]:g} N m",
+        f"at {inputs[-1]:g} N m",
+    )
+    print_table("Transmission error of the sun-planet meshes, peak to peak", header, rows)
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(main))

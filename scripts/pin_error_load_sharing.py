@@ -1,0 +1,168 @@
+#!/usr/bin/env python3
+"""Distribution of the load sharing factor over random errors of the planet pins."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter
+from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
+
+from femgear.errors import CaseError
+
+QUANTILES = (0.5, 0.9, 0.99)
+
+
+def main(
+    case: Path = REFERENCE_CASE,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/pin_error_load_sharing"),
+    tangential: str = "3 um",
+    radial: str = "3 um",
+    tolerance: str | None = None,
+    support: Annotated[
+        tuple[Literal["fixed", "floating", "case"], ...], Parameter(negative="", consume_multiple=True)
+    ] = ("fixed", "floating", "case"),
+    samples: int = 10000,
+    seed: int = 1,
+    position: float = 0.0,
+) -> None:
+    """Draw pin errors and solve the load sharing of each sample: a table, a histogram and a CSV file.
+
+    Parameters
+    ----------
+    case
+        TOML case file; the reference set when left out. The errors add to those of the case.
+    output
+        Folder of the results.
+    tangential, radial
+        Standard deviations of the normally distributed errors of every pin, with their unit.
+    tolerance
+        Tolerance of the pins in both directions, plus or minus: three standard deviations.
+    support
+        All members fixed, the sun floating with all others fixed, or the stiffnesses of the case.
+    samples
+        Number of samples.
+    seed
+        Of the random numbers; the same seed draws the same errors.
+    position
+        In mesh periods, 0 to 1, rounded to a sixteenth.
+    """
+    from femgear import planetary_set, read_case
+    from femgear.casefile.units import LENGTH, to_si
+    from femgear.design.basis import design_basis, sun_torque
+    from femgear.design.sharing import pin_samples
+    from femgear.plots.design import sharing_histogram
+    from femgear.plots.style import save_figure
+    from femgear.run import grid_cache
+
+    data = read_case(case)
+    gears = planetary_set(data)
+    torque = sun_torque(data, gears)
+    sigma = [to_si(text, LENGTH) for text in (radial, tangential)]
+    sigma = sigma if tolerance is None else [to_si(tolerance, LENGTH) / 3] * 2
+    _check(sigma, seed, position)
+    pins = pin_samples(gears.n_planets, samples=samples, radial=sigma[0], tangential=sigma[1], seed=seed)
+    place = {"position": round(position * 16) % 16, "positions": 16, "contact": data.static.contact}
+    folder = ready_folder(output)
+    with Progress() as progress:
+        progress("compliance", 0, 1)
+        basis = design_basis(data, cache=grid_cache())
+        progress("compliance", 1, 1)
+        results = []
+        for kind in dict.fromkeys(support):
+            progress(kind, 0, 1)
+            results.append((kind, *_solve(data, basis, kind, torque, place, pins)))
+            progress(kind, 1, 1)
+    names = {"fixed": "all members fixed", "floating": "floating sun", "case": "supports of the case"}
+    _print_summary(results, names, pins, sigma, seed)
+    write_csv(folder / "load_sharing_samples.csv", _header(results, gears.n_planets), _records(results, pins))
+    factors = [sharing.factor for _, sharing, _ in results]
+    figure = sharing_histogram(factors, [names[kind] for kind, *_ in results], gears.n_planets)
+    save_figure(figure, folder / "load_sharing_histogram.png")
+    say_files(folder, ["load_sharing_samples.csv", "load_sharing_histogram.png"])
+
+
+def _check(sigma, seed: int, position: float) -> None:
+    if min(sigma) < 0:
+        raise CaseError("a standard deviation is negative", code="E-RANGE", limit="0 m or more")
+    if seed < 0:
+        raise CaseError("a seed cannot be negative", code="E-RANGE", key="--seed", value=seed)
+    if not 0 <= position <= 1:
+        raise CaseError("no such position", code="E-RANGE", key="--position", value=position, limit="0 to 1")
+
+
+def _solve(data, basis, kind, torque, place, pins):
+    """Load sharing of all samples, and the difference of some from the whole contact problem."""
+    from femgear.contact.supports import RIGID, Supports
+    from femgear.design.basis import case_supports
+    from femgear.design.samples import sharing_of_samples
+    from femgear.design.sharing import sharing_model, walked_shares
+
+    supports = {"fixed": RIGID, "floating": Supports(sun=0.0), "case": case_supports(data)}[kind]
+    options = {"sun_torque": torque, "supports": supports, "deviations": basis.deviations, **place}
+    begin = perf_counter()
+    model = sharing_model(basis.gears, basis.bodies, **options)
+    curves = perf_counter()
+    sharing = sharing_of_samples(model, pins)
+    solved = perf_counter()
+    # a few of the first, the middle and the worst
+    order = np.argsort(sharing.factor)
+    chosen = np.unique([0, len(pins) // 3, order[len(pins) // 2], order[-1]])
+    whole = walked_shares(basis.gears, basis.bodies, pins[chosen], **options)
+    difference = np.abs(whole - sharing.share[chosen]).max()
+    facts = {
+        "curves": curves - begin,
+        "samples": solved - curves,
+        "difference": difference,
+        "checked": len(chosen),
+        "coupling": model.coupling_change,
+    }
+    return sharing, facts
+
+
+def _header(results, n_planets):
+    pins = [f"{way} error of pin {n + 1} [m]" for n in range(n_planets) for way in ("radial", "tangential")]
+    factors = [f"load sharing factor, {kind} [1]" for kind, *_ in results]
+    shares = [f"share of planet {n + 1}, {kind} [1]" for kind, *_ in results for n in range(n_planets)]
+    return ("sample", *pins, *factors, *shares)
+
+
+def _records(results, pins):
+    flat = pins.reshape(len(pins), -1)
+    factors = np.column_stack([sharing.factor for _, sharing, _ in results])
+    shares = np.hstack([sharing.share for _, sharing, _ in results])
+    for i, row in enumerate(np.hstack([flat, factors, shares]).tolist()):
+        yield i + 1, *row
+
+
+def _print_summary(results, names, pins, sigma, seed):
+    rows, notes = [], []
+    for kind, sharing, facts in results:
+        factor = sharing.factor
+        numbers = [factor.mean(), *np.quantile(factor, QUANTILES), factor.max()]
+        opened = sharing.open_planets.any(axis=1).mean()
+        rows.append((names[kind], *(f"{v:.4f}" for v in numbers), f"{opened:.2%}"))
+        notes.append(
+            f"{names[kind]}: curves {facts['curves']:.2f} s, samples {facts['samples']:.2f} s, residual "
+            f"{sharing.residual:.1e}; {facts['checked']} samples by the whole contact problem differ by "
+            f"{facts['difference']:.1e} of the torque; coupling between planets changes by "
+            f"{facts['coupling']:.1e} of a planet's compliance over the loads, which is neglected"
+        )
+    header = ("supports", "mean", *(f"{q:.0%}" for q in QUANTILES), "largest", "a planet opens")
+    title = (
+        f"Load sharing factor, {len(pins)} samples, seed {seed}; standard deviations {sigma[0] * 1e6:g} um "
+        f"radial, {sigma[1] * 1e6:g} um tangential"
+    )
+    print_table(title, header, rows)
+    for note in notes:
+        print(note)
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(main))

@@ -1,0 +1,195 @@
+#!/usr/bin/env python3
+"""Tip relief of sun and planets with the least transmission error peak to peak at one torque."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter
+from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
+
+from femgear.errors import CaseError
+
+HEADER = (
+    "torque [N m]",
+    "relief [m]",
+    "length [two-pair contact]",
+    "STE peak to peak [m]",
+    "over unmodified [1]",
+)
+
+
+def main(
+    case: Path = REFERENCE_CASE,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/tip_relief_design"),
+    torque: str | None = None,
+    also: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    largest: str | None = None,
+    shape: Literal["linear", "parabolic"] = "linear",
+    points: int = 7,
+    positions: int = 32,
+) -> None:
+    """Search amount and length of the relief: contour maps, a CSV file and the tables for the case file.
+
+    Parameters
+    ----------
+    case
+        TOML case file; the reference set when left out. The relief adds to its modifications.
+    output
+        Folder of the results.
+    torque
+        Torque of the input to design for, with its unit. Default: that of the case.
+    also
+        Further torques of maps; may be repeated. Default: half and one and a half times the first.
+    largest
+        Largest amount searched. Default: twice the mean deflection of the sun-planet meshes.
+    shape
+        Of the relief.
+    points
+        Points of the grid along each parameter.
+    positions
+        Positions over one mesh period.
+    """
+    from femgear import planetary_set, read_case
+    from femgear.casefile.units import LENGTH, TORQUE, to_si
+    from femgear.design.basis import design_basis, relief_snippet, sun_torque
+    from femgear.design.relief import loads_back
+    from femgear.files import write_text
+    from femgear.plots.design import relief_contours
+    from femgear.plots.style import save_figure
+    from femgear.run import grid_cache
+
+    data = read_case(case)
+    _check_counts(points, positions)
+    design = data.operation.torque if torque is None else to_si(torque, TORQUE)
+    others = [to_si(text, TORQUE) for text in also] or [0.5 * design, 1.5 * design]
+    gears = planetary_set(data)
+    inputs = np.unique([design, *others])
+    on_sun = np.array([sun_torque(data, gears, float(value)) for value in inputs])
+    loads_back(on_sun)
+    top = None if largest is None else _checked(to_si(largest, LENGTH), largest, data.sun.module)
+    folder = ready_folder(output)
+    with Progress() as progress:
+        progress("compliance", 0, 1)
+        basis = design_basis(data, cache=grid_cache())
+        progress("compliance", 1, 1)
+        power = 2.0 if shape == "parabolic" else 1.0
+        options = {
+            "deviations": basis.deviations,
+            "power": power,
+            "positions": positions,
+            "contact": data.static.contact,
+            "supports": basis.supports,
+        }
+        target = sun_torque(data, gears, design)
+        top = 2 * _mean_deflection(basis, target, data.static.contact) if top is None else top
+        amounts = top * np.arange(1, points + 1) / points
+        grid, best, fine = _search(basis, amounts, on_sun, target, options, progress)
+    write_csv(folder / "tip_relief.csv", HEADER, _records(inputs, grid))
+    figure = relief_contours(
+        grid.amounts, grid.lengths, grid.ratio, inputs, optimum=(best.amount, best.length)
+    )
+    save_figure(figure, folder / "tip_relief.png")
+    snippet = relief_snippet(gears, amount=best.amount, length=best.length, power=power, back=target < 0)
+    write_text(snippet, folder / "relief.toml")
+    _print_summary(inputs, grid, design, best)
+    print(f"at {2 * positions} positions: {fine:.1%}")
+    print(f"for the case file (relief.toml):\n\n{snippet}")
+    say_files(folder, ["tip_relief.csv", "tip_relief.png", "relief.toml"])
+
+
+def _check_counts(points: int, positions: int) -> None:
+    for key, value, low, high in (("--points", points, 3, 100), ("--positions", positions, 4, 2048)):
+        if not low <= value <= high:
+            raise CaseError("not usable", code="E-RANGE", key=key, value=value, limit=f"{low} to {high}")
+
+
+def _checked(amount: float, text: str, module: float) -> float:
+    if not 0 < amount <= 0.2 * module:
+        limit = f"over 0 to 0.2 modules, {0.2e6 * module:.6g} um"
+        raise CaseError("not a plausible relief", code="E-RANGE", key="--largest", value=text, limit=limit)
+    return amount
+
+
+def _mean_deflection(basis, torque: float, contact: str) -> float:
+    """Mean deflection of the sun-planet meshes without relief [m]."""
+    from femgear.contact.mirrored import walk_either_flank
+
+    cycle = walk_either_flank(basis.gears, basis.bodies, sun_torque=torque, positions=8, contact=contact)
+    return float(cycle.deflection[: basis.gears.n_planets].mean())
+
+
+def _search(basis, amounts, on_sun, target, options, progress):
+    """The grid, the optimum at the target torque, and its ratio at twice the positions."""
+    from femgear.design.relief import optimise_relief, relief_grid
+
+    grid = relief_grid(
+        basis.gears,
+        basis.bodies,
+        amounts=amounts,
+        lengths=np.linspace(0.4, 1.2, len(amounts)),
+        torques=on_sun,
+        progress=lambda done, total: progress("contact", done, total),
+        **options,
+    )
+    progress("optimum", 0, 1)
+    best = optimise_relief(basis.gears, basis.bodies, grid, torque=target, **options)
+    fine = _at_more_positions(basis, best, target, options)
+    progress("optimum", 1, 1)
+    return grid, best, fine
+
+
+def _at_more_positions(basis, best, torque: float, options) -> float:
+    """Peak to peak of the optimum over that without relief, at twice the positions."""
+    from femgear.design.relief import harris_map, with_tip_relief
+
+    ideal, gears = basis.deviations, basis.gears
+    relief = {"amount": best.amount, "length": best.length, "power": options["power"], "back": torque < 0}
+    found = harris_map(
+        gears,
+        basis.bodies,
+        torques=[torque],
+        deviations=[ideal, with_tip_relief(ideal, gears, **relief)],
+        positions=2 * options["positions"],
+        contact=options["contact"],
+        supports=options["supports"],
+    ).peak_to_peak[:, 0, 0]
+    return float(found[1] / found[0])
+
+
+def _records(inputs, grid):
+    for (t, a, b), peak in np.ndenumerate(grid.peak_to_peak):
+        place = float(inputs[t]), float(grid.amounts[a]), float(grid.lengths[b])
+        yield (*place, float(peak), float(grid.ratio[t, a, b]))
+
+
+def _print_summary(inputs, grid, design, best):
+    rows = []
+    for t, torque in enumerate(inputs):
+        a, b = np.unravel_index(grid.peak_to_peak[t].argmin(), grid.peak_to_peak[t].shape)
+        place = (f"{grid.amounts[a] * 1e6:.2f}", f"{grid.lengths[b]:.3f}")
+        numbers = (grid.unmodified[t] * 1e6, grid.peak_to_peak[t, a, b] * 1e6)
+        rows.append((f"{torque:g}", *place, *(f"{x:.4f}" for x in numbers), f"{grid.ratio[t, a, b]:.1%}"))
+    header = (
+        "torque [N m]",
+        "relief [um]",
+        "length [1]",
+        "unmodified p-p [um]",
+        "STE p-p [um]",
+        "over unmodified",
+    )
+    print_table("Best points of the grid, sun-planet meshes", header, rows)
+    print(
+        f"optimum at {design:g} N m: {best.amount * 1e6:.3f} um over {best.length:.3f} lengths of two-pair "
+        f"contact, STE peak to peak {best.peak_to_peak * 1e6:.4f} um, {best.ratio:.1%} of "
+        f"{best.unmodified * 1e6:.4f} um without it ({best.evaluations} mesh cycles)"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(main))
