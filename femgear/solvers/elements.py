@@ -1,0 +1,336 @@
+"""Springs between motions: gear meshes with play, bearings with clearance, polynomial and piecewise laws.
+
+An element acts on groups of columns of ``W`` and gives, for their deflections ``x = W^T q``, the forces
+``f(x, t)`` of ``M q'' + C q' + K q + W f = load`` and the tangents ``df/dx``, for all instants at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.series import FourierSeries, StepSeries, constant, series_of
+from femgear.system import MeshExcitation
+
+
+class Element(Protocol):
+    """What a solver asks of an element.
+
+    ``columns`` (g, d) int array: g independent groups of d columns of ``W``. ``reference`` (g, d): a linear
+    stiffness [N/m] near which it works. ``evaluate(x, theta)``: from deflections x (..., g, d) [m] and phases
+    theta (..., n_bases) [rad], forces (..., g, d) [N] and tangents (..., g, d, d) [N/m].
+    """
+
+    columns: np.ndarray
+
+    @property
+    def reference(self) -> np.ndarray: ...
+
+    def evaluate(self, x, theta) -> tuple[np.ndarray, np.ndarray]: ...
+
+
+def positive_part(x, smoothing=0.0) -> tuple[np.ndarray, np.ndarray]:
+    """``max(x, 0)`` and its slope; with a smoothing length s, ``(x + sqrt(x^2 + s^2)) / 2``.
+
+    The smooth form differs by at most s / 2, at the corner (NREL/CP-5000-55355 smooths its contacts so).
+    """
+    if not np.any(smoothing):
+        closed = x > 0.0
+        return np.where(closed, x, 0.0), closed.astype(float)
+    root = np.sqrt(x * x + np.asarray(smoothing) ** 2)
+    return 0.5 * (x + root), 0.5 * (1.0 + x / root)
+
+
+@dataclass(frozen=True)
+class GearMeshes:
+    """Gear meshes ``phi(F) - phi(-F - k b)`` with ``F = force + k (x - deflection)`` and ``phi = max(., 0)``.
+
+    The tangent line of a loaded mesh, cut where the drive flanks part and taken up again when the teeth have
+    crossed the backlash. With ``separates`` false the line goes on into tension.
+
+    Parameters
+    ----------
+    columns : (g,) or (g, 1) int array
+    stiffness : FourierSeries or StepSeries
+        ``k`` of every mesh [N/m].
+    deflection : FourierSeries or StepSeries, optional
+        Deflection of the mesh at the state about which it is linear [m]; zero when not given. With `force`
+        zero this is the unloaded transmission error.
+    force : FourierSeries or StepSeries, optional
+        Force at that state [N]; zero when not given.
+    backlash : (g,) array or float
+        Total play along the line of action [m]; infinite when there is no back side.
+    smoothing : float
+        Length [m] over which contact sets in, see `positive_part`.
+    separates : bool
+    """
+
+    columns: np.ndarray
+    stiffness: FourierSeries | StepSeries
+    deflection: FourierSeries | StepSeries | None = None
+    force: FourierSeries | StepSeries | None = None
+    backlash: np.ndarray | float = np.inf
+    smoothing: float = 0.0
+    separates: bool = True
+
+    def __post_init__(self):
+        columns = _columns(self.columns, 1)
+        backlash = np.broadcast_to(np.asarray(self.backlash, float), len(columns)).copy()
+        object.__setattr__(self, "columns", columns)
+        object.__setattr__(self, "backlash", backlash)
+        for name in ("deflection", "force"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, constant(np.zeros(len(columns))))
+        _positive("smoothing length", self.smoothing)
+        if np.any(np.isnan(backlash)) or np.any(backlash < 0.0):
+            raise CaseError(
+                f"backlash of {backlash.min():.4g} m", code="E-BACKLASH", limit="0 m or more, or infinite"
+            )
+        for name in ("stiffness", "deflection", "force"):
+            if len(getattr(self, name).mean) != len(columns):
+                raise CaseError(
+                    f"{len(getattr(self, name).mean)} series of the mesh {name} for {len(columns)} meshes",
+                    code="E-SHAPE",
+                )
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Mean mesh stiffness, (g, 1) [N/m]."""
+        return self.stiffness.mean[:, None]
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+        k = self.stiffness.at(theta)
+        line = self.force.at(theta) + k * (x[..., 0] - self.deflection.at(theta))
+        if not self.separates:
+            return line[..., None], np.broadcast_to(k, line.shape)[..., None, None]
+        force, slope = positive_part(line, self.smoothing * k)
+        if np.isfinite(self.backlash).any():
+            back, back_slope = positive_part(-line - k * self.backlash, self.smoothing * k)
+            force, slope = force - back, slope + back_slope
+        return force[..., None], (k * slope)[..., None, None]
+
+
+def gear_meshes(
+    excitation: MeshExcitation,
+    *,
+    harmonics: int,
+    columns=None,
+    separates: bool = True,
+    smoothing: float = 0.0,
+    orders: tuple[int, ...] = (1,),
+) -> GearMeshes:
+    """The meshes of a static record, each series cut to ``harmonics`` mesh harmonics.
+
+    Parameters
+    ----------
+    excitation : MeshExcitation
+        Its zero backlashes mean that there is no back side.
+    harmonics : int
+        Mesh harmonics kept.
+    columns : (g,) int array, optional
+        Columns of ``W``; the first ones when not given.
+    orders : tuple of int
+        Orders of the mesh frequency; the record's own period counts ``periods`` mesh periods, so with
+        ``periods`` above one the base frequency must be the mesh frequency over ``periods``.
+    """
+    count = harmonics * excitation.periods
+    names = ("stiffness", "deflection", "force")
+    series = {name: series_of(getattr(excitation, name), count, orders=orders) for name in names}
+    backlash = np.where(excitation.backlash > 0.0, excitation.backlash, np.inf)
+    columns = np.arange(len(excitation.stiffness)) if columns is None else columns
+    return GearMeshes(columns, **series, backlash=backlash, separates=separates, smoothing=smoothing)
+
+
+@dataclass(frozen=True)
+class RadialBearings:
+    """Bearings with radial clearance: a ring of one-sided radial springs.
+
+    With infinitely many springs ``F(r) = (2 k / pi) [r (p + sin p cos p) - 2 c sin p]``, ``cos p = c / r``,
+    beyond the clearance c, zero within (integral of the springs over the loaded arc; for c = 0 it is
+    ``k r``). With n springs each has the stiffness ``4 k / n``.
+
+    Parameters
+    ----------
+    columns : (g, 2) int array
+        x and y of the inner relative to the outer ring.
+    stiffness : (g,) array or float
+        ``k`` [N/m].
+    clearance : (g,) array or float
+        Radial, from the centred position [m].
+    springs : int, optional
+        Number of springs, the first on the x axis; the continuous limit when not given.
+    smoothing : float
+        Length over which a spring sets in [m]; only with a number of springs, the limit is smooth.
+    """
+
+    columns: np.ndarray
+    stiffness: np.ndarray | float
+    clearance: np.ndarray | float = 0.0
+    springs: int | None = None
+    smoothing: float = 0.0
+    directions: np.ndarray | None = field(init=False, default=None)
+
+    def __post_init__(self):
+        columns = _columns(self.columns, 2)
+        object.__setattr__(self, "columns", columns)
+        for name in ("stiffness", "clearance"):
+            value = np.broadcast_to(np.asarray(getattr(self, name), float), len(columns)).copy()
+            if not np.all(np.isfinite(value)) or np.any(value < 0.0):
+                raise CaseError(f"bearing {name} of {value.min():.4g}", code="E-BEARING", limit="0 or more")
+            object.__setattr__(self, name, value)
+        _positive("smoothing length", self.smoothing)
+        if self.springs is None:
+            if self.smoothing:
+                raise CaseError(
+                    "a continuous bearing needs no smoothing", code="E-BEARING", key="smoothing",
+                    remedy="give a number of springs or no smoothing length",
+                )  # fmt: skip
+            return
+        if self.springs < 3:
+            raise CaseError(
+                f"a bearing of {self.springs} springs", code="E-BEARING", key="springs", limit="3 or more"
+            )
+        angle = 2.0 * np.pi * np.arange(self.springs) / self.springs
+        object.__setattr__(self, "directions", np.stack([np.cos(angle), np.sin(angle)], axis=1))
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Stiffness without clearance, (g, 2) [N/m]."""
+        return np.repeat(self.stiffness[:, None], 2, axis=1)
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 2) and tangents (..., g, 2, 2)."""
+        return self._continuous(x) if self.springs is None else self._discrete(x)
+
+    def _continuous(self, x):
+        r = np.hypot(x[..., 0], x[..., 1])
+        touching = (r > self.clearance) & (r > 0.0)
+        safe = np.where(touching, r, 1.0)
+        cosine = np.where(touching, self.clearance / safe, 1.0)
+        half = np.arccos(cosine)
+        sine = np.sqrt(1.0 - cosine * cosine)
+        factor = 2.0 * self.stiffness / np.pi
+        radial = np.where(touching, factor * (half + sine * cosine), 0.0)
+        secant = np.where(touching, radial - 2.0 * factor * cosine * sine, 0.0)
+        # at rest in the centre of a bearing without clearance the law is linear
+        centred = (self.clearance == 0.0) & ~touching
+        radial, secant = np.where(centred, self.stiffness, radial), np.where(centred, self.stiffness, secant)
+        unit = x / safe[..., None]
+        tangent = (radial - secant)[..., None, None] * unit[..., :, None] * unit[..., None, :]
+        return secant[..., None] * x, tangent + secant[..., None, None] * np.eye(2)
+
+    def _discrete(self, x):
+        each = 4.0 * self.stiffness / self.springs
+        stretch = x @ self.directions.T - self.clearance[:, None]
+        force, slope = positive_part(stretch, self.smoothing)
+        forces = (each[:, None] * force) @ self.directions
+        tangents = np.einsum("...gs,si,sj->...gij", each[:, None] * slope, self.directions, self.directions)
+        return forces, tangents
+
+
+@dataclass(frozen=True)
+class PolynomialSprings:
+    """``f = sum_d coefficients[d - 1] x^d``.
+
+    Parameters
+    ----------
+    columns : (g,) int array
+    coefficients : (g, degree) array
+        Of x, x^2, x^3, ... [N/m, N/m^2, ...].
+    """
+
+    columns: np.ndarray
+    coefficients: np.ndarray
+
+    def __post_init__(self):
+        columns = _columns(self.columns, 1)
+        table = np.atleast_2d(np.array(self.coefficients, float))
+        if len(table) != len(columns) or not np.all(np.isfinite(table)):
+            raise CaseError(
+                f"{len(table)} rows of coefficients for {len(columns)} springs", code="E-SHAPE",
+                limit="one row of finite numbers a spring",
+            )  # fmt: skip
+        object.__setattr__(self, "columns", columns)
+        object.__setattr__(self, "coefficients", table)
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Stiffness at rest, (g, 1) [N/m]."""
+        return self.coefficients[:, :1]
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+        x = x[..., 0]
+        force, slope = np.zeros_like(x), np.zeros_like(x)
+        for coefficient in self.coefficients.T[::-1]:
+            slope = slope * x + force + coefficient
+            force = (force + coefficient) * x
+        return force[..., None], slope[..., None, None]
+
+
+@dataclass(frozen=True)
+class PiecewiseSprings:
+    """Continuous piecewise linear springs without force at ``x = 0``.
+
+    Parameters
+    ----------
+    columns : (g,) int array
+    breaks : (m,) array
+        Ascending deflections where the slope changes [m].
+    slopes : (m + 1,) array
+        Slopes below, between and above the breaks [N/m].
+    smoothing : float
+        Length over which a slope changes [m], see `positive_part`; the force at rest stays zero.
+    """
+
+    columns: np.ndarray
+    breaks: np.ndarray
+    slopes: np.ndarray
+    smoothing: float = 0.0
+
+    def __post_init__(self):
+        columns = _columns(self.columns, 1)
+        breaks, slopes = np.atleast_1d(np.array(self.breaks, float)), np.array(self.slopes, float)
+        if len(slopes) != len(breaks) + 1 or np.any(np.diff(breaks) <= 0.0):
+            raise CaseError(
+                f"{len(slopes)} slopes with breaks {breaks.tolist()}", code="E-SHAPE",
+                limit="ascending breaks and one more slope than breaks",
+            )  # fmt: skip
+        _positive("smoothing length", self.smoothing)
+        for name, value in (("columns", columns), ("breaks", breaks), ("slopes", slopes)):
+            object.__setattr__(self, name, value)
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Mean of the lowest and the highest slope, (g, 1) [N/m]."""
+        return np.full((len(self.columns), 1), 0.5 * (self.slopes.min() + self.slopes.max()))
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+        x = x[..., 0]
+        change = np.diff(self.slopes)
+        part, slope = positive_part(x[..., None] - self.breaks, self.smoothing)
+        rest, _ = positive_part(-self.breaks, self.smoothing)
+        force = self.slopes[0] * x + (part - rest) @ change
+        return force[..., None], (self.slopes[0] + slope @ change)[..., None, None]
+
+
+def _columns(columns, width: int) -> np.ndarray:
+    """Columns as a (g, width) integer array."""
+    array = np.array(columns)
+    array = array.reshape(-1, width) if array.ndim < 2 else array
+    if array.shape[1] != width or not np.issubdtype(array.dtype, np.integer) or np.any(array < 0):
+        raise CaseError(
+            f"columns {array.tolist()}", code="E-SHAPE", limit=f"groups of {width} column numbers of W"
+        )
+    array.setflags(write=False)
+    return array
+
+
+def _positive(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value >= 0.0):
+        raise CaseError(f"{name} of {value} m", code="E-SMOOTHING", limit="0 m or more")

@@ -1,0 +1,69 @@
+"""Periodic and quasi-periodic solutions as lines of a spectrum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class PeriodicSolution:
+    """``x(t) = Re sum_l X_l exp(i (orders_l . omega) t)`` for the deflections of the elements.
+
+    Parameters
+    ----------
+    frequency : (n_bases,) array
+        Base frequencies ``omega`` [rad/s].
+    orders : (L, n_bases) int array
+        Line 0 is the mean; of a line and its mirror image only one is there.
+    deflection : (n_columns, L) complex array
+        ``W^T q`` [m].
+    force : (n_columns, L) complex array
+        Forces of the elements [N].
+    converged : bool
+    residual : float
+        Largest violation of the harmonic equations relative to the largest deflection.
+    iterations : int
+    factorisations : int
+        Matrices factorised on the way.
+    tail : float
+        Share of the amplitude in the upper half of the lines: a measure of truncation.
+    message : str
+        What happened and, where it did not converge, what to do.
+    history : tuple of float
+        Relative residual at every iteration.
+    """
+
+    frequency: np.ndarray
+    orders: np.ndarray
+    deflection: np.ndarray
+    force: np.ndarray
+    converged: bool
+    residual: float
+    iterations: int
+    factorisations: int
+    tail: float
+    message: str
+    history: tuple[float, ...] = field(default=())
+
+    def __post_init__(self):
+        for name, kind in (
+            ("frequency", float),
+            ("orders", int),
+            ("deflection", complex),
+            ("force", complex),
+        ):
+            array = np.array(getattr(self, name), kind)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def line_frequency(self) -> np.ndarray:
+        """Angular frequency of every line, (L,) [rad/s]."""
+        return self.orders @ self.frequency
+
+    def at(self, time) -> np.ndarray:
+        """Deflections (..., n_columns) at the instants ``time`` (...) [s]."""
+        wave = np.exp(1j * np.asarray(time, float)[..., None] * self.line_frequency)
+        return (wave @ self.deflection.T).real
