@@ -10,9 +10,9 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "femgear"
 LAYERS = (
     ("errors",),
-    ("files",),
-    ("system", "gears", "fe", "casefile", "netcdf"),
-    ("contact", "models", "solvers", "housing", "case"),
+    ("files", "system"),
+    ("gears", "fe", "casefile", "netcdf", "solvers"),
+    ("contact", "models", "housing", "case"),
     ("storage", "datasets", "plots", "scene"),
     ("analysis", "design", "summary"),
     ("report", "sweep", "validation", "pictures"),

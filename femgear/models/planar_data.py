@@ -1,0 +1,242 @@
+"""Data of the lumped planetary set: rigid bodies, supports, radii, angles and torques."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.models.planar_checks import check_body, check_set
+
+if TYPE_CHECKING:
+    from femgear.gears import PlanetarySet
+
+CENTRAL = ("carrier", "ring", "sun")
+
+
+@dataclass(frozen=True)
+class PlanarBody:
+    """A rigid body.
+
+    Parameters
+    ----------
+    mass : float
+        [kg]
+    inertia : float
+        Polar inertia I about its axis [kg m^2]; `inertia_of_reduced` for data given as I / r^2.
+    support : float
+        Isotropic radial stiffness to the housing [N/m]; infinite holds the axis.
+    torsional_support : float
+        Against rotation relative to the housing [N m/rad]; infinite holds the body.
+    """
+
+    mass: float
+    inertia: float
+    support: float = 0.0
+    torsional_support: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlanarSet:
+    """Data of the lumped set.
+
+    Parameters
+    ----------
+    sun, ring, carrier : PlanarBody
+    planet : PlanarBody
+        Each of the N equal planets; it has no supports but its bearing.
+    sun_radius, ring_radius, planet_radius : float
+        Base radii [m].
+    centre_distance : float
+        Radius of the circle of planet centres [m].
+    planet_angles : (N,) array
+        psi_n [rad], ascending within one turn, counter-clockwise from the x axis.
+    pressure_angle_sun_planet, pressure_angle_planet_ring : float
+        Working pressure angles [rad].
+    stiffness_sun_planet, stiffness_planet_ring : float or (N,) array
+        Mean mesh stiffnesses [N/m].
+    planet_bearing : float or (N,) array
+        Isotropic stiffness between planet and carrier [N/m]; infinite fixes the planet's axis to its pin.
+
+    Raises
+    ------
+    CaseError
+        Numbers that no set can have (E-PLANAR), planet angles that are none, unordered or span more than a
+        turn (E-PLANAR).
+
+    Notes
+    -----
+    Published data are often rounded, or mix reference and working angles: radii that do not close are
+    taken as they are, and `closure` tells by how much.
+    """
+
+    sun: PlanarBody
+    ring: PlanarBody
+    carrier: PlanarBody
+    planet: PlanarBody
+    sun_radius: float
+    ring_radius: float
+    planet_radius: float
+    centre_distance: float
+    planet_angles: Sequence[float] | np.ndarray
+    pressure_angle_sun_planet: float
+    pressure_angle_planet_ring: float
+    stiffness_sun_planet: float | np.ndarray
+    stiffness_planet_ring: float | np.ndarray
+    planet_bearing: float | np.ndarray
+
+    def __post_init__(self):
+        angles = np.atleast_1d(np.array(self.planet_angles, float))
+        per_planet = ("stiffness_sun_planet", "stiffness_planet_ring", "planet_bearing")
+        arrays = {"planet_angles": angles} | {
+            name: np.array(getattr(self, name), float) * np.ones(1) for name in per_planet
+        }
+        for name in per_planet:
+            if len(arrays[name]) == 1:
+                arrays[name] = np.full(len(angles), arrays[name][0])
+        for name, array in arrays.items():
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        for name in (*CENTRAL, "planet"):
+            check_body(name, getattr(self, name))
+        check_set(self)
+
+    @property
+    def n_planets(self) -> int:
+        return len(self.planet_angles)
+
+    @property
+    def mesh_stiffness(self) -> np.ndarray:
+        """Mean stiffness of the 2N meshes [N/m]."""
+        return np.concatenate([self.stiffness_sun_planet, self.stiffness_planet_ring])
+
+    @property
+    def closure(self) -> tuple[float, float]:
+        """``(r_s + r_p) / (a cos alpha_sp) - 1`` and ``(r_r - r_p) / (a cos alpha_pr) - 1``.
+
+        Zero where radii, centre distance and pressure angles belong to one set of gears.
+        """
+        a = self.centre_distance
+        return (
+            (self.sun_radius + self.planet_radius) / (a * math.cos(self.pressure_angle_sun_planet)) - 1.0,
+            (self.ring_radius - self.planet_radius) / (a * math.cos(self.pressure_angle_planet_ring)) - 1.0,
+        )
+
+
+@dataclass(frozen=True)
+class PlanarTorque:
+    """External torque that drives the set.
+
+    Parameters
+    ----------
+    torque : float
+        On `member` [N m], positive counter-clockwise.
+    member : {"sun", "carrier", "ring"}
+    output : {"sun", "carrier", "ring"}, optional
+        Member on which an external torque reacts, by the balance of `torque_shares`; with None the
+        torsional supports carry everything.
+    """
+
+    torque: float
+    member: str = "sun"
+    output: str | None = "carrier"
+
+    def __post_init__(self):
+        if self.member not in CENTRAL or self.output not in (*CENTRAL, None) or self.member == self.output:
+            raise CaseError(
+                f"a torque on {self.member!r} that reacts on {self.output!r}", code="E-MECHANISM",
+                limit="two of sun, carrier and ring",
+            )  # fmt: skip
+        if not math.isfinite(self.torque):
+            raise CaseError(f"a torque of {self.torque} N m", code="E-VALUE", limit="finite")
+
+
+def inertia_of_reduced(reduced: float, radius: float) -> float:
+    """Polar inertia [kg m^2] of ``I / r^2`` [kg] at the radius [m] of ``u = r theta``."""
+    return reduced * radius**2
+
+
+def torsional_of_reduced(stiffness: float, radius: float) -> float:
+    """Torsional stiffness [N m/rad] of a stiffness ``k_u`` [N/m] that acts on ``u = r theta``."""
+    return stiffness * radius**2
+
+
+def planar_from_set(
+    planetary_set: PlanetarySet,
+    *,
+    sun: PlanarBody,
+    ring: PlanarBody,
+    carrier: PlanarBody,
+    planet: PlanarBody,
+    stiffness_sun_planet,
+    stiffness_planet_ring,
+    planet_bearing,
+) -> PlanarSet:
+    """Lumped set with the base radii, working pressure angles and planet angles of a geared one.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    sun, ring, carrier, planet, stiffness_sun_planet, stiffness_planet_ring, planet_bearing
+        See `PlanarSet`.
+    """
+    s = planetary_set
+    return PlanarSet(
+        sun=sun,
+        ring=ring,
+        carrier=carrier,
+        planet=planet,
+        sun_radius=s.sun.base_radius,
+        ring_radius=s.ring.base_radius,
+        planet_radius=s.planet.base_radius,
+        centre_distance=s.centre_distance,
+        planet_angles=s.planet_angles,
+        pressure_angle_sun_planet=s.working_pressure_angle_sun_planet,
+        pressure_angle_planet_ring=s.working_pressure_angle_planet_ring,
+        stiffness_sun_planet=stiffness_sun_planet,
+        stiffness_planet_ring=stiffness_planet_ring,
+        planet_bearing=planet_bearing,
+    )
+
+
+def torsional_set(data: PlanarSet) -> PlanarSet:
+    """The same set with all axes held: N + 3 rotations (A. Kahraman, J. Sound Vib. 173, 1994, 125-130).
+
+    The planets' axes are then fixed to the carrier, whose rotation carries their mass.
+    """
+    held = {name: replace(getattr(data, name), support=math.inf) for name in CENTRAL}
+    return replace(data, planet_bearing=math.inf, **held)
+
+
+def torque_shares(data: PlanarSet) -> dict[str, float]:
+    """Forces on ``u`` of the members in static balance, that on the sun being one.
+
+    Power balance over the rotations that strain no mesh, ``u_s + u_r = (cos alpha_sp + cos alpha_pr) u_c``
+    (add the deflections of both meshes of one planet). With radii that close these are the torques of
+    Willis, ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``.
+    """
+    both = math.cos(data.pressure_angle_sun_planet) + math.cos(data.pressure_angle_planet_ring)
+    return {"sun": 1.0, "ring": 1.0, "carrier": -both}
+
+
+def member_radius(data: PlanarSet, member: str) -> float:
+    """Radius [m] of ``u = r theta`` of the carrier, ring or sun."""
+    return data.centre_distance if member == "carrier" else getattr(data, f"{member}_radius")
+
+
+def flank_sign(data: PlanarSet, torque: PlanarTorque | None) -> int:
+    """1 where the loaded flanks are those of a sun that drives counter-clockwise, else -1."""
+    if torque is None:
+        return 1
+    return -1 if torque.torque * torque_shares(data)[torque.member] < 0.0 else 1
+
+
+def body_masses(data: PlanarSet) -> np.ndarray:
+    """Mass, mass and ``I / r^2`` (N + 3, 3) [kg] of carrier, ring, sun and planets."""
+    bodies = [(getattr(data, name), member_radius(data, name)) for name in CENTRAL]
+    bodies += [(data.planet, data.planet_radius)] * data.n_planets
+    return np.array([(body.mass, body.mass, body.inertia / r**2) for body, r in bodies])

@@ -1,0 +1,359 @@
+"""The lumped set against exact geometry, the printed matrices of Lin and Parker, and closed forms."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eig, eigh
+
+from femgear.errors import CaseError
+from femgear.gears import torques
+from femgear.models.planar import (
+    CENTRAL,
+    PlanarBody,
+    PlanarTorque,
+    column_groups,
+    free_motions,
+    mesh_directions,
+    pin_directions,
+    planar_dofs,
+    planar_from_set,
+    planar_system,
+    torque_shares,
+    torsional_set,
+)
+from femgear.solvers.modal import solve_modes
+from femgear.validation.planar import lin_parker_set
+from femgear.validation.planetary import nrel_set
+
+ANGLES = np.array([0.3, 1.9, 4.1])
+
+
+def uneven(**changes):
+    """Unequal angles, unequal pressure angles and stiffnesses that differ from mesh to mesh; radii close."""
+    alpha, beta = math.radians(24.0), math.radians(18.0)
+    distance, sun = 0.1, 0.04
+    planet = distance * math.cos(alpha) - sun
+    data = replace(
+        lin_parker_set(3),
+        planet_angles=ANGLES,
+        sun_radius=sun,
+        planet_radius=planet,
+        ring_radius=planet + distance * math.cos(beta),
+        centre_distance=distance,
+        pressure_angle_sun_planet=alpha,
+        pressure_angle_planet_ring=beta,
+        stiffness_sun_planet=[4e8, 5e8, 6e8],
+        stiffness_planet_ring=[7e8, 3e8, 5e8],
+        planet_bearing=[1e8, 2e8, 3e8],
+    )
+    return replace(data, **changes)
+
+
+def belt(one, two, turn, radii, *, crossed, branch):
+    """Length of a belt fixed to two base circles, straight along the line of action.
+
+    Points of the belt trace the involutes. Flanks of an external pair touch between the tangent points and
+    approach as the belt becomes shorter; those of an internal pair touch beyond, and approach as it grows.
+    """
+    apart = two - one
+    distance, heading = np.hypot(*apart), math.atan2(apart[1], apart[0])
+    reach = radii[0] + radii[1] if crossed else radii[0] - radii[1]
+    normal = heading + branch * math.acos(reach / distance)
+    straight = math.sqrt(distance**2 - reach**2)
+    # the belt leaves circle 1 in the direction that goes from tangent point to tangent point
+    towards = apart - reach * np.array([math.cos(normal), math.sin(normal)])
+    side = 1.0 if math.cos(normal) * towards[1] - math.sin(normal) * towards[0] > 0 else -1.0
+    wound = side * radii[0] * (normal - turn[0])
+    other = -side if crossed else side
+    return straight + wound - other * radii[1] * (normal - turn[1])
+
+
+@pytest.mark.parametrize("flank", [1, -1])
+@pytest.mark.parametrize("mesh", range(6))
+def test_mesh_columns_are_the_gradient_of_exact_involute_kinematics(flank, mesh):
+    data, planet = uneven(), mesh % 3
+    first, second = (("sun", "planet"), ("planet", "ring"))[mesh // 3]
+    radii = getattr(data, f"{first}_radius"), getattr(data, f"{second}_radius")
+    psi = ANGLES[planet]
+    out = np.array([math.cos(psi), math.sin(psi)])
+    frame = np.array([out, [-out[1], out[0]]]).T
+
+    def approach(q):
+        q = dict(zip(planar_dofs(3), q))
+        centre = {body: np.array([q[f"{body}: x"], q[f"{body}: y"]]) for body in ("sun", "ring")}
+        name = f"planet {planet + 1}"
+        centre["planet"] = data.centre_distance * out + frame @ [
+            q[f"{name}: radial"],
+            q[f"{name}: tangential"],
+        ]
+        angle = {body: q[f"{body}: u"] / getattr(data, f"{body}_radius") for body in ("sun", "ring")}
+        angle["planet"] = q[f"{name}: u"] / data.planet_radius
+        turned, crossed = (angle[first], angle[second]), first == "sun"
+        length = belt(centre[first], centre[second], turned, radii, crossed=crossed, branch=-flank)
+        return -length if crossed else length
+
+    step, eye = 1e-6, np.eye(18)
+    gradient = [(approach(step * e) - approach(-step * e)) / (2 * step) for e in eye]
+    assert gradient == pytest.approx(mesh_directions(data, flank)[:, mesh], abs=1e-8)
+
+
+def products(factors):
+    """The printed 3 x 3 blocks of member, coupling and planet are products of two vectors."""
+    member, planet = factors
+    return (member, member), (member, planet), (planet, planet)
+
+
+def printed_stiffness(data):
+    """K_b + K_m as Lin and Parker print it in their appendix, block by block."""
+    N = data.n_planets
+    K = np.zeros((3 * (N + 3), 3 * (N + 3)))
+    supports = [
+        (data.carrier, data.centre_distance),
+        (data.ring, data.ring_radius),
+        (data.sun, data.sun_radius),
+    ]
+    for i, (body, r) in enumerate(supports):
+        K[range(3 * i, 3 * i + 2), range(3 * i, 3 * i + 2)] = body.support
+        K[3 * i + 2, 3 * i + 2] = body.torsional_support / r**2
+    a, b = data.pressure_angle_sun_planet, data.pressure_angle_planet_ring
+    sa, ca, sb, cb = math.sin(a), math.cos(a), math.sin(b), math.cos(b)
+    for n, psi in enumerate(data.planet_angles):
+        s, c = math.sin(psi), math.cos(psi)
+        ss, cs, sr, cr = math.sin(psi - a), math.cos(psi - a), math.sin(psi + b), math.cos(psi + b)
+        ring = np.array([-sr, cr, 1.0]), np.array([sb, -cb, -1.0])
+        sun = np.array([-ss, cs, 1.0]), np.array([-sa, -ca, 1.0])
+        bearing = (
+            [[1, 0, -s], [0, 1, c], [-s, c, 1]],
+            [[-c, s, 0], [-s, -c, 0], [0, -1, 0]],
+            np.diag([1, 1, 0]),
+        )
+        blocks = (
+            (0, data.planet_bearing[n], *bearing),
+            (3, data.stiffness_planet_ring[n], *(np.outer(*pair) for pair in products(ring))),
+            (6, data.stiffness_sun_planet[n], *(np.outer(*pair) for pair in products(sun))),
+        )
+        own = slice(9 + 3 * n, 12 + 3 * n)
+        for first, k, diagonal, coupling, planet in blocks:
+            member = slice(first, first + 3)
+            K[member, member] += k * np.array(diagonal)
+            K[member, own] += k * np.array(coupling)
+            K[own, member] += k * np.array(coupling).T
+            K[own, own] += k * np.array(planet)
+    return K
+
+
+@pytest.mark.parametrize("data", [uneven(), lin_parker_set(4), lin_parker_set(5)], ids=["uneven", "4", "5"])
+def test_stiffness_and_mass_are_those_that_lin_and_parker_print(data):
+    system = planar_system(data)
+    total = system.K + (system.W * data.mesh_stiffness) @ system.W.T
+    assert total == pytest.approx(printed_stiffness(data), abs=1e-14 * np.abs(total).max())
+    bodies = [
+        (data.carrier, data.centre_distance),
+        (data.ring, data.ring_radius),
+        (data.sun, data.sun_radius),
+    ]
+    bodies += [(data.planet, data.planet_radius)] * data.n_planets
+    mass = np.concatenate([[b.mass, b.mass, b.inertia / r**2] for b, r in bodies])
+    assert np.array_equal(system.M, np.diag(mass))
+    assert system.dofs == planar_dofs(data.n_planets) and not system.C.any() and system.gyroscopic is None
+
+
+def rotation(data, *, sun, carrier):
+    """Small rotations of the mechanism, angles [rad] of sun and carrier given."""
+    q = dict.fromkeys(planar_dofs(data.n_planets), 0.0)
+    a = data.centre_distance
+    planet = carrier - (sun - carrier) * data.sun_radius / data.planet_radius
+    ring = carrier + (planet - carrier) * data.planet_radius / data.ring_radius
+    for name, angle in (("sun", sun), ("carrier", carrier), ("ring", ring)):
+        q[f"{name}: u"] = angle * (a if name == "carrier" else getattr(data, f"{name}_radius"))
+    for n in range(1, data.n_planets + 1):
+        q[f"planet {n}: tangential"] = a * carrier
+        q[f"planet {n}: u"] = planet * data.planet_radius
+    return np.array(list(q.values()))
+
+
+@pytest.mark.parametrize("turn", [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (1.0, 0.2)])
+@pytest.mark.parametrize("flank", [1, -1])
+def test_rotation_strains_neither_mesh_nor_bearing(turn, flank):
+    data = uneven()
+    assert np.abs(data.closure).max() < 1e-15
+    q = rotation(data, sun=turn[0], carrier=turn[1])
+    columns = np.hstack([mesh_directions(data, flank), pin_directions(data).reshape(18, -1)])
+    assert np.abs(columns.T @ q).max() < 1e-12 * np.abs(q).max()
+
+
+def test_common_translation_strains_no_mesh_and_no_planet_bearing():
+    data = uneven()
+    move = np.array([0.6, -0.8])
+    q = np.zeros(18)
+    q[[0, 1]] = q[[3, 4]] = q[[6, 7]] = move
+    for n, psi in enumerate(ANGLES):
+        q[9 + 3 * n : 11 + 3 * n] = np.array([[np.cos(psi), np.sin(psi)], [-np.sin(psi), np.cos(psi)]]) @ move
+    columns = np.hstack([mesh_directions(data), pin_directions(data).reshape(18, -1)])
+    assert np.abs(columns.T @ q).max() < 1e-15
+
+
+def test_turning_all_planets_turns_nothing_else():
+    modes = []
+    for shift in (0.0, 0.7):
+        data = uneven(planet_angles=ANGLES + shift)
+        modes.append(solve_modes(planar_system(data), data.mesh_stiffness).frequency)
+    assert modes[1] == pytest.approx(modes[0], rel=1e-9, abs=1e-3)
+
+
+def test_geared_set_gives_radii_angles_and_the_torques_of_willis():
+    gears = nrel_set()
+    body = PlanarBody(10.0, 1.0, 1e8)
+    data = planar_from_set(
+        gears, sun=body, ring=replace(body, torsional_support=1e9), carrier=body, planet=PlanarBody(5.0, 0.5),
+        stiffness_sun_planet=1e9, stiffness_planet_ring=1e9, planet_bearing=2e9,
+    )  # fmt: skip
+    assert np.abs(data.closure).max() < 1e-12
+    assert math.degrees(data.pressure_angle_sun_planet) == pytest.approx(24.169, abs=1e-3)
+    system = planar_system(data, torque=PlanarTorque(100.0))
+    expected = torques(gears, member="sun", torque=100.0)
+    load = dict(zip(system.dofs, system.load))
+    assert load["sun: u"] * data.sun_radius == pytest.approx(expected.sun, rel=1e-14)
+    assert load["carrier: u"] * data.centre_distance == pytest.approx(expected.carrier, rel=1e-14)
+    assert np.count_nonzero(system.load) == 2
+    ring = torque_shares(data)["ring"] * load["sun: u"] * data.ring_radius
+    assert ring == pytest.approx(expected.ring, rel=1e-14)
+    assert np.array_equal(data.planet_angles, gears.planet_angles)
+
+
+@pytest.mark.parametrize(
+    ("torque", "compressed"),
+    [
+        (PlanarTorque(50.0), True), (PlanarTorque(-50.0), True), (PlanarTorque(50.0, "carrier", "sun"), True),
+        (PlanarTorque(-50.0, "carrier", "sun"), True), (PlanarTorque(50.0, "sun", None), True),
+    ],
+)  # fmt: skip
+def test_columns_follow_the_loaded_flanks(torque, compressed):
+    data = uneven(carrier=replace(uneven().carrier, torsional_support=1e6))
+    system = planar_system(data, torque=torque)
+    q = np.linalg.solve(system.K + (system.W * data.mesh_stiffness) @ system.W.T, system.load)
+    assert np.all(system.W.T @ q > 0) == compressed
+
+
+def test_rotating_frame_shifts_whirl_by_the_carrier_speed():
+    """A ring on isotropic supports whirls at sqrt(k/m) in the housing, -+ Omega seen from the carrier."""
+    data, speed = lin_parker_set(3), 1500.0
+    system = planar_system(data, carrier_speed=speed)
+    G = system.gyroscopic
+    assert np.array_equal(G, -G.T) and system.K == pytest.approx(system.K.T, abs=1e-15 * system.K.max())
+    ring = [system.dofs.index(f"ring: {axis}") for axis in "xy"]
+    M, K, D = (np.array(m)[np.ix_(ring, ring)] for m in (system.M, system.K, speed * G))
+    state = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+    still = math.sqrt(1e8 / 2.35)
+    assert np.sort(np.abs(eig(state)[0].imag)) == pytest.approx(np.repeat([still - speed, still + speed], 2))
+
+
+def test_whole_set_whirls_as_one_body_seen_from_the_carrier():
+    """Without ring, sun and carrier supports the set is one free body: it stands still in the housing."""
+    free = {name: replace(getattr(uneven(), name), support=0.0) for name in CENTRAL}
+    data, speed = uneven(**free), 200.0
+    system = planar_system(data, carrier_speed=speed)
+    total = system.K + (system.W * data.mesh_stiffness) @ system.W.T
+    shift = np.zeros((18, 2))
+    shift[[0, 3, 6], 0] = shift[[1, 4, 7], 1] = 1.0
+    shift[9::3], shift[10::3] = (
+        np.array([np.cos(ANGLES), np.sin(ANGLES)]).T,
+        np.array([-np.sin(ANGLES), np.cos(ANGLES)]).T,
+    )
+    # x = cos(Omega t), y = -sin(Omega t): a point of the housing seen from the carrier
+    q = shift @ [1.0, 1j]
+    rest = (-(speed**2) * system.M + 1j * speed * speed * system.gyroscopic + total) @ q
+    assert np.abs(rest).max() < 1e-10 * np.abs(total).max()
+
+
+def test_centrifugal_load_pulls_planets_outwards():
+    data, speed = lin_parker_set(3), 300.0
+    system = planar_system(data, carrier_speed=speed)
+    force = 0.66 * data.centre_distance * speed**2
+    q = np.linalg.solve(system.K + 1e-3 * np.eye(18), system.load)
+    radial = q[[system.dofs.index(f"planet {n}: radial") for n in (1, 2, 3)]]
+    assert radial == pytest.approx(force / (1e8 - 0.66 * speed**2), rel=1e-9)
+    still, tangential = planar_system(data).load, system.load[10::3]
+    assert not still.any() and not tangential.any()
+
+
+def test_infinite_supports_are_the_limit_of_stiff_ones():
+    """Error of the stiff supports falls with their stiffness, towards the held coordinates."""
+    rigid = torsional_set(lin_parker_set(3))
+    exact = solve_modes(planar_system(rigid), rigid.mesh_stiffness).frequency
+    errors = []
+    for stiff in (1e13, 1e14):
+        held = {name: replace(getattr(rigid, name), support=stiff) for name in CENTRAL}
+        data = replace(rigid, planet_bearing=stiff, **held)
+        system = planar_system(data)
+        total = system.K + (system.W * data.mesh_stiffness) @ system.W.T
+        value = eigh(total, system.M, eigvals_only=True)[1 : len(exact)]
+        errors.append(np.abs(np.sqrt(value) / (2 * np.pi) / exact[1:] - 1.0).max())
+    assert errors[1] < 1e-5 and errors[0] / errors[1] == pytest.approx(10.0, rel=0.05)
+
+
+def test_held_planets_follow_their_pins():
+    data = uneven(planet_bearing=[1e8, np.inf, 3e8])
+    T, pins = free_motions(data), pin_directions(data)
+    assert T.shape == (18, 16)
+    q = T @ np.arange(1.0, 17.0)
+    assert np.abs(pins[:, 1].T @ q).max() < 1e-14
+    system = planar_system(data)
+    assert "planet 2: radial" not in system.dofs and len(system.dofs) == 16
+    assert np.trace(system.M) > np.trace(planar_system(uneven()).M) - 1e-9
+    assert np.array_equal(system.W, T.T @ mesh_directions(data))
+
+
+def test_bearing_columns_carry_what_left_the_stiffness():
+    data, names = uneven(), ("carrier", "sun", "planets", "ring")
+    groups = column_groups(data, back_flanks=True, bearings=names)
+    system = planar_system(data, back_flanks=True, bearings=names)
+    assert system.W.shape[1] == 6 + 6 + 3 * 2 + 6 == 1 + max(g.max() for g in groups.values())
+    whole = planar_system(data)
+    K = np.array(system.K)
+    for name in names:
+        k = data.planet_bearing if name == "planets" else [getattr(data, name).support]
+        for stiffness, columns in zip(k, groups[name], strict=True):
+            K += stiffness * system.W[:, columns] @ system.W[:, columns].T
+    assert K == pytest.approx(whole.K, abs=1e-6)
+    assert np.array_equal(system.W[:, groups["meshes"]], whole.W)
+    assert np.array_equal(system.W[:, groups["back flanks"]], mesh_directions(data, -1))
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "word"),
+    [
+        ({"sun": PlanarBody(0.0, 1.0)}, "E-PLANAR", "sun: mass"),
+        ({"ring": PlanarBody(1.0, math.nan)}, "E-PLANAR", "ring: inertia"),
+        ({"carrier": PlanarBody(1.0, 1.0, -1.0)}, "E-PLANAR", "carrier: support"),
+        ({"planet": PlanarBody(1.0, 1.0, 1e8)}, "E-PLANAR", "planet_bearing"),
+        ({"planet_angles": [0.0, 120.0, 240.0]}, "E-PLANAR", "radians"),
+        ({"planet_angles": [0.0, 0.0, 1.0]}, "E-PLANAR", "ascending"),
+        ({"pressure_angle_sun_planet": 24.6}, "E-PLANAR", "radians"),
+        ({"stiffness_planet_ring": [1e8, 1e8]}, "E-PLANAR", "2 values"),
+        ({"stiffness_sun_planet": 0.0}, "E-PLANAR", "above 0"),
+        ({"planet_bearing": -1e8}, "E-PLANAR", "above 0, or infinite"),
+        ({"centre_distance": 0.0}, "E-PLANAR", "centre distance"),
+    ],
+)
+def test_impossible_data_are_refused(changes, code, word):
+    with pytest.raises(CaseError, match=word) as error:
+        uneven(**changes)
+    assert error.value.code == code
+
+
+def test_impossible_requests_are_refused():
+    for torque in (("motor", None), ("sun", "sun")):
+        with pytest.raises(CaseError, match="E-MECHANISM"):
+            PlanarTorque(1.0, *torque)
+    with pytest.raises(CaseError, match="finite"):
+        PlanarTorque(math.nan)
+    held = uneven(sun=replace(uneven().sun, torsional_support=math.inf))
+    with pytest.raises(CaseError, match="which is held"):
+        planar_system(held, torque=PlanarTorque(1.0))
+    with pytest.raises(CaseError, match="infinitely stiff"):
+        planar_system(uneven(planet_bearing=math.inf), bearings=("planets",))
+    with pytest.raises(CaseError, match="motor"):
+        planar_system(uneven(), bearings=("motor",))
