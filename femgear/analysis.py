@@ -20,6 +20,7 @@ from femgear.analysis_checks import (
     static_warnings,
 )
 from femgear.case import Case, planetary_set, set_deviations
+from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,6 +120,7 @@ class HousingResult:
         return housing_dataset(self)
 
 
+@one_blas_thread()
 def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | None = None) -> StaticResult:
     """Static transmission error, load sharing and mesh stiffness over one mesh period.
 
@@ -158,11 +160,13 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
         supports=_supports(case),
         periods=periods,
         both_flanks=case.static.back_flanks,
+        pressures=case.static.stresses and periods == 1,
         progress=None if progress is None else lambda done, total: progress("contact", done, total),
     )
     return StaticResult(gears, sectors, bodies, cycle, sun_torque, period_message)
 
 
+@one_blas_thread()
 def solve_modes(case: Case, static: StaticResult) -> ModesResult:
     """Modal basis of the set with its elastic ring and mean mesh stiffnesses.
 
@@ -214,6 +218,7 @@ def solve_modes(case: Case, static: StaticResult) -> ModesResult:
     return ModesResult(ring, model, excitation, _named(modes, model), diameter)
 
 
+@one_blas_thread()
 def solve_dynamics(
     case: Case, static: StaticResult, modes: ModesResult, *, progress: Progress | None = None
 ) -> DynamicsResult:
@@ -286,6 +291,7 @@ def _outputs(result: ModesResult, response: Response):
     return values[:, :n_meshes], field
 
 
+@one_blas_thread()
 def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     """Signal and carrier orders of a sensor fixed on the ring while the carrier turns past it.
 
@@ -330,6 +336,7 @@ def _supports(case: Case):
         sun=case.sun.support_stiffness,
         carrier=case.carrier.support_stiffness,
         planet=case.planet.bearing_stiffness,
+        planet_clearance=case.planet.bearing_clearance,
     )
 
 

@@ -116,4 +116,8 @@ def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
         found.append(f"[W-OPEN] planet {planets} carries nothing at some positions")
     if cycle.wedged.any():
         found.append("[W-WEDGED] some meshes are loaded on both flanks at once")
+    if ((cycle.back_force > 0) & ~cycle.wedged).any():
+        found.append(
+            "[W-BACK] some meshes carry on their back flanks alone: planets work against one another"
+        )
     return tuple(found)

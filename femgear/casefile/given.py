@@ -7,6 +7,8 @@ import math
 from femgear.casefile.sections import Case
 from femgear.errors import GeometryError
 
+_LENGTHS = ("centre_distance", "bore_radius", "outer_radius", "tip_diameter", "root_diameter")
+
 
 def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
     """Let a refusal name the entries that the user gave, their values, and keys that exist.
@@ -26,6 +28,8 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
     if error.code == "E-ASSEMBLY":
         _assembly(error, case)
     _shift_left_out(error, case)
+    if isinstance(error.value, float) and (error.key or "").rpartition(".")[2] in _LENGTHS:
+        error.value = f"{1e3 * error.value:.6g} mm"
     error.file = case.location(error.key or "")
 
 
@@ -65,10 +69,15 @@ def notices(data: dict) -> tuple[str, ...]:
     data : dict
         Tables of a case file that was checked.
     """
-    teeth = data["ring"]["teeth"]
-    if teeth > 0:
-        return ()
-    return (
-        f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
-        "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)",
-    )
+    found = []
+    if (teeth := data["ring"]["teeth"]) < 0:
+        found.append(
+            f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
+            "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
+        )
+    if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
+        found.append(
+            'planet.bearing_clearance has no effect while static.members is "fixed": write '
+            'static.members = "elastic"'
+        )
+    return tuple(found)

@@ -117,6 +117,7 @@ class PlanetSection(_Section):
     mass: Mass
     inertia: Inertia
     bearing_stiffness: Stiffness
+    bearing_clearance: Quantity(LENGTH, 0.0, 0.002) = 0.0
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
@@ -196,6 +197,7 @@ class StaticSection(_Section):
     flank_elements: Count(4, 200) = 24
     members: Literal["fixed", "elastic"] = "fixed"
     back_flanks: StrictBool = False
+    stresses: StrictBool = False
     longest_record: Count(1, 4096) = 256
     depth: Quantity(LENGTH, 1e-6, 0.1) | None = None
 
@@ -301,6 +303,7 @@ def _check_operation(case: Case):
             key="operation.fixed",
             value=operation.fixed,
             limit="one member driven, another held, the third is the output",
+            remedy="drive the sun and hold the ring, or name two other members",
         )
     if len(set(operation.speeds)) < len(operation.speeds):
         yield CaseError("a speed is given twice", code="E-DUPLICATE", key="operation.speeds")
@@ -319,6 +322,7 @@ def _check_operation(case: Case):
             key="ring.foundation_tangential",
             value="0 N/m^3",
             limit="above 0 N/m^3",
+            remedy="give a tangential foundation, or hold another member",
         )
 
 
@@ -329,7 +333,9 @@ def _check_set(case: Case):
             f"{len(angles)} angles for {count} planets",
             code="E-COUNT",
             key="set.planet_angles",
+            value=len(angles),
             limit=f"{count} angles",
+            remedy="give one angle a planet, or leave planet_angles out for equal spacing",
         )
     if (
         case.set.centre_distance is None

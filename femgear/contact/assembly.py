@@ -11,6 +11,7 @@ from femgear.contact.candidates import FlankPair, Windows, flank_pair, window_po
 from femgear.contact.flank_sides import BACK, DRIVE, flank_side, side_teeth
 from femgear.contact.flanks import LEFT, RIGHT, FlankCompliance, station_weights
 from femgear.contact.halfplane import hertz_line, surface_displacement
+from femgear.contact.separations import pair_separations, profile_form
 
 if TYPE_CHECKING:
     from femgear.contact.supports import MovingMembers
@@ -58,6 +59,10 @@ class MeshWindows:
         Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh.
     cell_area : (2N,) array
         Area of a pressure cell [m^2].
+    cell : (2N,) array
+        Its width along the profile [m].
+    centre : array
+        From the point on the path of contact to the middle of the window, along flank 1 [m].
     """
 
     n_planets: int
@@ -73,6 +78,8 @@ class MeshWindows:
     turns: np.ndarray
     local: np.ndarray
     cell_area: np.ndarray
+    cell: np.ndarray
+    centre: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -153,6 +160,7 @@ def mesh_windows(
     nearest: float,
     contact: str,
     periods: int = 1,
+    first: int = 0,
     deviations: SetDeviations | None = None,
     planet_gaps=None,
     both_flanks: bool = False,
@@ -174,6 +182,8 @@ def mesh_windows(
     contact : {"profile", "line_of_action"}
     periods : int
         Number of mesh periods.
+    first : int
+        Number of the first position, zero being where "sun-planet 1" touches at its pitch point.
     deviations : SetDeviations, optional
     planet_gaps : (N,) array, optional
         Extra separation of the sun-side flanks of each planet [m].
@@ -182,7 +192,7 @@ def mesh_windows(
     """
     pitch = planetary_set.sun.base_pitch
     pairs = mesh_pairs(planetary_set)
-    tau = np.arange(positions * periods) / positions
+    tau = (first + np.arange(positions * periods)) / positions
     turns = np.floor(tau).astype(int)
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
@@ -195,11 +205,11 @@ def mesh_windows(
         passed = direction * (tau - turns)
         zeta = pitch * (passed[None, :, None] + side.phase[:, None, None] + index[:, None, :])
         tooth = side_teeth(planetary_set, index, direction)
-        shift = _pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
+        shift = pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
         shift += side.clearance[:, None, None]
         if direction > 0 and planet_gaps is not None:
             shift[: planetary_set.n_planets] += np.asarray(planet_gaps, float)[:, None, None]
-        form = [_profile_form(planetary_set, deviations, kind, direction < 0) for kind in (0, 1)]
+        form = [profile_form(planetary_set, deviations, kind, direction < 0) for kind in (0, 1)]
         found += _side_windows(
             planetary_set, bodies, pairs, zeta, shift, form, share, cells, nearest, contact
         )
@@ -228,37 +238,6 @@ def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells,
             )
         )
     return found
-
-
-def _profile_form(planetary_set, deviations, kind, back):
-    """Separation by deviations of the profiles as a function of both roll lengths, or None."""
-    # on the back side a planet meets sun and ring with its other flanks
-    planet = "planet_sun_side" if (kind == 0) != back else "planet_ring_side"
-    forms = (planet, "ring" if kind else "sun")
-    if deviations is None or not any(getattr(deviations, name).modifications for name in forms):
-        return None
-    from femgear.gears.deviations import profile_separation
-
-    return lambda roll_1, roll_2: profile_separation(
-        deviations, planetary_set, kind, roll_1, roll_2, back=back
-    )
-
-
-def _pair_separations(planetary_set, deviations, tooth, turns, tau, *, back) -> np.ndarray:
-    """Separations of whole tooth pairs by errors of pitch and position, shape (2N, P, pairs) [m]."""
-    N = planetary_set.n_planets
-    shift = np.zeros((2 * N, len(tau), tooth[0].shape[1]))
-    if deviations is not None:
-        from femgear.gears.deviations import body_separation, tooth_separation
-
-        shift += body_separation(deviations, planetary_set, tau, back=back)[:, :, None]
-        for mesh in range(2 * N):
-            # with every mesh period the sun's teeth move on by one, those of planets and ring back
-            sign = -1 if mesh < N else 1
-            first = tooth[0][mesh][None, :] + sign * turns[:, None]
-            second = tooth[1][mesh][None, :] + turns[:, None]
-            shift[mesh] += tooth_separation(deviations, mesh, first, second, back=back)
-    return shift
 
 
 def local_compliance(cell: float, cells: int, bodies: Bodies) -> np.ndarray:
@@ -301,6 +280,8 @@ def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows
         turns=turns,
         local=np.stack([local_compliance(w.cell, cells, bodies) for w in found[:2]]),
         cell_area=np.repeat([w.cell * bodies.face_width for w in found], N),
+        cell=np.repeat([w.cell for w in found], N),
+        centre=join("centre"),
     )
 
 

@@ -167,6 +167,8 @@ class Windows:
         Whether the pair comes near enough to be a candidate.
     start : (...,) array
         Arc length on flank 1 of the first cell edge [m].
+    centre : (...,) array
+        Arc length from the point on the path of contact to the middle of the window [m].
     cell : float
         Width of a cell [m].
     gap : (..., cells) array
@@ -180,6 +182,7 @@ class Windows:
     zeta: np.ndarray
     near: np.ndarray
     start: np.ndarray
+    centre: np.ndarray
     cell: float
     gap: np.ndarray
     roll_1: np.ndarray
@@ -254,6 +257,7 @@ def windows(
         zeta=zeta,
         near=near,
         start=start,
+        centre=start + 0.5 * width - nominal,
         cell=cell,
         gap=gap,
         roll_1=roll_1,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,9 @@ from femgear.contact.assembly import (
     mesh_windows,
     rotation_approach,
 )
-from femgear.contact.solve import solve_contact, tangent_stiffness
+from femgear.contact.bearings import BearingSprings, bearing_springs, pin_forces, solve_position
+from femgear.contact.record import MeshCycle, cycle_without_load
+from femgear.contact.solve import tangent_stiffness
 from femgear.contact.supports import RIGID, MovingMembers, Supports, moving_members
 from femgear.errors import ContactError
 
@@ -24,102 +26,12 @@ if TYPE_CHECKING:
     from femgear.gears import PlanetarySet
     from femgear.gears.deviations import SetDeviations
 
+__all__ = ["MeshCycle", "walk_mesh_cycle"]
 
-@dataclass(frozen=True)
-class MeshCycle:
-    """Static solution over one mesh period or several; meshes in the order sun-planet 1..N, planet 1..N-ring.
-
-    Parameters
-    ----------
-    position : (P,) array
-        In mesh periods.
-    deflection : (2N, P) array
-        Static transmission error of every mesh along its line of action: the approach of the flanks
-        by the motions of their gears, deviations included [m].
-    sun_arc : (P,) array
-        Rotation of the sun behind the unloaded, exact set, as an arc on its base circle [m].
-    force : (2N, P) array
-        Force on the drive flanks of the mesh, torque over base radius [N].
-    back_force : (2N, P) array
-        Force on its back flanks [N]; zero where they were not looked at.
-    stiffness : (2N, P) array
-        Tangent mesh stiffness dF/d delta at constant loads of the other meshes [N/m].
-    tooth_load : (2N, T, P) array
-        Load of each simultaneous tooth pair, in the order of the path coordinate [N].
-    path : (2N, T, P) array
-        Path coordinate of each tooth pair, from the pitch point in the direction of motion [m].
-    tooth : (2, 2N, T) int array
-        Tooth numbers of the pairs on gear 1 and gear 2 in the first mesh period, see `tooth_zero_angles`.
-    max_pressure : (2N, P) array
-        Largest pressure of the contacts that do not reach the end of a flank [Pa]: under a sharp edge the
-        pressure has no limit, it grows with every halving of the cells.
-    edge_contact : (2N, P) bool array
-        Whether a contact of the mesh reaches a tip corner or the start of the involute.
-    open_planets : (N, P) bool array
-        Planets that carry nothing.
-    residual : (P,) array
-        Largest relative violation of the contact conditions and of equilibrium.
-    iterations : (P,) int array
-    member_motion : (m, P) array
-        Displacement of the axes of floating or sprung members [m], named by `member_names`.
-    member_names : tuple of str
-        Such as ``"sun: x"``.
-    periods : int
-        Mesh periods in the record.
-    contact : str
-        ``"profile"`` or ``"line_of_action"``.
-    unknowns : int
-        Largest number of pressure cells at one position.
-    message : str
-    """
-
-    position: np.ndarray
-    deflection: np.ndarray
-    sun_arc: np.ndarray
-    force: np.ndarray
-    back_force: np.ndarray
-    stiffness: np.ndarray
-    tooth_load: np.ndarray
-    path: np.ndarray
-    tooth: np.ndarray
-    max_pressure: np.ndarray
-    edge_contact: np.ndarray
-    open_planets: np.ndarray
-    residual: np.ndarray
-    iterations: np.ndarray
-    member_motion: np.ndarray
-    member_names: tuple[str, ...]
-    periods: int
-    contact: str
-    unknowns: int
-    message: str
-
-    @property
-    def overall_deflection(self) -> np.ndarray:
-        """Transmission error from sun to ring over every planet, shape (N, P) [m].
-
-        With fixed centres the sum of the two mesh deflections; moving members add their part.
-        """
-        return np.broadcast_to(self.sun_arc, (len(self.deflection) // 2, len(self.sun_arc)))
-
-    @property
-    def secant_stiffness(self) -> np.ndarray:
-        """Force over deflection, zero where a mesh carries nothing, shape (2N, P) [N/m]."""
-        loaded = (self.force > 0) & (self.deflection > 0)
-        return np.divide(self.force, self.deflection, out=np.zeros_like(self.force), where=loaded)
-
-    @property
-    def load_share(self) -> np.ndarray:
-        """Share of every planet in the sun's torque, shape (N, P); zero without load."""
-        n = len(self.force) // 2
-        carried = self.force[:n] - self.back_force[:n]
-        total = carried.sum(axis=0)
-        return np.divide(carried, total, out=np.zeros((n, len(total))), where=total > 0)
-
-    @property
-    def wedged(self) -> np.ndarray:
-        """Meshes that are loaded on both flanks at once, shape (2N, P)."""
-        return (self.force > 0) & (self.back_force > 0)
+ROUGH_STIFFNESS = 10e9
+"""Stiffness of a mesh per face width, to size windows [N/m^2]."""
+HELD = 2.56
+"""A window is 3.2 half widths wide: it holds the contact of this many times the force that sized it."""
 
 
 def walk_mesh_cycle(
@@ -135,6 +47,8 @@ def walk_mesh_cycle(
     periods: int = 1,
     planet_gaps=None,
     both_flanks: bool = False,
+    pressures: bool = False,
+    first_position: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> MeshCycle:
     """Static transmission error, load sharing and mesh stiffness over the mesh cycle.
@@ -166,7 +80,12 @@ def walk_mesh_cycle(
     planet_gaps : (N,) array, optional
         Extra separation of the sun-side flanks of each planet [m].
     both_flanks : bool
-        Look for contact on the back flanks as well.
+        Look for contact on the back flanks as well. Without torque, only these can be loaded: both flanks
+        of teeth that are wedged.
+    pressures : bool
+        Keep the pressure distributions of the drive flanks.
+    first_position : int
+        Number of the first position; negative ones lie before the pitch point of "sun-planet 1".
     progress : callable, optional
         Called with (positions done, positions).
 
@@ -180,11 +99,18 @@ def walk_mesh_cycle(
         When the contact problem cannot be solved or no window size contains the contact.
     """
     N = planetary_set.n_planets
-    if not sun_torque > 0:
-        return _unloaded(N, positions * periods, periods, contact)
+    position = (first_position + np.arange(positions * periods)) / positions
+    nothing = cycle_without_load(
+        N, position, periods=periods, contact=contact, cells=cells, pressures=pressures
+    )
+    if not (sun_torque > 0 or both_flanks):
+        return nothing
     members = moving_members(planetary_set, supports, both_flanks=both_flanks)
-    share = sun_torque / (planetary_set.sun.base_radius * N)
-    enlarge, nearest = 1.0, 3.0 * share / (10e9 * planetary_set.sun.face_width)
+    springs = bearing_springs(planetary_set, supports, members)
+    width = bodies.face_width
+    # without torque the windows begin with what one micrometre of wedging may carry
+    share = sun_torque / (planetary_set.sun.base_radius * N) or 1e-6 * ROUGH_STIFFNESS * width
+    enlarge, nearest = 1.0, 3.0 * share / (ROUGH_STIFFNESS * width)
     for _ in range(8):
         setup = mesh_windows(
             planetary_set,
@@ -195,16 +121,20 @@ def walk_mesh_cycle(
             nearest=nearest,
             contact=contact,
             periods=periods,
+            first=first_position,
             deviations=deviations,
             planet_gaps=planet_gaps,
             both_flanks=both_flanks,
         )
-        cycle, overflow, missed = _walk(
-            planetary_set, bodies, setup, sun_torque, members, contact, periods, progress
+        found, overflow, missed = _walk(
+            planetary_set, bodies, setup, sun_torque, members, springs, pressures, progress
         )
+        missed = missed if contact == "profile" else 0.0
         if not overflow and missed <= nearest:
-            return cycle
-        enlarge *= 2.0 if overflow else 1.0
+            cycle = replace(nothing, **found)
+            return cycle if cycle.force.any() else nothing
+        if overflow:
+            enlarge = _enlarged(enlarge, share, max(found["force"].max(), found["back_force"].max()))
         nearest = max(nearest, 1.2 * missed)
     raise ContactError(
         "the contact windows do not contain the contact after seven enlargements",
@@ -213,80 +143,96 @@ def walk_mesh_cycle(
     )
 
 
-def _unloaded(N: int, positions: int, periods: int, contact: str) -> MeshCycle:
-    """The defined result without load: nothing touches, nothing is stiff."""
-    zero = np.zeros((2 * N, positions))
-    return MeshCycle(
-        position=np.arange(positions) * periods / positions,
-        deflection=zero,
-        sun_arc=np.zeros(positions),
-        force=zero,
-        back_force=zero,
-        stiffness=zero,
-        tooth_load=np.zeros((2 * N, 1, positions)),
-        path=np.zeros((2 * N, 1, positions)),
-        tooth=np.zeros((2, 2 * N, 1), int),
-        max_pressure=zero,
-        edge_contact=np.zeros((2 * N, positions), bool),
-        open_planets=np.ones((N, positions), bool),
-        residual=np.zeros(positions),
-        iterations=np.zeros(positions, int),
-        member_motion=np.zeros((0, positions)),
-        member_names=(),
-        periods=periods,
-        contact=contact,
-        unknowns=0,
-        message="no torque: no tooth carries load and the mesh stiffness is zero",
-    )
+def _enlarged(enlarge: float, share: float, force: float) -> float:
+    """Twice the window width, and twice again until windows sized by `share` hold the largest force."""
+    enlarge *= 2.0
+    while share * enlarge**2 < force / HELD:
+        enlarge *= 2.0
+    return enlarge
 
 
-def _walk(planetary_set, bodies, setup: MeshWindows, sun_torque, members, contact, periods, progress):
-    """All positions with one set of windows; also whether a contact ran into the end of its window."""
+def _walk(
+    planetary_set, bodies, setup: MeshWindows, sun_torque, members, springs, pressures, progress
+) -> tuple[dict, bool, float]:
+    """All positions with one set of windows, as fields of `MeshCycle`.
+
+    Also whether a contact ran into the end of its window, and the `nearest` that would have held all pairs.
+    """
     N, P = planetary_set.n_planets, setup.positions
     load = np.zeros(N + 1 + int(members.free.sum()))
     load[N] = sun_torque / planetary_set.sun.base_radius
-    out = {name: np.zeros((2 * N, P)) for name in ("deflection", "force", "back_force", "stiffness")}
-    meshes = setup.near.shape[0]
-    out["max_pressure"], out["edge_contact"] = np.zeros((meshes, P)), np.zeros((meshes, P), bool)
-    out["tooth_load"] = np.zeros((meshes, setup.pairs, P))
-    out["member_motion"] = np.zeros((len(members.names), P))
-    out["sun_arc"] = np.zeros(P)
-    residual, iterations = np.zeros(P), np.zeros(P, int)
-    previous, unknowns, overflow, missed = None, 0, False, 0.0
+    out = _empty_record(setup, members, pressures)
+    previous, overflow, missed = None, False, 0.0
     for p in range(P):
         problem = assemble_contact(setup, bodies, p, members)
-        start = None if previous is None else problem.warm_start(*previous)
-        state = solve_contact(problem.compliance, problem.gap, problem.G, load, start=start)
-        previous = (problem, state.active)
+        start = None if previous is None else _warm_start(problem, *previous)
+        state, active = solve_position(problem, springs, load, start=start)
+        previous = (problem, active)
         _collect(problem, state, setup, members, out, p)
-        residual[p], iterations[p] = state.residual, state.iterations
-        unknowns = max(unknowns, len(problem.gap))
+        out["unknowns"] = max(out["unknowns"], len(problem.gap))
         overflow |= problem.touches_window_end(state.active, setup)
-        missed = max(missed, _penetrated_outsider(setup, p, out["deflection"][:, p], contact))
+        missed = max(missed, _penetrated_outsider(setup, p, out["deflection"][:, p]))
         if progress is not None:
             progress(p + 1, P)
-    open_planets = out["force"][:N] + out["back_force"][:N] <= 0.0
-    wedged = (out["force"] > 0) & (out["back_force"] > 0)
+    return _finished(planetary_set, setup, springs, out), overflow, missed
+
+
+def _warm_start(problem: ContactProblem, previous: ContactProblem, active) -> np.ndarray:
+    """Cells that touched at the previous position, and the same springs of the bearings."""
+    cells = len(previous.gap)
+    return np.concatenate([problem.warm_start(previous, active[:cells]), active[cells:]])
+
+
+def _empty_record(setup: MeshWindows, members: MovingMembers, pressures: bool) -> dict:
+    """Arrays that `_collect` fills; those of teeth and cells lead with all meshes, back sides included."""
+    N, P, meshes = setup.n_planets, setup.positions, setup.near.shape[0]
+    out = {name: np.zeros((2 * N, P)) for name in ("deflection", "force", "back_force", "stiffness")}
+    out |= {
+        "max_pressure": np.zeros((meshes, P)),
+        "edge_contact": np.zeros((meshes, P), bool),
+        "tooth_load": np.zeros((meshes, setup.pairs, P)),
+        "member_motion": np.zeros((len(members.names), P)),
+        "sun_arc": np.zeros(P),
+        "residual": np.zeros(P),
+        "iterations": np.zeros(P, int),
+        "member_names": members.names,
+        "unknowns": 0,
+    }
+    if pressures:
+        out["pressure"] = np.zeros((2 * N, setup.pairs, setup.gap.shape[-1], P))
+    return out
+
+
+def _finished(planetary_set, setup: MeshWindows, springs: BearingSprings | None, out: dict) -> dict:
+    """The record with what follows from it: sides of the teeth apart, pins, messages."""
+    N = setup.n_planets
+    drive, back = slice(0, 2 * N), slice(2 * N, 4 * N)
+    load, path, tooth = out.pop("tooth_load"), np.moveaxis(setup.zeta, 2, 1), np.stack(setup.tooth)
+    for name in ("max_pressure", "edge_contact"):
+        out[name] = out[name][drive]
+    out |= {"tooth_load": load[drive], "path": path[drive], "tooth": tooth[:, drive]}
+    looked = len(load) > 2 * N
+    out |= {
+        "back_tooth_load": load[back] if looked else np.zeros_like(load),
+        "back_path": path[back] if looked else np.zeros_like(path),
+        "back_tooth": tooth[:, back] if looked else np.zeros_like(tooth),
+    }
+    if "pressure" in out:
+        cells = setup.gap.shape[-1]
+        out["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]
+        out["pressure_centre"] = np.moveaxis(setup.centre[drive], 2, 1)
+    out["bearing_force"] = pin_forces(planetary_set, out["force"], out["back_force"])
+    out["open_planets"] = out["force"][:N] + out["back_force"][:N] <= 0.0
     message = "all positions by the active set"
-    message += "; some planets lose all load" if open_planets.any() else ""
-    message += "; some teeth are wedged between both flanks" if wedged.any() else ""
-    for name in ("tooth_load", "max_pressure", "edge_contact"):
-        out[name] = out[name][: 2 * N]
-    cycle = MeshCycle(
-        position=np.arange(P) * periods / P,
-        path=np.moveaxis(setup.zeta[: 2 * N], 2, 1),
-        tooth=np.stack(setup.tooth)[:, : 2 * N],
-        open_planets=open_planets,
-        residual=residual,
-        iterations=iterations,
-        member_names=members.names,
-        periods=periods,
-        contact=contact,
-        unknowns=unknowns,
-        message=message,
-        **out,
-    )
-    return cycle, overflow, missed
+    if out["open_planets"].any():
+        message += "; some planets lose all load"
+        message += ", their places within the clearance of their bearings are not determined" * bool(springs)
+    wedged = (out["force"] > 0) & (out["back_force"] > 0)
+    if wedged.any():
+        message += "; some teeth are wedged between both flanks"
+    if (out["back_force"][~wedged] > 0).any():
+        message += "; some meshes carry on their back flanks alone"
+    return out | {"message": message}
 
 
 def _collect(problem: ContactProblem, state, setup: MeshWindows, members: MovingMembers, out, p):
@@ -297,6 +243,7 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     out["force"][:, p] = force[: 2 * N]
     out["back_force"][: meshes - 2 * N, p] = force[2 * N :]
     out["sun_arc"][p] = state.motions[N]
+    out["residual"][p], out["iterations"][p] = state.residual, state.iterations
     # sprung members yield under the mesh forces, free ones are unknowns of the problem
     motion = np.zeros(len(members.names))
     motion[members.free] = state.motions[N + 1 :]
@@ -310,14 +257,16 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     np.add.at(out["tooth_load"][:, :, p], (problem.mesh, problem.pair), loads)
     at_edge = problem.at_flank_end(state.active, setup)
     np.logical_or.at(out["edge_contact"][:, p], problem.mesh, at_edge)
-    pressure = np.where(at_edge, 0.0, loads / setup.cell_area[problem.mesh])
-    np.maximum.at(out["max_pressure"][:, p], problem.mesh, pressure)
+    pressure = loads / setup.cell_area[problem.mesh]
+    np.maximum.at(out["max_pressure"][:, p], problem.mesh, np.where(at_edge, 0.0, pressure))
+    if "pressure" in out:
+        drive = problem.mesh < 2 * N
+        place = problem.mesh[drive], problem.pair[drive], problem.cell[drive], p
+        out["pressure"][place] = pressure[drive]
 
 
-def _penetrated_outsider(setup: MeshWindows, p, deflection, contact) -> float:
+def _penetrated_outsider(setup: MeshWindows, p, deflection) -> float:
     """Separation from the nearest pair within which no omitted pair penetrates [m]; zero if none does."""
-    if contact == "line_of_action":
-        return 0.0
     gap = setup.smallest_gap[:, p]
     # a back flank approaches when its drive flank parts
     deflection = np.concatenate([deflection, -deflection])[: len(gap)]

@@ -75,7 +75,7 @@ def deformed_set(
 
 
 def _displacement(planetary_set, sector: Sector, cycle, position, acting):
-    """Displacement of one body; `acting` lists (mesh, gear of the pair, flank side) of its meshes."""
+    """Displacement of one body; `acting` lists (mesh, gear of the pair, drive flank) of its meshes."""
     from femgear.fe.compliance import mirror_nodes, mirrored_columns
     from femgear.fe.field import cyclic_displacement
 
@@ -84,16 +84,22 @@ def _displacement(planetary_set, sector: Sector, cycle, position, acting):
     columns = (left, mirrored_columns(left, mirror_nodes(sector.grid)))
     loads = np.zeros((sector.gear.teeth, left.shape[0]))
     pairs = mesh_pairs(planetary_set)
-    N = planetary_set.n_planets
-    for mesh, gear, side in acting:
+    N, turns = planetary_set.n_planets, int(np.floor(cycle.position[position]))
+    sides = (
+        (cycle.tooth, cycle.path, cycle.tooth_load, columns),
+        (cycle.back_tooth, cycle.back_path, cycle.back_tooth_load, columns[::-1]),
+    )
+    for mesh, gear, drive in acting:
         pair = pairs[mesh >= N]
-        for t, load in enumerate(cycle.tooth_load[mesh, :, position]):
-            if load <= 0.0:
-                continue
-            zeta = np.clip(cycle.path[mesh, t, position], *pair.path)
-            roll = pair.pitch_roll_1 + zeta if gear == 0 else pair.pitch_roll_2 - pair.sign * zeta
-            tooth = cycle.tooth[gear, mesh, t] % sector.gear.teeth
-            loads[tooth] += load * (columns[side] @ _hat(roll, stations.roll))
+        # with every mesh period the sun's teeth move on by one, those of planets and ring back
+        moved_on = -1 if mesh < N and gear == 0 else 1
+        for tooth, path, tooth_load, flanks in sides:
+            for t in np.flatnonzero(tooth_load[mesh, :, position] > 0.0):
+                zeta = np.clip(path[mesh, t, position], *pair.path)
+                roll = pair.pitch_roll_1 + zeta if gear == 0 else pair.pitch_roll_2 - pair.sign * zeta
+                number = (tooth[gear, mesh, t] + moved_on * turns) % sector.gear.teeth
+                force = tooth_load[mesh, t, position]
+                loads[number] += force * (flanks[drive] @ _hat(roll, stations.roll))
     return cyclic_displacement(sector.grid, sector.stiffness, loads, held="rim")
 
 

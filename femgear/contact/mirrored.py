@@ -26,12 +26,15 @@ def walk_either_flank(
     periods=1,
     planet_gaps=None,
     both_flanks=False,
+    pressures=False,
     progress=None,
 ) -> MeshCycle:
     """`walk_mesh_cycle` for a torque of either sign; results keep the order of planets and positions.
 
     For a negative torque the right flanks of the sun carry. Position zero is then where the right flanks of
-    "sun-planet 1" touch at the pitch point, and positions still run with the rotation of the sun.
+    "sun-planet 1" touch at the pitch point, and positions still run with the rotation of the sun. The
+    mirror image turns the other way: its record ends at position zero, so that records which do not close
+    hold the same configurations too.
     """
     options = {
         "positions": positions,
@@ -39,6 +42,7 @@ def walk_either_flank(
         "supports": supports,
         "periods": periods,
         "both_flanks": both_flanks,
+        "pressures": pressures,
         "progress": progress,
     }
     if sun_torque >= 0:
@@ -60,6 +64,7 @@ def walk_either_flank(
         sun_torque=-sun_torque,
         deviations=deviations,
         planet_gaps=turned,
+        first_position=1 - positions * periods,
         **options,
     )
     return _seen_from_front(cycle, planetary_set, order)
@@ -67,35 +72,39 @@ def walk_either_flank(
 
 def _seen_from_front(cycle: MeshCycle, planetary_set, order) -> MeshCycle:
     """Results of the mirror image in the order of planets and positions of the original."""
-    N, P = len(order), len(cycle.position)
-    back = np.empty(N, int)
-    back[order] = np.arange(N)
-    mesh, position = np.concatenate([back, back + N]), -np.arange(P) % P
+    planet = np.argsort(order)
+    mesh, axis = np.concatenate([planet, planet + len(order)]), planetary_set.planet_angles[0]
+    by_mesh = ("deflection", "force", "back_force", "stiffness", "max_pressure", "edge_contact")
+    found = {name: getattr(cycle, name)[mesh][:, ::-1] for name in by_mesh}
+    found |= {name: getattr(cycle, name)[::-1] for name in ("sun_arc", "residual", "iterations")}
+    # the pair that comes first along the path leaves first when the rotation is seen from behind
+    for side in ("", "back_"):
+        found[f"{side}tooth_load"] = getattr(cycle, f"{side}tooth_load")[mesh][:, ::-1, ::-1]
+        found[f"{side}path"] = -getattr(cycle, f"{side}path")[mesh][:, ::-1, ::-1]
+        found[f"{side}tooth"] = -getattr(cycle, f"{side}tooth")[:, mesh][:, :, ::-1]
+    if cycle.pressure is not None:
+        found["pressure"] = cycle.pressure[mesh][:, ::-1, ::-1, ::-1]
+        found["pressure_offset"] = -cycle.pressure_offset[mesh][:, ::-1]
+        found["pressure_centre"] = -cycle.pressure_centre[mesh][:, ::-1, ::-1]
     return replace(
         cycle,
-        deflection=cycle.deflection[mesh][:, position],
-        sun_arc=cycle.sun_arc[position],
-        force=cycle.force[mesh][:, position],
-        back_force=cycle.back_force[mesh][:, position],
-        stiffness=cycle.stiffness[mesh][:, position],
-        # the pair that comes first along the path leaves first when the rotation is seen from behind
-        tooth_load=cycle.tooth_load[mesh][:, ::-1][:, :, position],
-        path=-cycle.path[mesh][:, ::-1][:, :, position],
-        tooth=-cycle.tooth[:, mesh][:, :, ::-1],
-        max_pressure=cycle.max_pressure[mesh][:, position],
-        edge_contact=cycle.edge_contact[mesh][:, position],
-        open_planets=cycle.open_planets[back][:, position],
-        residual=cycle.residual[position],
-        iterations=cycle.iterations[position],
-        member_motion=_reflected_motion(cycle, planetary_set.planet_angles[0], back)[:, position],
+        position=np.abs(cycle.position[::-1]),
+        open_planets=cycle.open_planets[planet][:, ::-1],
+        bearing_force=_reflected(cycle.bearing_force, axis)[planet][:, :, ::-1],
+        member_motion=_reflected_motion(cycle, axis, planet)[:, ::-1],
+        **found,
     )
+
+
+def _reflected(vectors: np.ndarray, axis: float) -> np.ndarray:
+    """Vectors (m, 2, P) reflected in the line at the angle `axis`."""
+    c, s = np.cos(2 * axis), np.sin(2 * axis)
+    return np.einsum("ij,mjp->mip", np.array([[c, s], [s, -c]]), vectors)
 
 
 def _reflected_motion(cycle: MeshCycle, axis: float, back) -> np.ndarray:
     """Motions of the members reflected in the line through the first planet, planets in their own order."""
-    vectors = cycle.member_motion.reshape(-1, 2, cycle.member_motion.shape[1])
-    c, s = np.cos(2 * axis), np.sin(2 * axis)
-    vectors = np.einsum("ij,mjp->mip", np.array([[c, s], [s, -c]]), vectors)
+    vectors = _reflected(cycle.member_motion.reshape(-1, 2, cycle.member_motion.shape[1]), axis)
     names = [name.split(":")[0] for name in cycle.member_names[::2]]
     planets = [i for i, name in enumerate(names) if name.startswith("planet")]
     if planets:

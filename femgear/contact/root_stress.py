@@ -14,7 +14,6 @@ import numpy as np
 
 from femgear.contact.assembly import mesh_pairs
 from femgear.contact.flanks import LEFT, RIGHT, flank_load_columns, flank_stations, station_weights
-from femgear.errors import ContactError
 
 if TYPE_CHECKING:
     from femgear.contact.bodies import Sectors
@@ -82,7 +81,7 @@ class RootCycle:
     path : (T, P) array
         Path coordinate of the tooth pair of each slot in base pitches, 0 at the pitch point.
     load : (T, P) array
-        [N]
+        On the drive flank [N].
     stress : (T, P, 2, m) array
         Tangential stress along the root of the loaded flank (0) and of the back flank (1) [Pa].
     arc : (m,) array
@@ -244,20 +243,9 @@ def root_stress_cycle(
     Returns
     -------
     tuple of RootCycle
-        Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on.
-
-    Raises
-    ------
-    ContactError
-        When back flanks carry load: the cycle has the loads of the teeth on the drive flanks only.
+        Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on. Loads on back flanks press on the other flank
+        of the same teeth and add to both roots.
     """
-    if cycle.back_force.any():
-        raise ContactError(
-            f"back flanks carry up to {cycle.back_force.max():.4g} N, by teeth that the record does not name",
-            code="E-ROOT-BACK",
-            limit="contact on the drive flanks only",
-            remedy="give the set more backlash",
-        )
     N = planetary_set.n_planets
     found = {}
     meshes = range(N)
@@ -266,41 +254,53 @@ def root_stress_cycle(
     bodies += [("planet", roots.planet, [(n, 1, LEFT), (N + n, 0, RIGHT)]) for n in meshes]
     bodies.append(("ring", roots.ring, [(N + j, 1, LEFT) for j in meshes]))
     for kind, root, acting in bodies:
-        loads = [_station_loads(planetary_set, root, cycle, *one, reverse) for one in acting]
-        for mesh, gear, side in acting:
-            found[mesh, gear] = _one_mesh(
-                planetary_set, kind, root, cycle, (mesh, gear, side), acting, loads, reverse
-            )
+        loads = _tooth_loads(planetary_set, root, cycle, acting, reverse)
+        for target in acting:
+            found[target[:2]] = _one_mesh(planetary_set, kind, root, cycle, target, loads, reverse)
     return tuple(found[mesh, gear] for mesh in range(2 * N) for gear in (0, 1))
 
 
-def _station_loads(planetary_set, root: RootStress, cycle, mesh, gear, side, reverse) -> np.ndarray:
-    """Forces at the stations of both flanks of every loaded tooth, shape (T, 2 n, P) [N]."""
-    pair = mesh_pairs(planetary_set)[int(mesh >= planetary_set.n_planets)]
-    zeta = np.clip(-cycle.path[mesh] if reverse else cycle.path[mesh], *pair.path)
-    roll = pair.pitch_roll_1 + zeta if gear == 0 else pair.pitch_roll_2 - pair.sign * zeta
+def _tooth_loads(planetary_set, root: RootStress, cycle, acting, reverse) -> list:
+    """Loaded teeth of one body, each with its forces at the stations of both flanks (2 n, P) [N].
+
+    `acting` lists (mesh, gear of the pair, drive flank) of its meshes; back flanks are the opposite ones.
+    """
+    sides = [(cycle.tooth, cycle.path, cycle.tooth_load, False)]
+    if cycle.back_tooth_load.any():
+        sides.append((cycle.back_tooth, cycle.back_path, cycle.back_tooth_load, True))
+    loaded = []
+    for tooth, path, load, back in sides:
+        for mesh, gear, drive in acting:
+            flank = drive if not back else RIGHT if drive == LEFT else LEFT
+            pair = mesh_pairs(planetary_set)[int(mesh >= planetary_set.n_planets)]
+            zeta = np.clip(-path[mesh] if reverse else path[mesh], *pair.path)
+            roll = pair.pitch_roll_1 + zeta if gear == 0 else pair.pitch_roll_2 - pair.sign * zeta
+            forces = _station_loads(root, roll, load[mesh], flank)
+            loaded += [one for one in zip(tooth[gear, mesh], forces, strict=True) if one[1].any()]
+    return loaded
+
+
+def _station_loads(root: RootStress, roll, load, flank) -> np.ndarray:
+    """Forces at the stations of both flanks of every tooth (T, 2 n, P) [N] under loads (T, P) at `roll`."""
     index, weight = station_weights(roll, root.roll)
     teeth, positions = roll.shape
     n = len(root.roll)
     result = np.zeros((teeth, 2 * n, positions))
     t, p = np.indices((teeth, positions))
-    values = weight * cycle.tooth_load[mesh][..., None]
-    np.add.at(result, (t[..., None], index + side * n, p[..., None]), values)
+    np.add.at(result, (t[..., None], index + flank * n, p[..., None]), weight * load[..., None])
     return result
 
 
-def _one_mesh(planetary_set, kind, root: RootStress, cycle, target, acting, loads, reverse) -> RootCycle:
-    """Stress on the teeth of one mesh (mesh, gear, side) under the loads of all meshes of the body."""
+def _one_mesh(planetary_set, kind, root: RootStress, cycle, target, loads, reverse) -> RootCycle:
+    """Stress on the teeth of one mesh (mesh, gear, side) under the loads of all teeth of the body."""
     mesh, gear, side = target
     count = len(root.influence)
     teeth = _slots(cycle.tooth[gear, mesh], kind)
     # seen from behind the teeth are counted the other way round
     sense = -1 if reverse else 1
     total = np.zeros((len(teeth), root.influence.shape[1], len(cycle.position)))
-    for (other, other_gear, _), forces in zip(acting, loads, strict=True):
-        for tooth, force in zip(cycle.tooth[other_gear, other], forces, strict=True):
-            if force.any():
-                total += root.influence[sense * (teeth - tooth) % count] @ force
+    for tooth, force in loads:
+        total += root.influence[sense * (teeth - tooth) % count] @ force
     stress = total.reshape(len(teeth), 2, -1, len(cycle.position)).transpose(0, 3, 1, 2)
     path = cycle.path[mesh] / planetary_set.sun.base_pitch
     load = np.zeros((len(teeth), len(cycle.position)))

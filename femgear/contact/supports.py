@@ -28,12 +28,21 @@ class Supports:
         Between the member and the ground.
     planet : float, optional
         Bearing between each planet and its pin on the carrier; a planet cannot float.
+    planet_clearance : float
+        Radial clearance of these bearings [m]; see `femgear.contact.bearings`.
+    planet_springs : int
+        Springs that then stand for a bearing. With 120 the force differs by less than 0.1 % from that of
+        the continuous bearing where the planet moves by 1.1 clearances or more, 0.4 % at 1.05 clearances.
+        Under lighter loads the pin rests in a corner of the polygon: its place is never off by more than
+        ``(pi/n)^2/2`` clearances, 0.04 % of them.
     """
 
     sun: float | None = None
     carrier: float | None = None
     planet: float | None = None
     ring: float | None = None
+    planet_clearance: float = 0.0
+    planet_springs: int = 120
 
     def __post_init__(self):
         for name in ("sun", "carrier", "planet", "ring"):
@@ -46,6 +55,33 @@ class Supports:
                 )
         if self.planet == 0.0:
             raise ContactError("a planet without bearing has no place", code="E-SUPPORT", limit="above 0 N/m")
+        self._check_clearance()
+
+    def _check_clearance(self):
+        clearance, springs = self.planet_clearance, self.planet_springs
+        if not (clearance >= 0 and np.isfinite(clearance)):
+            raise ContactError(
+                f"the planet bearings have a radial clearance of {clearance} m",
+                code="E-SUPPORT",
+                value=clearance,
+                limit="0 m or above",
+            )
+        if clearance and self.planet is None:
+            raise ContactError(
+                f"rigid planet bearings with a clearance of {clearance} m",
+                code="E-SUPPORT",
+                value=clearance,
+                limit="a stiffness of the planet bearings above 0 N/m where they have clearance",
+                remedy="give Supports.planet, or no clearance",
+            )
+        # even numbers are their own mirror image; four springs are the fewest with one stiffness all round
+        if springs < 4 or springs % 2:
+            raise ContactError(
+                f"{springs} springs in a planet bearing",
+                code="E-SUPPORT",
+                value=springs,
+                limit="an even number, 4 or more",
+            )
 
 
 RIGID = Supports()
@@ -122,6 +158,7 @@ def _one_side(planetary_set, supports, back):
             effect[n], effect[N + n] = -on_planet[n], on_ring[n]
             names += [f"planet {n + 1}: x", f"planet {n + 1}: y"]
             columns.append(effect)
-            stiffness += [supports.planet, supports.planet]
+            # with clearance the springs of the bearing are candidates of the contact problem instead
+            stiffness += [0.0 if supports.planet_clearance else supports.planet] * 2
     approach = np.hstack(columns) if columns else np.zeros((2 * N, 0))
     return tuple(names), approach, np.array(stiffness, float)

@@ -7,9 +7,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.bearings import bearing_springs, solve_position
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.supports import Supports
+from femgear.contact.supports import Supports, moving_members
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
 from femgear.validation.planetary import reference_set
@@ -127,3 +129,55 @@ def test_the_same_error_everywhere_changes_no_load(gears, bodies, value):
     plain = walk(gears, bodies, [(0.0, 0.0)] * 3, Supports())
     moved = walk(gears, bodies, [value] * 3, Supports())
     assert moved.force == pytest.approx(plain.force, rel=1e-6)
+
+
+LOOSE = Supports(sun=5e7, planet=3e8, planet_clearance=15e-6)
+
+
+def solved(gears, bodies, values, held, position, torque, gaps):
+    """Loads [N] and motions [nm] at one of two positions, and the cells and springs that carry.
+
+    The windows do not depend on the torque.
+    """
+    members = moving_members(gears, held)
+    setup = mesh_windows(
+        gears,
+        bodies,
+        share=TORQUE / gears.sun.base_radius / 2,
+        positions=2,
+        cells=36,
+        nearest=40e-6,
+        contact="profile",
+        deviations=errors_of(gears, values),
+        planet_gaps=gaps,
+    )
+    problem = assemble_contact(setup, bodies, position, members)
+    load = np.zeros(problem.G.shape[1])
+    load[3] = torque / gears.sun.base_radius
+    state, active = solve_position(problem, bearing_springs(gears, held, members), load)
+    return np.concatenate([state.loads, 1e9 * state.motions]), active
+
+
+@few
+@given(
+    pins,
+    st.sampled_from([Supports(), Supports(sun=0.0), Supports(sun=5e7, carrier=2e8, planet=3e8), LOOSE]),
+    st.integers(0, 1),
+    st.floats(0.1, 1.0),
+    st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
+)
+def test_changes_superpose_while_the_same_cells_touch(gears, bodies, values, held, position, turn, shift):
+    """Loads and motions are affine in the torque and in the gaps of the planets."""
+    for size in (1e-2, 1e-3, 1e-4, 1e-5):
+        torques = TORQUE * np.array([1.0, 1.0 + size * turn, 1.0, 1.0 + size * turn, 1.0 + 2 * size * turn])
+        gaps = 1e-6 * size * np.array(shift) * np.array([0.0, 0.0, 1.0, 1.0, 2.0])[:, None]
+        found = [solved(gears, bodies, values, held, position, *one) for one in zip(torques, gaps)]
+        if all(np.array_equal(active, found[0][1]) for _, active in found):
+            break
+    else:
+        pytest.fail("the active set changes with every small change")
+    start, turned, moved, both, twice = (solution for solution, _ in found)
+    rounding = 1e-6 * np.abs(both - start).max() + 1e-11 * np.abs(start).max()
+    assert np.abs((turned - start) + (moved - start) - (both - start)).max() < rounding
+    assert np.abs(twice - start - 2 * (both - start)).max() < rounding
+    assert np.abs(both - start).max() > 100 * rounding
