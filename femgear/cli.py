@@ -134,7 +134,7 @@ def run(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    only: Literal["static", "modes", "dynamics", "housing"] | None = None,
+    only: Literal["static", "stress", "modes", "dynamics", "housing"] | None = None,
     pictures: bool = True,
     force: bool = False,
 ) -> int:
@@ -147,7 +147,7 @@ def run(
     output
         Folder of the results.
     only
-        Compute this stage and what it needs, no further.
+        Compute this stage and what it needs, no further; "stress" whatever static.stresses says.
     pictures
         Draw figures, fields and report.
     force

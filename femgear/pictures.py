@@ -35,7 +35,7 @@ def write_figures(
     folder : path
     gears : PlanetarySet
     data : dict of str to Dataset
-        Contents of static.nc, modes.nc, dynamics.nc and housing.nc, as far as computed.
+        Contents of static.nc, stress.nc, modes.nc, dynamics.nc and housing.nc, as far as computed.
     deviations : SetDeviations, optional
         Charted when they are not zero.
 
@@ -52,6 +52,8 @@ def write_figures(
         figures["mesh_stiffness"] = plots.mesh_stiffness(static, face_width=gears.sun.face_width)
         figures["load_sharing"] = plots.load_sharing(static)
         figures["tooth_loads"] = plots.tooth_loads(static)
+    if (stress := data.get("stress")) is not None:
+        figures |= _stress_figures(stress)
     if (modes := data.get("modes")) is not None:
         figures["mode_shapes"] = plots.mode_shapes(modes, gears)
         figures["natural_frequencies"] = plots.natural_frequencies(modes)
@@ -76,6 +78,22 @@ def write_figures(
     for name, figure in figures.items():
         plots.save_figure(figure, folder / f"{name}.png")
     return [f"{name}.png" for name in figures]
+
+
+def _stress_figures(stress: xr.Dataset) -> dict:
+    """Figures of stress.nc; distributions and turns are not in records of several mesh periods."""
+    from femgear.plots import stress as plots
+
+    figures = {
+        "root_stress": plots.root_stress_history(stress),
+        "root_profile": plots.root_stress_profile(stress),
+        "load_spectrum": plots.load_spectrum(stress),
+    }
+    if "pressure_distribution" in stress:
+        figures["contact_pressure"] = plots.contact_pressure(stress)
+    if "planet_root_stress" in stress:
+        figures["planet_bending"] = plots.planet_bending(stress)
+    return figures
 
 
 def shown_speeds(data: xr.Dataset) -> list[int]:

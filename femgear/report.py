@@ -4,128 +4,22 @@ from __future__ import annotations
 
 import base64
 import os
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case import planetary_set
 from femgear.files import checksum, storage_errors, write_text
+from femgear.report_captions import SECTIONS, caption_of
 from femgear.storage import Results, open_results
 from femgear.summary import Block, describe_case, describe_results
-
-if TYPE_CHECKING:
-    pass
 
 _LARGEST_PICTURE = 8_000_000  # bytes
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
 _FEW = 4
-
-# stem of a file, its section, its caption; {} stands for what follows the stem
-_CAPTIONS = (
-    (
-        "static_transmission_error",
-        "Static",
-        "Static transmission error over one mesh period: every mesh along its line of action, and from "
-        "sun to ring. Sun and planets held at their bores, ring at its outer surface.",
-    ),
-    (
-        "mesh_stiffness",
-        "Static",
-        "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (solid) and secant F/δ "
-        "(dotted).",
-    ),
-    (
-        "load_sharing",
-        "Static",
-        "Share of every planet in the torque of the sun.",
-    ),
-    (
-        "tooth_loads",
-        "Static",
-        "Load of one tooth pair from its first to its last contact.",
-    ),
-    (
-        "profile_deviations",
-        "Static",
-        "Deviations of the loaded flanks from the involute over the roll angle, positive with more material.",
-    ),
-    (
-        "pitch_deviations",
-        "Static",
-        "Cumulative pitch deviations of the loaded flanks over the tooth number.",
-    ),
-    (
-        "deformed_set",
-        "Static",
-        "Deformed set under the static load, magnified; at rest in grey.",
-    ),
-    (
-        "mode_shapes",
-        "Modes",
-        "Mode shapes with mean mesh stiffness: bodies with a mark of their rotation, and the outer "
-        "surface of the ring; at rest in grey.",
-    ),
-    (
-        "natural_frequencies",
-        "Modes",
-        "Natural frequencies over the nodal diameters of the ring.",
-    ),
-    (
-        "ring_mode",
-        "Modes",
-        "A mode of the toothed ring on its foundation, on the finite-element grid.",
-    ),
-    (
-        "dynamic_transmission_error",
-        "Dynamics",
-        "Dynamic transmission error over one mesh period, beside the static one; both without their mean.",
-    ),
-    (
-        "dynamic_spectrum",
-        "Dynamics",
-        "Harmonics of the dynamic transmission error.",
-    ),
-    (
-        "speed_sweep",
-        "Dynamics",
-        "Fluctuation of the transmission error over the speed, and the verdicts on the solution: the "
-        "fixed point contracts below 1, the motion is stable below 1.",
-    ),
-    (
-        "ring_static_deflection",
-        "Dynamics",
-        "Mean radial deflection of the ring's outer surface, which turns with the carrier.",
-    ),
-    (
-        "operating_deflection",
-        "Dynamics",
-        "Operating deflection of the ring, without its mean, during one revolution of the carrier. Every "
-        "frame is a true instant; the meshes appear slowed down as under a stroboscope.",
-    ),
-    (
-        "housing_signal",
-        "Housing",
-        "Acceleration at the fixed sensor during one carrier revolution: all orders, and the band around "
-        "a mesh harmonic with its envelope and lobes ({}).",
-    ),
-    (
-        "order_spectrum",
-        "Housing",
-        "Carrier orders at the fixed sensor ({}): a wave of n nodal diameters at mesh harmonic h is heard"
-        " at order h z − n, z the teeth of the ring, when the carrier turns counter-clockwise.",
-    ),
-    (
-        "modulation",
-        "Housing",
-        "Envelope around a mesh harmonic over the angle of the carrier ({}).",
-    ),
-)
-_SECTIONS = ("Static", "Modes", "Dynamics", "Housing", "Other pictures")
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1b1b1b; background: #fff;
@@ -205,7 +99,7 @@ def page(results: Results) -> str:
             "".join(_table(block) for block in geometry if block.title != "Warnings"),
         )
     )
-    body = "".join(_section(name, numbers, pictures, results) for name in _SECTIONS)
+    body = "".join(_section(name, numbers, pictures, results) for name in SECTIONS)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
@@ -223,7 +117,7 @@ def _lead(results: Results) -> str:
 
 
 def _contents(numbers, pictures) -> str:
-    shown = [name for name in _SECTIONS if name in numbers or any(p.section == name for p in pictures)]
+    shown = [name for name in SECTIONS if name in numbers or any(p.section == name for p in pictures)]
     links = [("gears", "Gears"), *((_anchor(name), name) for name in shown), ("provenance", "Provenance")]
     return "<nav>" + " ".join(f'<a href="#{key}">{escape(text)}</a>' for key, text in links) + "</nav>\n"
 
@@ -376,19 +270,10 @@ def _pictures(results: Results) -> tuple[list[Picture], list[str]]:
         if len(data) > _LARGEST_PICTURE:
             skipped.append(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)")
             continue
-        rank, section, caption = _caption(path.stem)
+        rank, section, caption = caption_of(path.stem)
         found.append((rank, Picture(section, caption, kind, data)))
     found.sort(key=lambda item: item[0])
     return [picture for _, picture in found], skipped
-
-
-def _caption(stem: str) -> tuple[int, str, str]:
-    """Place in the order, section and caption of a picture from its file name."""
-    for rank, (prefix, section, caption) in enumerate(_CAPTIONS):
-        if stem == prefix or stem.startswith(prefix + "_"):
-            what = stem[len(prefix) :].strip("_").replace("_", " ")
-            return rank, section, caption.replace(" ({})", f" ({what})" if what else "")
-    return len(_CAPTIONS), "Other pictures", re.sub("[_-]+", " ", stem)
 
 
 def _figure(picture: Picture) -> str:

@@ -16,7 +16,7 @@ from femgear.storage import finish, record, write_dataset, write_text
 if TYPE_CHECKING:
     from femgear.case import Case
 
-STAGES = ("static", "modes", "dynamics", "housing")
+STAGES = ("static", "stress", "modes", "dynamics", "housing")
 
 
 def grid_cache() -> Path:
@@ -44,26 +44,26 @@ def run_case(
     case : Case
     folder : path
         From `storage.run_folder`; its manifest says after every stage what is there.
-    only : {"static", "modes", "dynamics", "housing"}, optional
-        Last stage to compute.
+    only : {"static", "stress", "modes", "dynamics", "housing"}, optional
+        Last stage to compute; ``"stress"`` computes the stresses whatever ``static.stresses`` says.
     pictures : bool
         Draw figures, fields and report.
     progress : callable, optional
         Called with (stage, done, total).
     """
-    from threadpoolctl import threadpool_limits
+    from femgear.threads import one_blas_thread
 
     cache = grid_cache()
-    if only != "static":
+    if only not in ("static", "stress"):
         analysis.check_dynamic_case(case, planetary_set(case))
-    last = STAGES.index(only) if only else len(STAGES) - 1
+    if only == "stress":
+        case = case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})})
     write_text(case.source, folder / "case.toml")
     names, timings, convergence = ["case.toml"], {}, {}
     record(folder, names, timings=timings, convergence=convergence)
     results, data = {}, {}
-    # two BLAS threads on these small matrices cost more than they gain
-    with threadpool_limits(1):
-        for stage in STAGES[: last + 1]:
+    with one_blas_thread():
+        for stage in _stages(case, only):
             if progress is not None:
                 progress(stage, 0, 1)
             start = time.perf_counter()
@@ -99,10 +99,20 @@ def run_case(
         finish(folder, [*names, "report.html"], timings=timings, convergence=convergence)
 
 
+def _stages(case: Case, only: str | None) -> tuple[str, ...]:
+    """Stages to compute, in order."""
+    last = STAGES.index(only) if only else len(STAGES) - 1
+    return tuple(stage for stage in STAGES[: last + 1] if stage != "stress" or case.static.stresses)
+
+
 def _compute(stage, case, results, cache, progress):
     """One stage from those before it."""
     if stage == "static":
         return analysis.solve_static(case, cache=cache, progress=progress)
+    if stage == "stress":
+        from femgear.analysis_stress import solve_stress
+
+        return solve_stress(case, results["static"], progress=progress)
     if stage == "modes":
         return analysis.solve_modes(case, results["static"])
     if stage == "dynamics":
@@ -115,6 +125,8 @@ def _convergence(stage, result) -> dict:
     if stage == "static":
         cycle = result.cycle
         return {"residual": float(cycle.residual.max()), "message": cycle.message, "contact": cycle.contact}
+    if stage == "stress":
+        return {"root_points": sum(len(root.arc) for root in result.roots), "iso": result.nominal.message}
     if stage == "modes":
         return {"modes": len(result.modes.frequency), "degrees_of_freedom": len(result.model.system.M)}
     if stage == "dynamics":

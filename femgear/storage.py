@@ -46,7 +46,7 @@ __all__ = [
     "write_manifest",
     "write_text",
 ]
-STAGES = ("static", "modes", "dynamics", "housing")
+STAGES = ("static", "stress", "modes", "dynamics", "housing")
 CASE = "case.toml"
 LOCK = ".lock"
 RUNNING = ".running"
@@ -69,6 +69,11 @@ class Results:
     def static(self) -> xr.Dataset:
         """Static transmission error, mesh stiffness, load sharing."""
         return read_dataset(self._checked("static.nc"))
+
+    @cached_property
+    def stress(self) -> xr.Dataset:
+        """Root stresses, contact pressures, load spectra."""
+        return read_dataset(self._checked("stress.nc"))
 
     @cached_property
     def modes(self) -> xr.Dataset:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,8 @@ from femgear.gears import check_set, speeds, tooth_thickness, torques
 from femgear.gears.checks import tip_clearances
 from femgear.gears.deviation_checks import check_deviations
 from femgear.models.ring import MAX_DIAMETER
+from femgear.summary_block import Block
+from femgear.summary_stress import describe_stress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,25 +24,6 @@ if TYPE_CHECKING:
 
 RPM = math.pi / 30
 _MANY = 8
-
-
-@dataclass(frozen=True)
-class Block:
-    """A titled table with notes under it.
-
-    Parameters
-    ----------
-    title : str
-    header : tuple of str
-        Names of the columns, or empty.
-    rows : tuple of tuple of str
-    notes : tuple of str
-    """
-
-    title: str
-    header: tuple[str, ...] = ()
-    rows: tuple[tuple[str, ...], ...] = ()
-    notes: tuple[str, ...] = ()
 
 
 def describe_case(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
@@ -178,7 +160,13 @@ def describe_results(results: Results) -> tuple[Block, ...]:
     -------
     tuple of Block
     """
-    describe = {"static": _static, "modes": _modes, "dynamics": _dynamics, "housing": _housing}
+    describe = {
+        "static": _static,
+        "stress": describe_stress,
+        "modes": _modes,
+        "dynamics": _dynamics,
+        "housing": _housing,
+    }
     blocks = [describe[stage](getattr(results, stage)) for stage in results.stages]
     timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
     return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))

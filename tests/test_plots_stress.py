@@ -6,7 +6,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from femgear.contact.root_stress import RootCycle
 from femgear.datasets_stress import root_stress_dataset
-from femgear.plots.stress import root_stress_history, root_stress_profile
+from femgear.plots.stress import (
+    contact_pressure,
+    load_spectrum,
+    planet_bending,
+    root_stress_history,
+    root_stress_profile,
+)
 from femgear.plots.style import png_bytes
 
 MESHES = ["sun-planet 1", "sun-planet 2", "planet 1-ring", "planet 2-ring"]
@@ -93,3 +99,85 @@ def test_figures_show_the_numbers(stress):
 def test_a_root_without_critical_section_has_no_mark(stress):
     flat = stress.assign(root_slope=0.0 * stress.root_slope + 0.2)
     assert all(len(ax.lines) == 3 for ax in root_stress_profile(flat).axes)
+
+
+PAIRS, CELLS, BINS, PITCH = 3, 24, 10, 4.4e-3
+
+
+@pytest.fixture(scope="module")
+def whole(stress):
+    """Root stresses with nominal values, semi-elliptic pressures, a spectrum and the turn of a planet."""
+    path = PITCH * (np.arange(PAIRS)[:, None] - 1 + np.arange(P) / P)
+    offset = np.linspace(-9e-5, 9e-5, CELLS)
+    peak = np.where(np.abs(path) < 0.9 * PITCH, 8e8 + 1e11 * path, 0.0)
+    shape = np.sqrt(np.maximum(1 - (offset / 6e-5) ** 2, 0.0))
+    pressure = np.broadcast_to(peak[:, None] * shape[:, None], (4, PAIRS, CELLS, P))
+    by_pair = ("mesh", "pair", "position")
+    turn = np.linspace(-0.25, 0.75, 200, endpoint=False)
+    bumps = np.exp(-((turn / 0.02) ** 2)) - 0.6 * np.exp(-(((turn - 0.49) / 0.02) ** 2))
+    history = 1e8 * np.outer([1.0, 1.1, -0.9, -1.2], bumps)
+    share = np.zeros((4, BINS))
+    share[:, 4], share[:, 9] = 0.75, 0.25
+    edges = np.linspace(0, 1000, BINS + 1)
+    return stress.assign(
+        iso_root_stress=(("mesh", "gear"), np.full((4, 2), 9.5e7)),
+        iso_contact_stress=("mesh", [7e8, 7e8, 3e8, 3e8]),
+        contact_pressure=(("mesh", "position"), pressure.max(axis=(1, 2))),
+        pressure_distribution=(("mesh", "pair", "cell", "position"), pressure),
+        pressure_offset=(("mesh", "cell"), np.tile(offset, (4, 1))),
+        pressure_centre=(by_pair, np.zeros((4, PAIRS, P))),
+        pressure_path=(by_pair, np.tile(path, (4, 1, 1))),
+        load_bin_low=("load_bin", edges[:-1]),
+        load_bin_high=("load_bin", edges[1:]),
+        load_time_share=(("mesh", "load_bin"), share),
+        load_cycle_share=(("mesh", "load_bin"), np.eye(BINS)[[9] * 4]),
+        load_cycles=(("mesh", "gear"), [[2, 1], [2, 1], [1, 2], [1, 2]]),
+        planet_root_stress=(("mesh", "turn"), history),
+        turn=("turn", turn),
+    )
+
+
+def test_nominal_stress_is_drawn_where_it_is_known(whole, stress):
+    for ax in root_stress_history(whole).axes:
+        assert any(np.allclose(line.get_ydata(), 95.0) for line in ax.lines)
+    assert all(len(ax.lines) == 3 for ax in root_stress_history(stress).axes)
+    unknown = whole.assign(iso_root_stress=np.nan * whole.iso_root_stress)
+    assert all(len(ax.lines) == 3 for ax in root_stress_history(unknown).axes)
+
+
+def test_pressure_is_drawn_over_the_path_of_one_pair(whole):
+    figure = contact_pressure(whole)
+    for ax, nominal in zip(figure.axes[:2], (700.0, 300.0), strict=True):
+        path, pressure = ax.lines[0].get_data()
+        assert (np.diff(path) > 0).all() and pressure[0] == pressure[-1] == 0.0
+        assert pressure.max() == pytest.approx(1e-6 * float(whole.pressure_distribution.max()))
+        assert ax.lines[1].get_ydata() == pytest.approx([nominal, nominal])
+    for ax in figure.axes[2:4]:
+        (image,) = ax.collections
+        values = np.ma.asarray(image.get_array()).reshape(CELLS, -1)
+        assert values.max() == pytest.approx(1e-6 * float(whole.pressure_distribution.max()))
+        # cells without pressure are left blank, and the picture reaches as far as there is any
+        assert values.mask[0].all() and 60 < ax.get_ylim()[1] < 70
+
+
+def test_spectrum_and_bending_show_the_numbers(whole):
+    left, right = load_spectrum(whole).axes
+    for ax in (left, right):
+        time, cycles = (patch.get_data() for patch in ax.patches)
+        assert time.values == pytest.approx(100 * whole.load_time_share.values[0])
+        assert cycles.values.argmax() == 9 and cycles.edges[-1] == 1000
+    assert "sun 2, planet 1" in left.get_title(loc="left")
+    assert "planet 1, ring 2" in right.get_title(loc="left")
+    (ax,) = planet_bending(whole).axes
+    assert ax.get_title(loc="left") == "planet 2"  # the wider of the two ranges
+    assert ax.lines[0].get_ydata() == pytest.approx(1e-6 * whole.planet_root_stress.values[1])
+    assert ax.lines[1].get_ydata() == pytest.approx(1e-6 * whole.planet_root_stress.values[3])
+
+
+def test_new_figures_hide_nothing(whole):
+    for figure in (contact_pressure(whole), load_spectrum(whole), planet_bending(whole)):
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        legend = figure.legends[0].get_window_extent(canvas.renderer)
+        assert all(not legend.overlaps(ax.get_tightbbox(canvas.renderer)) for ax in figure.axes)
+        assert all("[" in ax.get_ylabel() + ax.get_xlabel() for ax in figure.axes[-2:])

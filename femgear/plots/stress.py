@@ -1,4 +1,4 @@
-"""Figures of root stresses: one tooth on its way through the mesh, and along its roots."""
+"""Figures of stress.nc: one tooth on its way through the mesh, along its roots, pressures, load spectra."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.plots.style import BLUE, GREY, VERMILION, family, label, legend_below, new_figure
+from femgear.plots.style import BLACK, BLUE, GREY, VERMILION, family, label, legend_below, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 TENSION, COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
 # tangent of the critical section after ISO 6336-3, external and internal gears
 CRITICAL_SLOPE = {False: 30.0, True: 60.0}
+KINDS = ("sun-planet", "planet-ring")
 
 
 def root_stress_history(stress: xr.Dataset) -> Figure:
@@ -23,7 +24,8 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``root_tension`` and ``root_compression`` [Pa] and ``root_path`` [1] (mesh, gear, step).
+        With ``root_tension`` and ``root_compression`` [Pa] and ``root_path`` [1] (mesh, gear, step); where
+        it has ``iso_root_stress`` [Pa] (mesh, gear), the nominal stress is drawn too.
 
     Returns
     -------
@@ -35,6 +37,7 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
         ax.plot(path, row["root_tension"].values * 1e-6, color=VERMILION, label=TENSION)
         ax.plot(path, row["root_compression"].values * 1e-6, color=BLUE, linestyle="--", label=COMPRESSION)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
+        _nominal(ax, row, "iso_root_stress", "σ_F0 of ISO 6336-3")
         largest = float(row["root_tension"].max()) * 1e-6
         lowest = float(row["root_compression"].min()) * 1e-6
         label(ax, title=f"{title}: {largest:.3g} and {lowest:.3g} MPa")
@@ -81,14 +84,136 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
     return figure
 
 
+def contact_pressure(stress: xr.Dataset) -> Figure:
+    """Contact pressure of one tooth pair over its path, for one mesh of each kind.
+
+    Parameters
+    ----------
+    stress : xarray.Dataset
+        With ``pressure_distribution`` [Pa] (mesh, pair, cell, position), ``pressure_offset`` (mesh, cell),
+        ``pressure_centre`` and ``pressure_path`` (mesh, pair, position) [m], ``contact_pressure`` [Pa] (mesh,
+        position) and ``iso_contact_stress`` [Pa] (mesh).
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6)
+    top = float(stress["contact_pressure"].max()) * 1e-6 or 1.0
+    for upper, lower, kind in zip(axes[:2], axes[2:], KINDS):
+        row = _first(stress, kind)
+        path, place, pressure = _along_path(row)
+        upper.plot(path, pressure.max(axis=0), color=VERMILION, label="largest pressure")
+        _nominal(upper, row, "iso_contact_stress", "σ_H0 of ISO 6336-2")
+        upper.set_ylim(0.0, 1.6 * top)
+        largest = float(row["contact_pressure"].max()) * 1e-6
+        label(upper, title=f"{row['mesh'].item()}: {largest:.4g} MPa away from flank ends")
+        image = lower.pcolormesh(
+            np.broadcast_to(path, place.shape),
+            place,
+            np.ma.masked_less_equal(pressure, 0.0),
+            shading="nearest",
+            cmap="viridis",
+            vmin=0.0,
+            vmax=1.2 * top,
+        )
+        lower.set_xlim(upper.get_xlim())
+        reach = 1.1 * np.abs(place[pressure > 0.0]).max(initial=0.0)
+        lower.set_ylim(-reach or -1.0, reach or 1.0)
+        label(lower, "path from the pitch point [mm]")
+    label(axes[0], y="pressure [MPa]")
+    label(axes[2], y="along the common tangent [µm]")
+    figure.colorbar(image, ax=axes[2:], label="pressure [MPa]", extend="max")
+    legend_below(figure, columns=2)
+    return figure
+
+
+def _along_path(row):
+    """Path (k,) [mm], place (C, k) [um] and pressure (C, k) [MPa] of a tooth pair from entry to exit."""
+    path = row["pressure_path"].values.ravel()
+    pressure = row["pressure_distribution"].values.swapaxes(0, 1).reshape(-1, len(path))
+    place = row["pressure_offset"].values[:, None] + row["pressure_centre"].values.ravel()
+    order = np.argsort(path, kind="stable")
+    loaded = np.flatnonzero(pressure[:, order].any(axis=0))
+    first, last = (loaded[0], loaded[-1]) if len(loaded) else (0, len(order) - 1)
+    order = order[max(first - 1, 0) : last + 2]
+    return path[order] * 1e3, place[:, order] * 1e6, pressure[:, order] * 1e-6
+
+
+def load_spectrum(stress: xr.Dataset) -> Figure:
+    """Load spectrum of the teeth of one mesh of each kind.
+
+    Parameters
+    ----------
+    stress : xarray.Dataset
+        With ``load_time_share`` and ``load_cycle_share`` (mesh, load_bin) [1], ``load_bin_low`` and
+        ``load_bin_high`` (load_bin) [N], ``load_cycles`` (mesh, gear) [1].
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = new_figure(columns=2, width=9.5, sharex=True, sharey=True)
+    edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
+    for ax, kind in zip(axes, KINDS):
+        row = _first(stress, kind)
+        time, cycles = (100 * row[f"load_{name}_share"].values for name in ("time", "cycle"))
+        ax.stairs(time, edges, fill=True, color=BLUE, alpha=0.75, label="share of the time under load")
+        ax.stairs(
+            cycles, edges, color=VERMILION, linewidth=1.8, label="share of the load cycles, by their peak"
+        )
+        counts = zip(kind.split("-"), row["load_cycles"].values)
+        text = ", ".join(f"{name} {float(count):.3g}" for name, count in counts)
+        label(ax, "load of the tooth [N]", title=f"{row['mesh'].item()}; cycles a turn: {text}")
+    axes[0].set_ylim(0.0, 105.0)
+    label(axes[0], y="share [%]")
+    legend_below(figure, columns=2)
+    return figure
+
+
+def planet_bending(stress: xr.Dataset) -> Figure:
+    """Stress in both roots of a tooth of the worst planet while it turns once against the carrier.
+
+    Parameters
+    ----------
+    stress : xarray.Dataset
+        With ``planet_root_stress`` [Pa] (mesh, turn).
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = new_figure()
+    values = stress["planet_root_stress"].values * 1e-6
+    planets = len(values) // 2
+    worst = int(np.ptp(values, axis=1).argmax()) % planets
+    lines = ((worst, VERMILION, "-", "sun side"), (worst + planets, BLUE, "--", "ring side"))
+    for row, colour, dash, side in lines:
+        text = f"root of the {side} flank: {values[row].min():.4g} to {values[row].max():.4g} MPa"
+        ax.plot(stress["turn"].values, values[row], dash, color=colour, label=text)
+    ax.axhline(0.0, color="0.4", linewidth=0.8)
+    label(ax, "turns since the pitch point with the sun [1]", "stress [MPa]", f"planet {worst + 1}")
+    legend_below(figure, columns=1)
+    return figure
+
+
+def _first(stress: xr.Dataset, kind: str) -> xr.Dataset:
+    """The first mesh of a kind."""
+    names = [str(name) for name in stress["mesh"].values]
+    return stress.isel(mesh=next(i for i, name in enumerate(names) if family(name) == kind))
+
+
+def _nominal(ax, row: xr.Dataset, name: str, text: str) -> None:
+    """Line at a nominal stress, where it is known."""
+    if name in row and np.isfinite(row[name].item()) and row[name].item() > 0.0:
+        ax.axhline(row[name].item() * 1e-6, color=BLACK, linewidth=1.2, linestyle="-.", label=text)
+
+
 def _four_gears(stress: xr.Dataset):
     """Title, rows and whether it is internal, of sun, planet on both sides, and ring."""
-    names = [str(name) for name in stress["mesh"].values]
-    gears = {"sun-planet": ("sun", "planet, sun side"), "planet-ring": ("planet, ring side", "ring")}
-    for kind, titles in gears.items():
-        mesh = next(i for i, name in enumerate(names) if family(name) == kind)
+    for kind, titles in zip(KINDS, (("sun", "planet, sun side"), ("planet, ring side", "ring"))):
         for gear, title in enumerate(titles):
-            yield title, stress.isel(mesh=mesh, gear=gear), title == "ring"
+            yield title, _first(stress, kind).isel(gear=gear), title == "ring"
 
 
 def _crossing(slope, arc, angle) -> float | None:
