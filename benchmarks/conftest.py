@@ -17,9 +17,9 @@ def pytest_addoption(parser):
 
 @pytest.fixture(scope="session", autouse=True)
 def one_thread():
-    from threadpoolctl import threadpool_limits
+    from femgear.threads import one_blas_thread
 
-    with threadpool_limits(1):
+    with one_blas_thread():
         yield
 
 

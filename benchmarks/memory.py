@@ -32,10 +32,11 @@ def _status(key: str) -> float:
 
 def _measure(name: str) -> None:
     from stages import STAGES, Reference
-    from threadpoolctl import threadpool_limits
+
+    from femgear.threads import one_blas_thread
 
     stage, reference = STAGES[name], Reference()
-    with threadpool_limits(1):
+    with one_blas_thread():
         for need in stage.needs:
             getattr(reference, need)
         before = _status("VmRSS")

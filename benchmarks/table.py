@@ -73,10 +73,16 @@ def _stages(rows, base) -> str:
 
 
 def _plain(rows, base) -> str:
+    promised = any(row.info.get("limit") for row in rows)
     lines = ["| route | time [ms] | ratio | note |", "|---|---:|---:|---|"]
+    if promised:
+        lines = ["| route | time [ms] | ratio | limit [ms] | note |", "|---|---:|---:|---:|---|"]
     for row in rows:
-        note = row.info.get("note", "")
-        lines.append(f"| {row.title} | {_ms(row.median)} | {_ratio(row.median, base)} | {note} |")
+        note, limit = row.info.get("note", ""), row.info.get("limit")
+        cells = [row.title, _ms(row.median), _ratio(row.median, base), note]
+        if promised:
+            cells.insert(3, f"{1e3 * limit:.0f}" if limit else "")
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

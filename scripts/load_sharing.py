@@ -24,6 +24,8 @@ def main(
 ) -> None:
     """Compute the load share of every planet and the tooth loads: a table, pictures and CSV files.
 
+    Deviations, supports and bearings are those of the case.
+
     Parameters
     ----------
     case
@@ -37,6 +39,7 @@ def main(
     """
     from femgear import planetary_set, read_case
     from femgear.casefile.units import LENGTH, to_si
+    from femgear.design.basis import sun_torque
     from femgear.plots import save_figure
 
     data = read_case(case)
@@ -46,17 +49,16 @@ def main(
         raise CaseError(
             f"there is no planet {planet}", code="E-PLANET", key="--planet", limit=f"1 to {gears.n_planets}"
         )
-    if data.operation.torque == 0:
-        raise CaseError("without torque there is nothing to share", code="E-TORQUE", key="operation.torque")
+    sun_torque(data, gears)
     folder = ready_folder(output)
     with Progress() as progress:
-        cycles = _solve(data, gears, gaps, planet, progress)
+        cycles, plain = _solve(data, gaps, planet, progress)
     names = [str(name) for name in gears.mesh_names]
     write_csv(folder / "load_sharing.csv", SHARE_HEADER, _share_records(gaps, cycles))
     write_csv(folder / "tooth_loads.csv", TOOTH_HEADER, _tooth_records(gaps, cycles, names))
     save_figure(_share_figure(gaps, cycles, planet), folder / "load_sharing.png")
     save_figure(_tooth_figure(gaps, cycles, names, planet), folder / "tooth_loads.png")
-    _print_shares(gaps, cycles, planet)
+    _print_shares(gaps, cycles, planet, plain)
     say_files(folder, ["load_sharing.csv", "tooth_loads.csv", "load_sharing.png", "tooth_loads.png"])
 
 
@@ -72,35 +74,37 @@ def _checked(gap: float, text: str) -> float:
     return gap
 
 
-def _solve(case, gears, gaps, planet, progress):
-    """One mesh cycle for each gap; grids and compliances are made once."""
-    from femgear.contact.bodies import make_bodies, make_sectors
+def _solve(case, gaps, planet, progress):
+    """What all gaps share, and one mesh cycle for each of them."""
     from femgear.contact.mirrored import walk_either_flank
-    from femgear.fe.elasticity import Material
-    from femgear.gears import torques
+    from femgear.design.basis import design_basis, sun_torque
+    from femgear.gears.deviations import common_period
     from femgear.run import grid_cache
 
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
     progress("compliance", 0, 1)
-    sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=grid_cache())
-    bodies = make_bodies(sectors, material, depth=case.static.depth)
+    basis = design_basis(case, cache=grid_cache())
     progress("compliance", 1, 1)
-    sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
+    gears, deviations = basis.gears, basis.deviations
+    limit = case.static.longest_record
+    periods = 1 if deviations is None else common_period(deviations, gears, limit=limit)[0]
     cycles = []
     for gap in gaps:
         separation = np.zeros(gears.n_planets)
         separation[planet - 1] = gap
         cycle = walk_either_flank(
             gears,
-            bodies,
-            sun_torque=sun_torque,
+            basis.bodies,
+            sun_torque=sun_torque(case, gears),
             positions=case.static.positions,
             contact=case.static.contact,
+            deviations=deviations,
+            supports=basis.supports,
+            periods=periods,
             planet_gaps=separation,
             progress=lambda done, total, gap=gap: progress(f"gap {gap * 1e6:g} um", done, total),
         )
         cycles.append(cycle)
-    return cycles
+    return cycles, deviations is None and case.static.members == "fixed"
 
 
 def _share_records(gaps, cycles):
@@ -147,9 +151,10 @@ def parallel_springs(stiffness, force, gap, planet) -> np.ndarray:
     return (k * np.maximum(x - g, 0.0) / force).mean(axis=1)
 
 
-def _print_shares(gaps, cycles, planet):
+def _print_shares(gaps, cycles, planet, plain):
     rows, notes = [], []
-    reference = next((c for gap, c in zip(gaps, cycles) if gap == 0), None)
+    # the springs know neither deviations nor supports
+    reference = next((c for gap, c in zip(gaps, cycles) if gap == 0 and plain), None)
     for gap, cycle in zip(gaps, cycles):
         share = 100 * cycle.load_share
         linear = None
@@ -184,13 +189,15 @@ def _share_figure(gaps, cycles, planet):
 
     figure, axes = new_figure(columns=len(gaps), width=max(3.4 * len(gaps), 6.0), height=4.2, sharey=True)
     for ax, gap, cycle in zip(axes, gaps, cycles):
-        position, share = periodic(cycle.position, 100 * cycle.load_share)
+        position, share = cycle.position, 100 * cycle.load_share
+        if cycle.periods == 1:
+            position, share = periodic(position, share)
         for n, values in enumerate(share):
             ax.plot(
                 position, values, label=f"planet {n + 1}", linewidth=max(4.6 - 1.5 * n, 1.2), **line_style(n)
             )
-        ax.set_xlim(0, 1)
-        label(ax, "position in the period [1]", title=f"gap {gap * 1e6:g} µm at planet {planet}")
+        ax.set_xlim(0, cycle.periods)
+        label(ax, "position [mesh periods]", title=f"gap {gap * 1e6:g} µm at planet {planet}")
     highest = max(100 * cycle.load_share.max() for cycle in cycles)
     axes[0].set_ylim(0, 1.1 * highest)
     label(axes[0], y="share of the torque [%]")

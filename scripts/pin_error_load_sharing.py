@@ -32,7 +32,10 @@ def main(
     seed: int = 1,
     position: float = 0.0,
 ) -> None:
-    """Draw pin errors and solve the load sharing of each sample: a table, a histogram and a CSV file.
+    """Draw pin errors and solve the load sharing of each sample: tables, a histogram and a CSV file.
+
+    A second table has the linear sensitivity of the shares to single pins, and the spread of the shares that
+    follows from it beside that of the samples; they part where planets open.
 
     Parameters
     ----------
@@ -81,6 +84,7 @@ def main(
             progress(kind, 1, 1)
     names = {"fixed": "all members fixed", "floating": "floating sun", "case": "supports of the case"}
     _print_summary(results, names, pins, sigma, seed)
+    _print_sensitivities(results, names, sigma)
     write_csv(folder / "load_sharing_samples.csv", _header(results, gears.n_planets), _records(results, pins))
     factors = [sharing.factor for _, sharing, _ in results]
     figure = sharing_histogram(factors, [names[kind] for kind, *_ in results], gears.n_planets)
@@ -98,8 +102,9 @@ def _check(sigma, seed: int, position: float) -> None:
 
 
 def _solve(data, basis, kind, torque, place, pins):
-    """Load sharing of all samples, and the difference of some from the whole contact problem."""
+    """Load sharing of all samples, the difference of some from the whole contact problem, sensitivities."""
     from femgear.contact.supports import RIGID, Supports
+    from femgear.design import linearise, pin_sensitivities
     from femgear.design.basis import case_supports
     from femgear.design.samples import sharing_of_samples
     from femgear.design.sharing import sharing_model, walked_shares
@@ -116,12 +121,15 @@ def _solve(data, basis, kind, torque, place, pins):
     chosen = np.unique([0, len(pins) // 3, order[len(pins) // 2], order[-1]])
     whole = walked_shares(basis.gears, basis.bodies, pins[chosen], **options)
     difference = np.abs(whole - sharing.share[chosen]).max()
+    walk = {key: value for key, value in options.items() if key != "position"}
+    linear = linearise(basis.gears, basis.bodies, only=[place["position"]], **walk)
     facts = {
         "curves": curves - begin,
         "samples": solved - curves,
         "difference": difference,
         "checked": len(chosen),
         "coupling": model.coupling_change,
+        "sensitivity": pin_sensitivities(linear)[..., 0],
     }
     return sharing, facts
 
@@ -162,6 +170,32 @@ def _print_summary(results, names, pins, sigma, seed):
     print_table(title, header, rows)
     for note in notes:
         print(note)
+
+
+def _print_sensitivities(results, names, sigma):
+    """Change of shares per micrometre at single pins, and the spread they give to the shares."""
+    rows = []
+    for kind, sharing, facts in results:
+        slopes = facts["sensitivity"]
+        own = slopes[np.arange(len(slopes)), np.arange(len(slopes))]
+        others = slopes[~np.eye(len(slopes), dtype=bool)]
+        mean = [own[:, 1].mean(), own[:, 0].mean()]
+        mean += [others[:, 1].mean(), others[:, 0].mean()] if len(others) else [0.0, 0.0]
+        spread = np.sqrt(((slopes * sigma) ** 2).sum(axis=(1, 2))).mean(), sharing.share.std(axis=0).mean()
+        values = [f"{round(1e-4 * m, 4) + 0.0:+.4f}" for m in mean] + [f"{100 * s:.3f}" for s in spread]
+        rows.append((names[kind], *values))
+    header = (
+        "supports",
+        "own pin tangential",
+        "radial",
+        "another pin tangential",
+        "radial",
+        "spread, linear [%]",
+        "of the samples [%]",
+    )
+    print_table(
+        "Linear sensitivity of a planet's share, in % of the torque per um, mean of all planets", header, rows
+    )
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
         Exit code: 0, 2 (bad input), 3 (numerical failure), 4 (storage), 130 (interrupted).
     """
     from cyclopts import App, CycloptsError
-    from threadpoolctl import threadpool_limits
+    from femgear.threads import one_blas_thread
 
     from femgear.cli import show_warning, wrong_arguments
     from femgear.files import storage_error
@@ -44,8 +44,7 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
     )
     app.default(command)
     try:
-        # two BLAS threads on these small matrices cost more than they gain
-        with threadpool_limits(1), warnings.catch_warnings():
+        with one_blas_thread(), warnings.catch_warnings():
             warnings.showwarning = show_warning
             app(
                 sys.argv[1:] if arguments is None else list(arguments),

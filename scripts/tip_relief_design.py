@@ -36,6 +36,9 @@ def main(
 ) -> None:
     """Search amount and length of the relief: contour maps, a CSV file and the tables for the case file.
 
+    Printed beside the optimum: by how much the transmission error rises per micrometre of amount and per
+    millimetre of length on either side of it.
+
     Parameters
     ----------
     case
@@ -99,6 +102,7 @@ def main(
     write_text(snippet, folder / "relief.toml")
     _print_summary(inputs, grid, design, best)
     print(f"at {2 * positions} positions: {fine:.1%}")
+    _print_slopes(basis, best, target, options)
     print(f"for the case file (relief.toml):\n\n{snippet}")
     say_files(folder, ["tip_relief.csv", "tip_relief.png", "relief.toml"])
 
@@ -160,6 +164,42 @@ def _at_more_positions(basis, best, torque: float, options) -> float:
         supports=options["supports"],
     ).peak_to_peak[:, 0, 0]
     return float(found[1] / found[0])
+
+
+AMOUNT_STEP, LENGTH_STEP = 0.1e-6, 0.05e-3
+"""Tolerances [m] over which the slopes at the optimum are taken."""
+
+
+def _print_slopes(basis, best, torque: float, options) -> None:
+    """Slopes of the peak to peak at the optimum, from one linearised mesh cycle."""
+    from femgear.design import (
+        linearise,
+        peak_to_peak_slopes,
+        relief_amount,
+        relief_length,
+        sensitivity,
+        two_pair_length,
+    )
+
+    gears, base = basis.gears, basis.deviations
+    law = {"power": options["power"], "back": torque < 0}
+    amount = relief_amount(base, gears, length=best.length, **law)
+    length = relief_length(base, gears, amount=best.amount, **law)
+    contact = {key: options[key] for key in ("positions", "contact", "supports")}
+    linear = linearise(gears, basis.bodies, sun_torque=torque, deviations=amount(best.amount), **contact)
+    meshes, unit = slice(gears.n_planets), two_pair_length(gears)
+    per_amount = sensitivity(linear, amount, best.amount, step=1e-9).deflection[meshes]
+    per_length = sensitivity(linear, length, best.length, step=1e-5).deflection[meshes] / unit
+    signal = linear.deflection[meshes]
+    for name, change, step, (down, up), number, unit in (
+        ("amount", per_amount, AMOUNT_STEP, ("less", "more"), 1.0, "um per um"),
+        ("length", per_length, LENGTH_STEP, ("shorter", "longer"), 1e3, "um per mm"),
+    ):
+        left, right = (number * slope for slope in peak_to_peak_slopes(signal, change, step=step))
+        print(
+            f"slopes of the STE peak to peak over the {name}, within {step * 1e6:g} um: "
+            f"{-left:+.3f} {unit} {down}, {right:+.3f} {unit} {up}"
+        )
 
 
 def _records(inputs, grid):

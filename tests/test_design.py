@@ -219,6 +219,14 @@ def test_the_tables_for_the_case_file_mean_the_same_relief(basis, tmp_path):
     assert planetary_set(case) == gears
 
 
+def test_supports_are_those_of_the_static_stage():
+    from femgear import with_value
+    from femgear.design.basis import case_supports
+
+    case = with_value(read_case(CASE), "planet.bearing_clearance", "3 um")
+    assert case_supports(case) == Supports(sun=5e7, carrier=2e8, planet=3e8, planet_clearance=3e-6)
+
+
 def test_refusals(basis):
     gears, bodies = basis.gears, basis.bodies
     with pytest.raises(CaseError, match="differ from zero"):
@@ -231,6 +239,9 @@ def test_refusals(basis):
         sharing_model(gears, bodies, sun_torque=0.0)
     with pytest.raises(CaseError, match="no such position"):
         sharing_model(gears, bodies, sun_torque=1.0, position=8)
+    loose = Supports(planet=1e8, planet_clearance=1e-6)
+    with pytest.raises(CaseError, match="no clearance"):
+        sharing_model(gears, bodies, sun_torque=1.0, supports=loose)
     with pytest.raises(CaseError, match="number of samples"):
         pin_samples(3, samples=0, radial=1e-6, tangential=1e-6, seed=1)
     with pytest.raises(CaseError, match="negative"):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from femgear.case import Case, planetary_set, set_deviations
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
+from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.contact.assembly import Bodies
@@ -26,6 +27,7 @@ class DesignBasis:
     deviations: SetDeviations | None
 
 
+@one_blas_thread()
 def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
     """The compliance of a case, computed once for all variants.
 
@@ -56,11 +58,12 @@ def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
 
 
 def case_supports(case: Case) -> Supports:
-    """Supports of sun, carrier and planets with the stiffnesses of the case."""
+    """Supports of sun, carrier and planets with the stiffnesses and the bearing clearance of the case."""
     return Supports(
         sun=case.sun.support_stiffness,
         carrier=case.carrier.support_stiffness,
         planet=case.planet.bearing_stiffness,
+        planet_clearance=case.planet.bearing_clearance,
     )
 
 

@@ -18,6 +18,7 @@ from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
 from femgear.gears.modifications import FlankForm, TipRelief
+from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.contact.assembly import Bodies
@@ -166,6 +167,7 @@ def with_tip_relief(
     return replace(found, **forms)
 
 
+@one_blas_thread()
 def harris_map(
     planetary_set: PlanetarySet,
     bodies: Bodies,
@@ -233,6 +235,7 @@ def harris_map(
     return HarrisMap(torques, peaks, overall, residual)
 
 
+@one_blas_thread()
 def relief_grid(
     planetary_set: PlanetarySet,
     bodies: Bodies,
@@ -286,6 +289,7 @@ def relief_grid(
     return ReliefGrid(amounts, lengths, torques, peaks, found[0])
 
 
+@one_blas_thread()
 def optimise_relief(
     planetary_set: PlanetarySet,
     bodies: Bodies,

@@ -8,6 +8,7 @@ import numpy as np
 
 from femgear.contact.solve import solve_contact
 from femgear.errors import CaseError, ContactError
+from femgear.threads import one_blas_thread
 
 SOFTEST = 1e-10
 """Spring on every motion, over the stiffness of a planet: it holds motions that no loaded planet holds."""
@@ -78,6 +79,7 @@ class Sharing:
         return self.share <= 0.0
 
 
+@one_blas_thread()
 def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sharing:
     """Load sharing for many sets of pin errors at once.
 

@@ -28,6 +28,7 @@ from femgear.design.samples import SharingModel
 from femgear.errors import CaseError, ContactError
 from femgear.gears.deviations import SetDeviations, mesh_normals, no_deviations
 from femgear.gears.mirrored_deviations import mirrored_deviations
+from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.contact.assembly import Bodies
@@ -62,6 +63,7 @@ def pin_samples(n_planets: int, *, samples: int, radial: float, tangential: floa
     return np.random.default_rng(seed).standard_normal((samples, n_planets, 2)) * scale
 
 
+@one_blas_thread()
 def sharing_model(
     planetary_set: PlanetarySet,
     bodies: Bodies,
@@ -100,24 +102,33 @@ def sharing_model(
     Raises
     ------
     CaseError
-        E-TORQUE: no torque; E-RANGE: no such position.
+        E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
     ContactError
     """
     if not (np.isfinite(sun_torque) and sun_torque):
         raise CaseError("without torque there is nothing to share", code="E-TORQUE", value=sun_torque)
     if not 0 <= position < positions:
         raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {positions - 1}")
+    if supports.planet_clearance:
+        raise CaseError(
+            "the load sharing of samples knows no clearance of the planet bearings",
+            code="E-SUPPORT",
+            key="planet.bearing_clearance",
+            value=f"{supports.planet_clearance * 1e6:.6g} um",
+            limit="0 um",
+            remedy='set it to zero, or solve single cases with static.members = "elastic"',
+        )
     solved, order = planetary_set, np.arange(planetary_set.n_planets)
     if sun_torque < 0:
         solved, order = mirrored_set(planetary_set)
         if deviations is not None:
             deviations = mirrored_deviations(deviations, planetary_set, solved, order)
-        position = -position % positions
+        position = -position
     N = solved.n_planets
     load = abs(sun_torque) / solved.sun.base_radius
     # planets open and close at small loads, where a line contact changes most
     force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
-    place = {"position": position, "positions": positions, "contact": contact, "deviations": deviations}
+    place = {"first": position, "positions": positions, "contact": contact, "deviations": deviations}
     deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
     for k, one in enumerate(force):
         deflection[:, k], coupling[k] = _paths(solved, bodies, max(one, 1e-9 * load), place)
@@ -168,25 +179,24 @@ def pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
 
 def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
     """Path deflections (N,) and compliance between planets (N, N) with the same force in all meshes."""
-    N, p = s.n_planets, place["position"]
+    N = s.n_planets
     share, nearest = force, 3.0 * force / (10e9 * bodies.face_width)
     for _ in range(8):
         setup = mesh_windows(
             s,
             bodies,
             share=share,
-            positions=place["positions"],
             cells=36,
             nearest=nearest,
-            contact=place["contact"],
-            deviations=place["deviations"],
+            **place,
         )
-        problem = assemble_contact(setup, bodies, p)
+        # the record of the windows begins at the position
+        problem = assemble_contact(setup, bodies, 0)
         mesh = problem.mesh[:, None] == np.arange(2 * N)
         state = solve_contact(problem.H, problem.gap, mesh.astype(float), np.full(2 * N, force))
         overflow = problem.touches_window_end(state.active, setup)
-        gap = setup.smallest_gap[:, p]
-        outside = ~setup.near[:, p] & (gap < state.motions[:, None])
+        gap = setup.smallest_gap[:, 0]
+        outside = ~setup.near[:, 0] & (gap < state.motions[:, None])
         outside = outside.any() and place["contact"] == "profile"
         if not overflow and not outside:
             break
@@ -205,6 +215,7 @@ def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
     return state.motions[:N] + state.motions[N:], between
 
 
+@one_blas_thread()
 def walked_shares(
     planetary_set: PlanetarySet,
     bodies: Bodies,

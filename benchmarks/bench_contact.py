@@ -1,0 +1,167 @@
+"""Contact with errors and moving members, Monte Carlo, derivatives; growth over planets and positions."""
+
+from functools import cached_property
+
+import numpy as np
+import pytest
+
+ERRORS = "Errors, floating sun, samples (compliance known)"
+PLANETS = "Contact, 64 positions, over the number of planets (36/24/84)"
+POSITIONS = "Contact over the number of positions (reference set)"
+SAMPLES = 10_000
+
+
+def record(benchmark, title, note="", limit=None):
+    """Notes of a row; a promised time is also a test."""
+    benchmark.extra_info.update(title=title, note=note, limit=limit)
+    if limit is not None and benchmark.stats is not None:
+        assert benchmark.stats.stats.median < limit, f"{title}: {benchmark.stats.stats.median:.2f} s"
+
+
+@pytest.fixture(scope="module")
+def erroneous(reference):
+    """Pitch errors of all gears of quality 6 or so, and of all pins."""
+    from dataclasses import replace
+
+    from femgear.gears.deviations import no_deviations
+
+    draw, gears = np.random.default_rng(1), reference.gears
+    ideal = no_deviations(gears)
+    names = ("sun_pitch", "planet_pitch", "planet_ring_side_pitch", "ring_pitch", "pin_errors")
+    return replace(ideal, **{name: draw.normal(0.0, 3e-6, getattr(ideal, name).shape) for name in names})
+
+
+@pytest.mark.benchmark(group=ERRORS)
+@pytest.mark.parametrize(
+    ("periods", "positions", "limit"), [(1, 64, 5.0), (27, 16, None)], ids=["64 positions", "27 periods"]
+)
+def test_errors_and_floating_sun(benchmark, reference, erroneous, periods, positions, limit):
+    from femgear.contact.cycle import walk_mesh_cycle
+    from femgear.contact.supports import Supports
+
+    options = {
+        "positions": positions,
+        "periods": periods,
+        "deviations": erroneous,
+        "supports": Supports(sun=0.0),
+    }
+    cycle = benchmark.pedantic(
+        walk_mesh_cycle,
+        args=(reference.gears, reference.bodies),
+        kwargs={"sun_torque": reference.sun_torque, **options},
+        rounds=3,
+        warmup_rounds=1,
+    )
+    assert cycle.residual.max() < 1e-9
+    title = f"six meshes, pitch and pin errors, floating sun, {len(cycle.position)} positions"
+    record(benchmark, title, f"up to {cycle.unknowns} pressure cells, {periods} mesh periods", limit)
+
+
+@pytest.mark.benchmark(group=ERRORS)
+def test_monte_carlo(benchmark, reference):
+    from femgear.contact.supports import Supports
+    from femgear.design import pin_samples, sharing_model, sharing_of_samples
+
+    pins = pin_samples(3, samples=SAMPLES, radial=3e-6, tangential=3e-6, seed=1)
+
+    def sample():
+        model = sharing_model(
+            reference.gears,
+            reference.bodies,
+            sun_torque=reference.sun_torque,
+            supports=Supports(sun=5e7, carrier=2e8, planet=3e8),
+        )
+        return sharing_of_samples(model, pins)
+
+    found = benchmark.pedantic(sample, rounds=3, warmup_rounds=1)
+    note = f"at one position, load-deflection curves included; residual {found.residual:.0e}"
+    record(benchmark, f"load sharing of {SAMPLES} samples of pin errors", note, 10.0)
+
+
+@pytest.mark.benchmark(group=ERRORS)
+def test_derivatives(benchmark, reference):
+    from femgear.design import linearise, pin_sensitivities
+
+    def derive():
+        linear = linearise(reference.gears, reference.bodies, sun_torque=reference.sun_torque, positions=64)
+        return pin_sensitivities(linear)
+
+    found = benchmark.pedantic(derive, rounds=3, warmup_rounds=1)
+    record(
+        benchmark, "derivatives of all shares by all pin errors", f"{found.size} derivatives, 64 positions"
+    )
+
+
+class Planets:
+    """A set whose planets may be 3, 4, 5 or 6: (36 + 84)/N is whole, and six of them fit."""
+
+    @cached_property
+    def bodies(self):
+        from femgear.contact.bodies import make_bodies, make_sectors
+        from femgear.fe.elasticity import Material
+
+        material = Material(206e9, 0.3, 7850.0)
+        return make_bodies(make_sectors(self.gears(3), material, flank_elements=24, cache=None), material)
+
+    @staticmethod
+    def gears(n_planets):
+        from femgear.gears import Gear, PlanetarySet, equal_planet_angles
+
+        common = {
+            "module": 1.5e-3,
+            "pressure_angle": np.radians(20.0),
+            "profile_shift": 0.0,
+            "face_width": 25e-3,
+        }
+        return PlanetarySet(
+            sun=Gear(teeth=36, rim_radius=12e-3, name="sun", **common),
+            planet=Gear(teeth=24, rim_radius=9e-3, name="planet", **common),
+            ring=Gear(teeth=84, rim_radius=80e-3, internal=True, name="ring", **common),
+            centre_distance=45e-3,
+            planet_angles=equal_planet_angles(n_planets),
+        )
+
+
+@pytest.fixture(scope="module")
+def planets():
+    return Planets()
+
+
+@pytest.fixture(scope="module")
+def first():
+    """Medians of the first row of every group, which the others are compared with."""
+    return {}
+
+
+def walk(benchmark, gears, bodies, positions, rounds=3):
+    from femgear.contact.cycle import walk_mesh_cycle
+
+    options = {"sun_torque": 100.0, "positions": positions}
+    return benchmark.pedantic(
+        walk_mesh_cycle, args=(gears, bodies), kwargs=options, rounds=rounds, warmup_rounds=1
+    )
+
+
+def growth(benchmark, first, group, title, size, cycle):
+    """A row whose note says by how much the time grew against how much the problem did."""
+    # without measurement (--benchmark-disable) there is nothing to compare
+    median = benchmark.stats.stats.median if benchmark.stats is not None else 1.0
+    base, start = first.setdefault(group, (median, size))
+    grown = f"{size / start:.3g} times as much takes {median / base:.2f} times as long"
+    note = f"{cycle.unknowns} pressure cells; {grown}"
+    record(benchmark, title, note)
+
+
+@pytest.mark.benchmark(group=PLANETS)
+@pytest.mark.parametrize("n_planets", [3, 4, 5, 6])
+def test_growth_over_planets(benchmark, planets, first, n_planets):
+    cycle = walk(benchmark, planets.gears(n_planets), planets.bodies, 64)
+    np.testing.assert_allclose(cycle.load_share.mean(axis=1), 1 / n_planets, rtol=1e-2)
+    growth(benchmark, first, PLANETS, f"{n_planets} planets, {2 * n_planets} meshes", n_planets, cycle)
+
+
+@pytest.mark.benchmark(group=POSITIONS)
+@pytest.mark.parametrize("positions", [16, 32, 64, 128, 256])
+def test_growth_over_positions(benchmark, reference, first, positions):
+    cycle = walk(benchmark, reference.gears, reference.bodies, positions)
+    growth(benchmark, first, POSITIONS, f"{positions} positions", positions, cycle)
