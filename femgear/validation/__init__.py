@@ -43,8 +43,8 @@ def validate(
         When the file cannot be written.
     """
     import scipy.linalg  # noqa: F401  its BLAS is limited only if it is loaded before
-    from threadpoolctl import threadpool_limits
 
+    from femgear.threads import one_blas_thread
     from femgear.validation.page import row_line, summary, write_page
     from femgear.validation.run import run_validation
     from femgear.validation.themes import THEMES
@@ -52,7 +52,7 @@ def validate(
     chosen = THEMES if theme is None else tuple(one for one in THEMES if one.name == theme)
     if not chosen:
         raise _unknown_theme(theme, [one.name for one in THEMES])
-    with threadpool_limits(1):  # sums of several threads differ in the last digits
+    with one_blas_thread():  # sums of several threads differ in the last digits
         validation = run_validation(chosen, quick=quick, progress=progress)
     if output is not None:
         write_page(validation, output)

@@ -15,10 +15,14 @@ from femgear.validation import (
     members,
     modulation,
     parametric,
+    planar,
     planetary,
+    rims,
     ring,
+    sharing,
     standard,
     static,
+    stress,
     two_body,
     vibration,
 )
@@ -102,13 +106,50 @@ THEMES = (
         "members",
         "Relief, errors and moving members",
         "The same set with tip relief, pin errors, a floating sun, planet bearings and reversed torque.",
-        (members.sharing, members.relief, members.nominal_stress),
+        (members.sharing, members.relief, members.rigid_relief),
+    ),
+    Theme(
+        "sharing",
+        "Load sharing under pin errors",
+        "Meshes of 5e8 N/m and pressure angles of 24.6 degrees, as in the set of Lin and Parker (1999); "
+        "separations, supports and solution are those of the contact problem.",
+        (sharing.pin_errors, sharing.lumped_sets),
+    ),
+    Theme(
+        "stress",
+        "Stresses of teeth",
+        "",
+        (stress.nominal_flanks, stress.nominal_roots, stress.hertz_of_teeth),
+        (stress.root_against_whole_gear,),
+    ),
+    Theme(
+        "rims",
+        "Elastic rims",
+        "27/40/108 with elastic members, 100 N m and a pin error; the ring on its foundation has a rim of "
+        "one module under the root. Tooth loads are those of the contact solution, spread over half a "
+        "module of flank. Differences are relative to the largest displacement.",
+        (rims.sharing_with_a_thin_rim,),
+        (rims.thin_ring, rims.planet_between_its_meshes),
     ),
     Theme(
         "ring",
         "Vibration of the ring",
         "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress.",
         (ring.plain_annulus, ring.toothed_ring),
+    ),
+    Theme(
+        "lumped set",
+        "Lumped planetary set",
+        "",
+        (
+            planar.frequencies,
+            planar.structure,
+            planar.torsional,
+            planar.load_sharing,
+            planar.closed_form,
+            planar.balance,
+            planar.wind_turbine,
+        ),
     ),
     Theme(
         "dynamics",

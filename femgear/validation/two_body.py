@@ -33,7 +33,7 @@ LINE_LOAD = 70e3  # N/m: 100 N m on the sun, three planets, 25 mm
 SPREAD = 1.35  # half of the finely divided stretch of flank, in half widths of the contact
 GROWTH = 0.2  # of the element size along the flank beyond it
 EDGES = 10  # element edges on one half width at level 1
-LEVELS = (0.75, 1.5, 3.0)
+LEVELS = (0.5, 1.0, 2.0)
 PLACES = ((0, "pitch point"), (-16, "approach, -16/64 base pitch"), (24, "recess, 24/64 base pitch"))
 TIP_PLACES = (61, 62)  # 1.0 and 0.3 half widths from the sun's tip corner
 
