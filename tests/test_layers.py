@@ -10,7 +10,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "femgear"
 LAYERS = (
     ("errors",),
-    ("files", "system"),
+    ("files", "system", "threads"),
     ("gears", "fe", "casefile", "netcdf", "solvers"),
     ("contact", "models", "housing", "case"),
     ("storage", "datasets", "plots", "scene"),

@@ -7,12 +7,18 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.models.planar import PlanarSet, free_motions, planar_system
-from femgear.models.planar_data import body_masses
+from femgear.models.kinds import SetMotions, class_energies, named_kinds
+from femgear.models.planar import (
+    CENTRAL,
+    PlanarSet,
+    free_motions,
+    mesh_directions,
+    pin_directions,
+    planar_system,
+)
+from femgear.models.planar_data import body_masses, member_radius
 from femgear.solvers.modal import solve_modes
 from femgear.system import Modes
-
-PURE = 0.99
 
 
 def planar_modes(data: PlanarSet, *, mesh_stiffness=None, damping_ratio: float = 0.0) -> Modes:
@@ -58,52 +64,72 @@ def planar_kinds(data: PlanarSet, shape, *, frequency) -> tuple[str, ...]:
     CaseError
         Shapes of another system (E-SHAPE).
     """
-    share = class_shares(data, shape)
-    names = ("rotational", "translational", "planet")
-    kinds = []
-    for m, value in enumerate(np.asarray(frequency)):
-        best = int(share[:, m].argmax())
-        kinds.append("rigid" if value == 0.0 else names[best] if share[best, m] >= PURE else "mixed")
-    return tuple(kinds)
+    return named_kinds(class_shares(data, shape), frequency)
 
 
 def class_shares(data: PlanarSet, shape) -> np.ndarray:
     """Shares (3, m) of rotational, translational and planet motion in the kinetic energy.
 
-    Lin and Parker (J. Vib. Acoust. 121, 1999, section 4) for equal spacing: in a rotational mode the central
-    members only turn and all planets move alike; in a translational one they only translate, and the motion
-    of planet n is ``p cos psi_n + p' sin psi_n``; in a planet mode they rest, and the planets' motion is free
-    of both patterns. The same patterns are looked for at unequal spacing, where they are not independent: the
-    shares then need not add up to one, and a motion that no class explains reaches 99 % in none.
+    See `femgear.models.kinds.class_energies`, also for unequal spacing.
     """
-    full, mass = _motion(data, shape)
-    energy = mass[:, :, None] * np.abs(full) ** 2
-    psi = data.planet_angles
-    alike = np.ones((len(psi), 1)) / np.sqrt(len(psi))
-    waves = _orthonormal(np.column_stack([np.cos(psi), np.sin(psi)]))
-    both = _orthonormal(np.column_stack([alike, waves]))
-
-    def inside(pattern):
-        amplitude = np.einsum("nk,nam->kam", pattern, full[3:])
-        return (mass[3, :, None] * np.abs(amplitude) ** 2).sum(axis=(0, 1))
-
-    rotational = energy[:3, 2].sum(axis=0) + inside(alike)
-    translational = energy[:3, :2].sum(axis=(0, 1)) + inside(waves)
-    planet = energy[3:].sum(axis=(0, 1)) - inside(both)
-    return np.array([rotational, translational, planet]) / energy.sum(axis=(0, 1))
+    motions = planar_motions(data, shape)
+    central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
+    return class_energies(motions) / (central + (np.abs(motions.weighted) ** 2).sum(axis=(0, 1)))
 
 
-def _orthonormal(patterns: np.ndarray) -> np.ndarray:
-    """Orthonormal basis of the patterns over the planets; two opposite planets know one wave only."""
-    left, size, _ = np.linalg.svd(patterns, full_matrices=False)
-    return left[:, size > 1e-9 * size[0]]
+def planar_motions(data: PlanarSet, shape) -> SetMotions:
+    """Motions of all bodies, held ones and planets fixed to their pins included.
 
+    Parameters
+    ----------
+    data : PlanarSet
+    shape : (n, m) array
+        In the coordinates of `planar_system`.
 
-def _motion(data: PlanarSet, shape) -> tuple[np.ndarray, np.ndarray]:
-    """Motions (N + 3, 3, m) and masses (N + 3, 3) of all bodies, held ones included."""
+    Raises
+    ------
+    CaseError
+        Shapes of another system (E-SHAPE).
+    """
     T, shape = free_motions(data), np.asarray(shape)
     if shape.ndim != 2 or len(shape) != T.shape[1]:
         raise CaseError(
             f"mode shapes of shape {shape.shape}", code="E-SHAPE", limit=f"({T.shape[1]}, modes)"
         )  # fmt: skip
-    return (T @ shape).reshape(data.n_planets + 3, 3, -1), body_masses(data)
+    full, mass = (T @ shape).reshape(data.n_planets + 3, 3, -1), body_masses(data)
+    return SetMotions(full[:3], mass[:3], full[3:], mass[3:], data.planet_angles)
+
+
+def planar_springs(data: PlanarSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Springs of the set by name, for `femgear.solvers.mode_energy.strain_shares`.
+
+    Parameters
+    ----------
+    data : PlanarSet
+    mesh_stiffness : (2N,) array, optional
+        [N/m]; that of the set when not given.
+
+    Returns
+    -------
+    dict of str to (columns (n, g), stiffness (g,))
+        Meshes one by one, planet bearings one by one, supports and torsional supports of the central members;
+        what is held or free has no spring.
+    """
+    T, N = free_motions(data), data.n_planets
+    k = np.asarray(data.mesh_stiffness if mesh_stiffness is None else mesh_stiffness, float)
+    meshes, pins = T.T @ mesh_directions(data), pin_directions(data)
+    names = [f"sun-planet {n + 1}" for n in range(N)] + [f"planet {n + 1}-ring" for n in range(N)]
+    springs = {name: (meshes[:, [j]], k[[j]]) for j, name in enumerate(names)}
+    for n, bearing in enumerate(data.planet_bearing):
+        if np.isfinite(bearing):
+            springs[f"bearing of planet {n + 1}"] = (T.T @ pins[:, n], np.full(2, bearing))
+    for row, name in enumerate(CENTRAL):
+        body = getattr(data, name)
+        torsion = body.torsional_support / member_radius(data, name) ** 2
+        for text, first, stiffness in (
+            (f"support of the {name}", 3 * row, np.full(2, body.support)),
+            (f"torsional support of the {name}", 3 * row + 2, np.array([torsion])),
+        ):
+            if np.all(np.isfinite(stiffness)) and np.any(stiffness):
+                springs[text] = (T[first : first + len(stiffness)].T, stiffness)
+    return springs

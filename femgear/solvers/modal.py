@@ -54,7 +54,7 @@ def solve_modes(
     Residual flexibility ``W^T K^+ W - sum r r^T / omega^2``, ``r = W^T phi`` (Geradin and Rixen, Mechanical
     Vibrations, 3rd ed., section 2.9); ``K^+`` is the inverse on the motions free of rigid modes.
     """
-    stiffness = _total_stiffness(system, mesh_stiffness)
+    stiffness = total_stiffness(system, mesh_stiffness)
     if count is not None and max_frequency is not None:
         raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
     scale, values, shape = _eigen(system.M, stiffness, count, max_frequency)
@@ -67,7 +67,7 @@ def solve_modes(
     rows[:, rigid] = 0.0
     modal_load[rigid] = 0.0
     omega = np.sqrt(np.where(rigid, 0.0, values))
-    flexible = _pseudo_solve(system.M, stiffness, shape[:, rigid], np.column_stack([system.W, system.load]))
+    flexible = pseudo_solve(system.M, stiffness, shape[:, rigid], np.column_stack([system.W, system.load]))
     static = system.W.T @ flexible
     residual = static[:, :-1] - _modal_flexibility(rows, rows, omega)
     return Modes(
@@ -102,7 +102,7 @@ def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarr
         ``L K^+ W - sum (L phi) r^T / omega^2`` [m/N per unit of L].
     """
     outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
-    static = outputs @ _pseudo_solve(*_rigid_basis(system, modes), system.W)
+    static = outputs @ pseudo_solve(*rigid_basis(system, modes), system.W)
     omega = 2.0 * np.pi * modes.frequency
     return static - _modal_flexibility(outputs @ modes.shape, modes.mesh_deflection, omega)
 
@@ -110,7 +110,7 @@ def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarr
 def output_load(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
     """Static outputs ``L K^+ load`` (n_outputs,) under the constant external load, all modes included."""
     outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
-    return outputs @ _pseudo_solve(*_rigid_basis(system, modes), system.load[:, None])[:, 0]
+    return outputs @ pseudo_solve(*rigid_basis(system, modes), system.load[:, None])[:, 0]
 
 
 def output_response(modes: Modes, response: Response, rows, *, residual, load) -> np.ndarray:
@@ -139,7 +139,7 @@ def output_response(modes: Modes, response: Response, rows, *, residual, load) -
     return out
 
 
-def _total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     n, meshes = len(system.M), np.asarray(mesh_stiffness, dtype=float)
     shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "W": (n, len(meshes)), "load": (n,)}
     for name, shape in shapes.items():
@@ -260,11 +260,11 @@ def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
         )  # fmt: skip
 
 
-def _rigid_basis(system: MechanicalSystem, modes: Modes):
-    return system.M, _total_stiffness(system, modes.mesh_stiffness), modes.shape[:, modes.frequency == 0.0]
+def rigid_basis(system: MechanicalSystem, modes: Modes):
+    return system.M, total_stiffness(system, modes.mesh_stiffness), modes.shape[:, modes.frequency == 0.0]
 
 
-def _pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
+def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
     """``K^+ loads``: elastic displacement, mass-orthogonal to the rigid modes, of self-equilibrated loads.
 
     ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.

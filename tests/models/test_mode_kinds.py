@@ -3,7 +3,19 @@
 import numpy as np
 import pytest
 
-from femgear.models.kinds import mode_kinds
+from femgear.errors import CaseError
+from femgear.models.kinds import (
+    class_energies,
+    mode_kinds,
+    motion_planes,
+    phase_basis,
+    phase_shares,
+    phasing,
+    set_motions,
+)
+from femgear.models.planar import planar_system
+from femgear.models.planar_modes import class_shares, planar_modes
+from femgear.validation.planar import lin_parker_set
 
 
 def rigid_ring_set(planets, *, spread=0.0):
@@ -122,3 +134,116 @@ def test_a_mode_without_frequency_is_rigid():
         planet_angles=psi,
     )
     assert kinds[0] == "rigid" and "rigid" not in kinds[1:]
+
+
+def moved(shape, names, psi, mass=None):
+    return set_motions(shape, np.ones(len(names)) if mass is None else mass, names, psi)
+
+
+@pytest.mark.parametrize("planets", [3, 4, 5, 6])
+def test_phase_shares_are_the_discrete_fourier_transform(planets):
+    """Random motions in x and y, transformed by hand in local axes."""
+    names = tuple(f"planet {n + 1}: {a}" for n in range(planets) for a in ("x", "y", "rotation"))
+    psi = 0.3 + 2 * np.pi * np.arange(planets) / planets
+    draw = np.random.default_rng(planets)
+    shape = draw.normal(size=(3 * planets, 4)) + 1j * draw.normal(size=(3 * planets, 4))
+    motion = shape.reshape(planets, 3, 4)
+    local = np.exp(-1j * psi)[:, None] * (motion[:, 0].real + 1j * motion[:, 1].real)
+    other = np.exp(-1j * psi)[:, None] * (motion[:, 0].imag + 1j * motion[:, 1].imag)
+    axes = (local.real + 1j * other.real, local.imag + 1j * other.imag, motion[:, 2])
+    energy = np.array([
+        sum(abs(sum(a[n] * np.exp(-2j * np.pi * j * n / planets) for n in range(planets))) ** 2 for a in axes)
+        for j in range(planets)
+    ])  # fmt: skip
+    energy /= energy.sum(axis=0)
+    motions = moved(shape, names, psi)
+    assert phase_shares(motions, signed=True) == pytest.approx(energy, abs=1e-12)
+    folded = [
+        energy[j] + (energy[planets - j] if 0 < j < planets - j else 0.0) for j in range(planets // 2 + 1)
+    ]
+    assert phase_shares(motions) == pytest.approx(np.array(folded), abs=1e-12)
+
+
+def test_travelling_motions_are_told_apart_by_sign():
+    psi = 2 * np.pi * np.arange(5) / 5
+    names = tuple(f"planet {n + 1}: u" for n in range(5))
+    shape = np.column_stack([np.exp(1j * psi), np.exp(-1j * psi), np.cos(2 * psi)])
+    expected = np.zeros((5, 3))
+    expected[1, 0] = expected[4, 1] = 1.0
+    expected[2, 2] = expected[3, 2] = 0.5
+    assert phase_shares(moved(shape, names, psi), signed=True) == pytest.approx(expected, abs=1e-12)
+    assert phasing(moved(shape.real, names, psi)) == ("sequentially phased 1",) * 2 + (
+        "sequentially phased 2",
+    )
+
+
+@pytest.mark.parametrize("planets", [3, 4, 5, 6, 7])
+def test_phasing_goes_with_the_kind(planets):
+    """Kahraman (1994): rotational in phase, translational sequential; planet modes the other harmonics."""
+    K, mass, names, psi = rigid_ring_set(planets)
+    frequency, shape = solve(K, mass)
+    _, kinds, _ = kinds_of(K, mass, names, psi)
+    shape = shape @ phase_basis(moved(shape, names, psi, mass), frequency)
+    assert np.abs(shape.T @ (mass[:, None] * shape) - np.eye(len(mass))).max() < 1e-9
+    assert (
+        np.abs(K @ shape - mass[:, None] * shape * (2 * np.pi * frequency) ** 2).max()
+        < 1e-7 * np.abs(K).max()
+    )
+    found = phasing(moved(shape, names, psi, mass))
+    for kind, phase in zip(kinds, found):
+        if kind == "rotational":
+            assert phase == "in phase"
+        elif kind == "translational":
+            assert phase == "sequentially phased 1"
+        else:
+            assert phase == "counter-phased" or int(phase[-1]) >= 2
+    counter = found.count("counter-phased")
+    assert counter == (3 if planets % 2 == 0 else 0)
+    assert "mixed" not in found
+    twice = [found.count(f"sequentially phased {j}") for j in range(2, (planets + 1) // 2)]
+    assert twice == [6] * len(twice)
+
+
+def test_unequal_planets_have_honest_phase_shares():
+    """Shares are what the patterns of a harmonic explain; signed ones are refused."""
+    psi = np.deg2rad([0.0, 60.0, 150.0, 250.0])
+    names = tuple(f"planet {n + 1}: radial" for n in range(4))
+    shape = np.column_stack([np.ones(4), np.cos(psi), np.random.default_rng(1).normal(size=4)])
+    motions = moved(shape, names, psi)
+    share = phase_shares(motions)
+    for j in range(3):
+        basis = np.column_stack([np.cos(j * psi), np.sin(j * psi)][: 2 if j else 1])
+        rest = shape - basis @ np.linalg.lstsq(basis, shape, rcond=None)[0]
+        assert share[j] == pytest.approx(1 - (rest**2).sum(axis=0) / (shape**2).sum(axis=0), abs=1e-12)
+    assert share[0, 0] == pytest.approx(1.0) and share[1, 1] == pytest.approx(1.0)
+    assert phasing(motions)[2] == "mixed"
+    with pytest.raises(CaseError, match="E-SPACING"):
+        phase_shares(motions, signed=True)
+
+
+def test_planets_at_rest_have_no_phasing():
+    names = ("sun: x", "planet 1: u", "planet 2: u", "planet 3: u")
+    motions = moved(np.array([[1.0], [0.0], [0.0], [0.0]]), names, 2 * np.pi * np.arange(3) / 3)
+    assert phasing(motions) == ("at rest",)
+    assert np.all(np.isnan(phase_shares(motions)))
+
+
+def test_names_of_both_models_give_the_same_classes():
+    """The lumped set in x, y of the planets instead of radial and tangential."""
+    data = lin_parker_set(5)
+    system, shape = planar_system(data), planar_modes(data).shape
+    names, turned = list(system.dofs), np.array(shape)
+    for n, angle in enumerate(data.planet_angles):
+        rows = [names.index(f"planet {n + 1}: {a}") for a in ("radial", "tangential")]
+        c, s = np.cos(angle), np.sin(angle)
+        turned[rows] = np.array([[c, -s], [s, c]]) @ shape[rows]
+        for row, axis in zip(rows, "xy"):
+            names[row] = f"planet {n + 1}: {axis}"
+    energies = class_energies(set_motions(turned, np.diag(system.M), names, data.planet_angles))
+    # mass-normalised shapes: energies are shares
+    assert energies == pytest.approx(class_shares(data, shape), abs=1e-12)
+
+
+def test_planes_of_motion():
+    dofs = ("sun: x", "sun: u", "sun: y", "ring: x", "planet 1: radial", "planet 1: tangential")
+    assert motion_planes(dofs).tolist() == [[0, 2], [4, 5]]

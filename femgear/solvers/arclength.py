@@ -1,0 +1,226 @@
+"""Steps of arc-length continuation: predictor, corrector, acceptance, ends of the range and closed loops.
+
+Allgower and Georg, Introduction to Numerical Continuation Methods (SIAM 2003), chapter 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.bifurcation import Segment, branch_point, folds
+from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, correct
+
+# A loop is closed when it meets its start within this (scaled) distance.
+_CLOSED = 1e-6
+# Deviation of a chord from the mean of its tangents [rad], beyond a share of the angle between them.
+_CHORD, _CHORD_SHARE = 0.003, 0.15
+# Steps below this part of the largest one may turn in a corner, where a chord can have half the angle aside.
+_CORNER, _CORNER_SHARE = 1e-3, 0.6
+
+
+@dataclass(frozen=True)
+class StepOptions:
+    """How a curve is followed; lengths are in the scaled unknowns ``(u / scale, parameter / unit)``.
+
+    Parameters
+    ----------
+    first, smallest, largest : float
+        Step lengths. Curves nearer to each other than ``largest * angle / 10`` can only be told apart by how
+        Newton's method contracts: keep ``largest`` small where solutions crowd.
+    angle : float
+        Angle between successive tangents that is aimed at [rad]; twice as much is refused.
+    contraction : float
+        Ratio of the second to the first Newton step aimed at; four times as much is refused.
+    tolerance : float
+        Last Newton step relative to ``1 + |z|``.
+    max_iterations : int
+        Newton iterations of one correction.
+    max_points : int
+        The curve ends, incomplete, after so many points.
+    """
+
+    first: float = 0.01
+    smallest: float = 1e-8
+    largest: float = 0.1
+    angle: float = 0.15
+    contraction: float = 0.15
+    tolerance: float = 1e-10
+    max_iterations: int = 10
+    max_points: int = 5000
+
+    def __post_init__(self):
+        if not 0.0 < self.smallest <= self.first or not self.smallest <= self.largest < np.inf:
+            raise CaseError(
+                f"steps from {self.smallest} over {self.first} to {self.largest}", code="E-STEP",
+                limit="0 < smallest <= first, smallest <= largest",
+            )  # fmt: skip
+        if min(self.angle, self.contraction, self.tolerance, self.max_iterations - 1, self.max_points) <= 0:
+            raise CaseError(
+                "a step option is not positive", code="E-STEP", limit="> 0; two iterations or more"
+            )
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a curve ended; complete: a closed loop or an end of the range, otherwise the message says why."""
+
+    closed: bool
+    complete: bool
+    message: str
+
+
+def curve_points(
+    curve: ScaledCurve, first: CurvePoint, *, limits, options: StepOptions | None = None
+) -> Iterator[CurvePoint]:
+    """Points of a curve one by one, limit points and branch points among them; returns an `Ending`.
+
+    ``first`` has orientation zero where it is a branch point.
+    """
+    options = options or StepOptions()
+    bounds = np.asarray(limits, float) / curve.unit
+    yield first
+    point, h, count = first, options.first, 1
+    while count < options.max_points:
+        try:
+            segment, special, h = _step(curve, point, min(h, options.largest), bounds, options)
+        except LostError as lost:
+            return Ending(False, False, f"lost after parameter = {point.z[-1] * curve.unit:.9g}: {lost}")
+        events = [*special, (segment.length, segment.last)]
+        events, closed = _closing(segment, first, events, count)
+        for _, end in _until_end(segment, events, bounds):
+            yield end
+            count += 1
+            if end.kind == "end":
+                return Ending(False, True, f"end of the range at {end.z[-1] * curve.unit:.9g}")
+        if closed:
+            return Ending(True, True, "closed loop")
+        point = segment.last
+    where = f"parameter = {point.z[-1] * curve.unit:.9g}"
+    return Ending(False, False, f"stopped at {where} after {count} points: raise max_points")
+
+
+def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: StepOptions):
+    """The next accepted point: segment, special points on it, length of the next step."""
+    reason = ""
+    while h >= options.smallest:
+        try:
+            new = _landing(curve, point, h, bounds)
+            if new is None:
+                new = correct(curve, point.z + h * point.tangent, point.tangent)
+            corner = h <= _CORNER * options.largest
+            strain = _strain(point, new, options, _CORNER_SHARE if corner else _CHORD_SHARE)
+            segment = Segment(curve, point, new)
+            special = folds(segment)
+            if point.orientation * new.orientation < 0.0:
+                special.append(branch_point(segment))
+            factor = np.clip(1.0 / max(strain, 1e-3), 0.5, 2.0)
+            return segment, sorted(special, key=lambda s: s[0]), h * factor
+        except LostError as lost:
+            reason = str(lost)
+            h *= 0.5
+    raise LostError(f"{reason} (step reduced to {h:.1e})")
+
+
+def _landing(curve: ScaledCurve, point: CurvePoint, h: float, bounds) -> CurvePoint | None:
+    """Point at the end of the range where the predictor reaches it, so that nothing is evaluated beyond."""
+    rate = point.tangent[-1]
+    bound = bounds[1] if rate > 0.0 else bounds[0]
+    way = (bound - point.z[-1]) / rate if rate else 0.0
+    if not 0.0 < way <= h:
+        return None
+    try:
+        new = _at_parameter(curve, point.z + way * point.tangent, bound, point.tangent)
+    except LostError:
+        return None  # a limit point lies before the end
+    return new if point.tangent @ (new.z - point.z) <= 2.0 * way else None
+
+
+def _at_parameter(curve: ScaledCurve, guess: np.ndarray, bound: float, along: np.ndarray) -> CurvePoint:
+    """Point of the curve at the scaled parameter ``bound``, exactly."""
+    axis = np.zeros(len(guess))
+    axis[-1] = 1.0
+    found = correct(curve, np.append(guess[:-1], bound), axis, along=along)
+    return replace(found, z=np.append(found.z[:-1], bound))
+
+
+def _strain(point: CurvePoint, new: CurvePoint, options: StepOptions, share: float) -> float:
+    """How far the step was from what is aimed at: 1 on target; refused from 2 on, or beyond the chord rule.
+
+    On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
+    a jump from curve to curve turns the chord but not the tangents.
+    """
+    cosine = float(np.clip(point.tangent @ new.tangent, -1.0, 1.0))
+    angle = np.arccos(cosine)
+    if angle > 2.0 * options.angle:
+        raise LostError(f"the tangent turns by {angle:.2g} rad")
+    if new.contraction > 4.0 * options.contraction:
+        raise LostError(f"Newton's method contracts only by {new.contraction:.2g}")
+    chord = new.z - point.z
+    mean = point.tangent + new.tangent
+    mean /= np.linalg.norm(mean)
+    along = chord @ mean
+    aside = np.arctan2(np.linalg.norm(chord - along * mean), along)
+    if aside > _CHORD + share * angle:
+        raise LostError(f"the chord leaves the tangents by {aside:.2g} rad: another curve was reached")
+    return max(angle / options.angle, np.sqrt(new.contraction / options.contraction))
+
+
+def _until_end(segment: Segment, events, bounds):
+    """Events up to the end of the range, which replaces the first one beyond it."""
+    low = (0.0, segment.first)
+    for event in events:
+        value = event[1].z[-1]
+        beyond = bounds[0] if value < bounds[0] else bounds[1] if value > bounds[1] else None
+        if beyond is not None:
+            yield _at_bound(segment, low, event, beyond)
+            return
+        outward = event[1].tangent[-1] * (value - bounds.mean()) > 0.0
+        if value in bounds and event[1] is segment.last and outward:
+            yield event[0], replace(event[1], kind="end")
+            return
+        yield event
+        low = event
+
+
+def _at_bound(segment: Segment, low, high, bound: float):
+    """Point exactly at the bound, between two points with a monotonous parameter between them."""
+    from scipy.optimize import brentq
+
+    if low[1].z[-1] == bound:
+        # the curve starts at the bound and leaves at once
+        return low[0] + np.finfo(float).tiny, replace(low[1], kind="end")
+    known = {low[0]: low[1].z[-1] - bound, high[0]: high[1].z[-1] - bound}
+
+    def gap(h: float) -> float:
+        return known[h] if h in known else segment.at(h).z[-1] - bound
+
+    h = brentq(gap, low[0], high[0], xtol=1e-13 * segment.length, rtol=1e-14)
+    near = segment.at(h) if h not in known else (low if h == low[0] else high)[1]
+    try:
+        exact = _at_parameter(segment.curve, near.z, bound, near.tangent)
+        if np.linalg.norm(exact.z - near.z) < 1e-6 * segment.length:
+            near = exact
+    except LostError:
+        pass  # the bound is a limit point: the root above stands
+    return h, replace(near, z=np.append(near.z[:-1], bound), kind="end")
+
+
+def _closing(segment: Segment, first: CurvePoint, events, count: int):
+    """Events up to the start of the curve, when the segment meets it again in the same sense."""
+    offset = first.z - segment.first.z
+    h = float(segment.first.tangent @ offset)
+    if count < 3 or not 0.0 < h <= segment.length or segment.first.tangent @ first.tangent < 0.5:
+        return events, False
+    if np.linalg.norm(offset) > 2.0 * segment.length:
+        return events, False
+    try:
+        met = segment.at(h)
+    except LostError:
+        return events, False
+    if np.linalg.norm(met.z - first.z) > _CLOSED or met.tangent @ first.tangent < 0.9:
+        return events, False
+    return [e for e in events if e[0] < h - 1e-9] + [(h, replace(first, kind="regular"))], True

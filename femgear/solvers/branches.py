@@ -1,0 +1,322 @@
+"""Branches of periodic solutions over a frequency or another parameter, with limit points and stability.
+
+Harmonic balance joined with arc-length continuation and Floquet multipliers: Krack and Gross, Harmonic
+Balance for Nonlinear Vibration Problems (2019), chapters 3 and 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.bifurcation import Segment
+from femgear.solvers.continuation import Curve, StepOptions, continue_curve, scaled_curve, switch_branch
+from femgear.solvers.corrector import correct
+from femgear.solvers.harmonic_balance import harmonic_balance
+from femgear.solvers.hill import FloquetVerdict
+from femgear.solvers.nonlinear import NonlinearSystem
+from femgear.solvers.periodic import PeriodicSolution
+from femgear.solvers.routes import FamilyRoute, FrequencyRoute, Route
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Periodic solutions along a curve.
+
+    Parameters
+    ----------
+    parameter : (p,) array
+        Frequency [rad/s] or whatever was varied, in order along the curve.
+    solutions : tuple of PeriodicSolution
+    verdicts : tuple of FloquetVerdict
+        One a solution; empty when stability was not asked for.
+    curve : Curve
+        The unknowns, limit points and branch points.
+    limits : (low, high)
+    route : Route
+        The equations along the curve.
+    """
+
+    parameter: np.ndarray
+    solutions: tuple[PeriodicSolution, ...]
+    verdicts: tuple[FloquetVerdict, ...]
+    curve: Curve
+    limits: tuple[float, float]
+    route: Route = field(repr=False)
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Base frequencies, (p, n_bases) [rad/s]."""
+        return np.stack([solution.frequency for solution in self.solutions])
+
+    @property
+    def lines(self) -> np.ndarray:
+        """Deflections of the columns, (p, n_columns, L) complex [m]."""
+        return np.stack([solution.deflection for solution in self.solutions])
+
+    @property
+    def orders(self) -> np.ndarray:
+        """Lines, (L, n_bases)."""
+        return self.solutions[0].orders
+
+    @property
+    def folds(self) -> np.ndarray:
+        """Indices of the limit points."""
+        return self.curve.folds
+
+    @property
+    def branch_points(self) -> np.ndarray:
+        """Indices of the points where another branch crosses."""
+        return self.curve.branch_points
+
+    @property
+    def stable(self) -> np.ndarray:
+        """(p,) bool: known to be stable; False where the verdict is open."""
+        return np.array([verdict.stable is True for verdict in self.verdicts])
+
+    @property
+    def loss(self) -> tuple[str, ...]:
+        """How every solution lost its stability; ``""`` where it did not or the verdict is open."""
+        return tuple(verdict.loss for verdict in self.verdicts)
+
+    @property
+    def largest_multiplier(self) -> np.ndarray:
+        """Largest modulus of the Floquet multipliers, (p,); nan where there is no verdict."""
+        return np.array([abs(v.multipliers[0]) if len(v.multipliers) else np.nan for v in self.verdicts])
+
+    @property
+    def converged(self) -> np.ndarray:
+        """(p,) bool."""
+        return np.array([solution.converged for solution in self.solutions])
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Largest violation of the harmonic equations relative to the largest deflection, (p,)."""
+        return np.array([solution.residual for solution in self.solutions])
+
+    @property
+    def tail(self) -> np.ndarray:
+        """Share of the amplitude in the upper half of the lines, (p,)."""
+        return np.array([solution.tail for solution in self.solutions])
+
+    @property
+    def closed(self) -> bool:
+        """The last solution is the first one again."""
+        return self.curve.closed
+
+    @property
+    def complete(self) -> bool:
+        """The branch reached an end of the range or closed."""
+        return self.curve.complete
+
+    @property
+    def message(self) -> str:
+        """How the branch ended."""
+        return self.curve.message
+
+
+def frequency_response_curve(
+    problem: NonlinearSystem,
+    frequency: tuple[float, float],
+    *,
+    harmonics: int | None = None,
+    orders=None,
+    base: int = 0,
+    held=None,
+    start=None,
+    start_at: float | None = None,
+    stability: bool = True,
+    tolerance: float = 1e-7,
+    samples=None,
+    reduction=None,
+    scale: float | None = None,
+    options: StepOptions | None = None,
+) -> Branch:
+    """Periodic solutions over a base frequency, past limit points.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    frequency : (first, last)
+        [rad/s]; the curve starts at the first one towards the last one, which may be lower.
+    harmonics, orders, samples, reduction
+        As for ``harmonic_balance``.
+    base : int
+        Which base frequency varies.
+    held : (n_bases,) array, optional
+        The base frequencies, when there are several; the entry ``base`` is not used.
+    start : PeriodicSolution or (n_columns, L) array, optional
+        Near the solution to start from; found from the linear response when not given.
+    start_at : float, optional
+        Frequency of the start, within the range, when it is not the first one; closed loops need that.
+    stability : bool
+        Floquet verdict at every point. With several base frequencies each says "not covered".
+    tolerance : float
+        Relative error of the monodromy matrices.
+    scale : float, optional
+        Deflection [m] that counts as much as the whole range of frequencies; by default the larger of the
+        static deflection and the start.
+    options : StepOptions, optional
+
+    Raises
+    ------
+    CaseError
+        A range, start or base that cannot be used.
+    ConvergenceError
+        No solution at the start.
+    """
+    balance = harmonic_balance(
+        problem, harmonics=harmonics, orders=orders, samples=samples, reduction=reduction
+    )
+    bases = balance.orders.shape[1]
+    others = np.ones(bases) if held is None and bases == 1 else held
+    if others is None or np.shape(others) != (bases,) or not 0 <= base < bases:
+        raise CaseError(
+            f"base {base} with the other base frequencies {others}", code="E-FREQUENCY", key="held",
+            limit=f"{bases} base frequencies and one of them to vary",
+        )  # fmt: skip
+    if not 0.0 <= min(frequency) < max(frequency) < np.inf:
+        raise CaseError(
+            f"a range of frequencies {tuple(frequency)}",
+            code="E-RANGE",
+            limit="two different ones, not negative",
+        )
+    route = FrequencyRoute(balance, tuple(np.asarray(others, float).tolist()), base)
+    return _follow(route, frequency, start, start_at, stability, tolerance, scale, options)
+
+
+def parameter_curve(
+    family: Callable[[float], NonlinearSystem],
+    parameter: tuple[float, float],
+    frequency,
+    *,
+    harmonics: int | None = None,
+    orders=None,
+    start=None,
+    start_at: float | None = None,
+    stability: bool = True,
+    tolerance: float = 1e-7,
+    samples=None,
+    scale: float | None = None,
+    options: StepOptions | None = None,
+) -> Branch:
+    """Periodic solutions over any parameter at fixed base frequencies: amplitude, backlash, clearance, ...
+
+    Parameters
+    ----------
+    family : callable
+        Parameter -> NonlinearSystem; called within the range.
+    parameter : (first, last)
+        The curve starts at the first value towards the last one.
+    frequency : float or (n_bases,) array
+        [rad/s].
+    harmonics, orders, start, start_at, stability, tolerance, samples, scale, options
+        As for :func:`frequency_response_curve`. The derivative by the parameter is taken by differences.
+    """
+    if not np.all(np.isfinite(parameter)) or min(parameter) == max(parameter):
+        raise CaseError(
+            f"a range of parameters {tuple(parameter)}", code="E-RANGE", limit="two different ones"
+        )
+    begin = parameter[0] if start_at is None else start_at
+    balance = harmonic_balance(family(begin), harmonics=harmonics, orders=orders, samples=samples)
+    omega = tuple(np.atleast_1d(np.asarray(frequency, float)).tolist())
+    route = FamilyRoute(family, balance, omega, (min(parameter), max(parameter)), samples)
+    return _follow(route, parameter, start, start_at, stability, tolerance, scale, options)
+
+
+def crossing_branches(
+    branch: Branch, index: int, *, stability: bool = True, tolerance: float = 1e-7, options=None
+) -> tuple[Branch, Branch]:
+    """The branch that crosses a known one in a branch point, in both directions from there.
+
+    Parameters
+    ----------
+    branch : Branch
+    index : int
+        One of ``branch.branch_points``.
+
+    Raises
+    ------
+    CaseError
+        The point is no branch point.
+    ConvergenceError
+        The branch point is not simple.
+    """
+    curves = switch_branch(branch.route.evaluate, branch.curve, index, limits=branch.limits, options=options)
+    return tuple(_branch(branch.route, curve, branch.limits, stability, tolerance) for curve in curves)
+
+
+def branch_maximum(
+    branch: Branch, measure: Callable[[np.ndarray], float]
+) -> tuple[float, float, PeriodicSolution]:
+    """Largest value along a branch, found between its points: parameter, value, solution.
+
+    Parameters
+    ----------
+    branch : Branch
+    measure : callable
+        Lines (n_columns, L) -> float.
+    """
+    from scipy.optimize import minimize_scalar
+
+    values = np.array([measure(lines) for lines in branch.lines])
+    top = int(np.argmax(values))
+    best = (float(branch.parameter[top]), float(values[top]), branch.solutions[top])
+    known, z = (
+        branch.curve,
+        np.column_stack([branch.curve.points / branch.curve.scale, branch.parameter / branch.curve.unit]),
+    )
+    curve = scaled_curve(
+        branch.route.evaluate, known.points[top], known.parameter[top], limits=branch.limits,
+        scale=known.scale, unit=known.unit,
+    )  # fmt: skip
+    for i in {max(top - 1, 0), min(top, len(z) - 2)}:
+        ends = [correct(curve, z[k], known.tangent[k]) for k in (i, i + 1)]
+        segment = Segment(curve, *ends)
+
+        def lowered(h: float, segment=segment) -> float:
+            u, _ = curve.physical(segment.at(h).z)
+            return -measure(branch.route.lines(u))
+
+        found = minimize_scalar(
+            lowered, bounds=(0.0, segment.length), method="bounded", options={"xatol": 1e-10}
+        )
+        if -found.fun > best[1]:
+            u, parameter = curve.physical(segment.at(found.x).z)
+            best = (parameter, float(-found.fun), branch.route.solution(u, parameter, 0.0))
+    return best
+
+
+def _follow(route, ends, start, start_at, stability, tolerance, scale, options) -> Branch:
+    """The branch of a route between two ends of its parameter."""
+    limits = (float(min(ends)), float(max(ends)))
+    begin = float(ends[0]) if start_at is None else float(start_at)
+    if not limits[0] <= begin <= limits[1]:
+        raise CaseError(
+            f"the start at {begin:.6g} lies outside the range", code="E-RANGE", key="start_at",
+            limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
+        )  # fmt: skip
+    first = route.first(begin, start)
+    if not first.converged:
+        raise ConvergenceError(
+            f"no periodic solution found at the start {begin:.6g}: {first.message}", code="E-START",
+            remedy="give a start, or start where the response is nearly linear",
+        )  # fmt: skip
+    size = max(route.scale, float(np.abs(first.deflection).max())) if scale is None else scale
+    curve = continue_curve(
+        route.evaluate, route.unknowns(first.deflection), begin, limits=limits, scale=size,
+        direction=1 if ends[1] > ends[0] else -1, options=options,
+    )  # fmt: skip
+    return _branch(route, curve, limits, stability, tolerance)
+
+
+def _branch(route: Route, curve: Curve, limits, stability: bool, tolerance: float) -> Branch:
+    solutions = tuple(
+        route.solution(u, float(parameter), float(error), int(count))
+        for u, parameter, error, count in zip(curve.points, curve.parameter, curve.error, curve.iterations)
+    )
+    verdicts = route.verdicts(curve.parameter, solutions, tolerance) if stability else ()
+    return Branch(curve.parameter, solutions, verdicts, curve, limits, route)

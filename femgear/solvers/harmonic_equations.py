@@ -1,0 +1,243 @@
+"""The harmonic equations of the element deflections, whatever the number of degrees of freedom.
+
+``X_l + T(omega_l) (F_l - reference X_l) = T_load(omega_l) S_l`` for every line l, with the receptance T of
+the system whose elements are springs of the reference stiffness, the lines F of the element forces by
+alternating between frequency and time, and the loads S.
+(Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019, chapters 2 and 4.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.aft import (
+    PhaseGrid,
+    coupled_pairs,
+    forces_on_grid,
+    on_grid,
+    phase_grid,
+    sample_counts,
+)
+from femgear.solvers.elements import Element
+from femgear.solvers.lines import checked_lines, harmonic_lines, line_tail
+from femgear.solvers.nonlinear import NonlinearSystem
+from femgear.solvers.periodic import PeriodicSolution
+from femgear.solvers.receptance import Reduction, reduce_problem, source_columns
+
+
+@dataclass(frozen=True)
+class LineForces:
+    """What the elements do beyond their reference springs.
+
+    Parameters
+    ----------
+    lines : (n_columns, L) complex array
+        [N]
+    products : (n_pairs, L, 2 L - 1) complex array
+        Their derivative by the unknowns of one column, for every coupled pair [N/m].
+    """
+
+    lines: np.ndarray
+    products: np.ndarray
+
+
+@dataclass(frozen=True)
+class HarmonicBalance:
+    """The harmonic equations of a problem on given lines, ready for any base frequencies.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    orders : (L, n_bases) int array
+        Lines; line 0 is the mean.
+    reduction : Reduction
+    grid : PhaseGrid
+    elements : tuple of Element
+        With their coefficients on the grid.
+    pairs : (n_pairs, 2) int array
+        Columns that elements couple.
+    source : (n_loads, L) complex array
+        Amplitudes of the load columns of the reduction.
+    scale : float
+        Typical deflection [m]: the largest static one, or a length of the elements where there is none.
+    """
+
+    problem: NonlinearSystem
+    orders: np.ndarray
+    reduction: Reduction
+    grid: PhaseGrid
+    elements: tuple[Element, ...]
+    pairs: np.ndarray
+    source: np.ndarray
+    scale: float
+
+    @property
+    def size(self) -> int:
+        """Number of real unknowns, ``n_columns (2 L - 1)``."""
+        return len(self.reduction.reference) * (2 * len(self.orders) - 1)
+
+    def unknowns(self, lines) -> np.ndarray:
+        """Real vector ``Re X_0, Re X_1, Im X_1, ...`` column by column, of lines (n_columns, L)."""
+        lines = np.asarray(lines, complex)
+        out = np.empty((len(lines), 2 * lines.shape[1] - 1))
+        out[:, 0], out[:, 1::2], out[:, 2::2] = lines[:, 0].real, lines[:, 1:].real, lines[:, 1:].imag
+        return out.ravel()
+
+    def lines(self, y) -> np.ndarray:
+        """Lines (n_columns, L) of the unknowns."""
+        table = np.asarray(y, float).reshape(len(self.reduction.reference), -1)
+        out = np.empty((len(table), len(self.orders)), complex)
+        out[:, 0], out[:, 1:] = table[:, 0], table[:, 1::2] + 1j * table[:, 2::2]
+        return out
+
+    def forces(self, lines) -> LineForces:
+        """What the elements do beyond their reference springs, at lines (n_columns, L)."""
+        reference = self.reduction.reference
+        x = self.grid.values(lines)
+        force, tangent = forces_on_grid(self.elements, self.pairs, x, self.grid.theta)
+        own = self.pairs[:, 0] == self.pairs[:, 1]
+        tangent[:, own] -= reference[self.pairs[own, 0]]
+        # one transform for forces and tangents; columns without elements keep their reference spring
+        both = self.grid.transform(np.hstack([force - reference * x, tangent]))
+        n = len(reference)
+        return LineForces(self.grid.amplitudes(both[:n]), self.grid.products(both[n:]))
+
+    def receptance(self, frequency) -> tuple[np.ndarray, np.ndarray]:
+        """Receptance and its derivative (L, n_columns, n_columns + n_loads) at all lines."""
+        frequency = np.atleast_1d(np.asarray(frequency, float))
+        return self.reduction.at(self.orders @ frequency)
+
+    def residual(self, lines, forces, receptance) -> np.ndarray:
+        """``X + T (F - reference X) - T_load S`` (n_columns, L) [m]."""
+        return lines + self._respond(receptance, forces.lines)
+
+    def jacobian(self, forces, receptance) -> np.ndarray:
+        """Derivative (n_y, n_y) of the residual by the unknowns."""
+        n, width = len(self.reduction.reference), 2 * len(self.orders) - 1
+        columns = np.zeros((n, len(self.orders), n, width), complex)
+        transfer = receptance[:, :, :n].transpose(1, 0, 2)
+        for (row, column), block in zip(self.pairs, forces.products):
+            columns[:, :, column] += transfer[:, :, row, None] * block
+        out = np.empty((n, width, n, width))
+        out[:, 0], out[:, 1::2], out[:, 2::2] = columns[:, 0].real, columns[:, 1:].real, columns[:, 1:].imag
+        out = out.reshape(n * width, n * width)
+        out[np.diag_indices(n * width)] += 1.0
+        return out
+
+    def evaluate(self, y, frequency) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Residual (n_y,) [m], its derivative (n_y, n_y) by y and (n_y, n_bases) by the base frequencies.
+
+        Parameters
+        ----------
+        y : (n_y,) array
+            See `unknowns`.
+        frequency : (n_bases,) array
+            Base frequencies [rad/s].
+        """
+        lines = self.lines(y)
+        forces = self.forces(lines)
+        value, change = self.receptance(frequency)
+        moved = self._respond(change, forces.lines)
+        slope = np.stack([self.unknowns(moved * order) for order in self.orders.T], axis=1)
+        residual = self.unknowns(self.residual(lines, forces, value))
+        return residual, self.jacobian(forces, value), slope
+
+    def linear_start(self, frequency) -> np.ndarray:
+        """Unknowns of the response with reference springs, forced by what the elements do at its mean."""
+        value, _ = self.receptance(frequency)
+        static = -self._respond(value, np.zeros((len(self.reduction.reference), len(self.orders))))
+        mean = np.zeros_like(static)
+        mean[:, 0] = static[:, 0]
+        return self.unknowns(-self._respond(value, self.forces(mean).lines))
+
+    def solution(self, y, frequency, **what_happened) -> PeriodicSolution:
+        """The unknowns as a solution; keywords are the fields of `PeriodicSolution` that say how it came."""
+        frequency = np.atleast_1d(np.asarray(frequency, float))
+        lines = self.lines(y)
+        forces = self.forces(lines)
+        if "residual" not in what_happened:
+            error = self.unknowns(self.residual(lines, forces, self.receptance(frequency)[0]))
+            what_happened["residual"] = relative_residual(error, y, self.scale)
+        told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
+        force = forces.lines + self.reduction.reference[:, None] * lines
+        return PeriodicSolution(
+            frequency, self.orders, lines, force, tail=line_tail(lines, self.orders), **told
+        )
+
+    def _respond(self, receptance, force) -> np.ndarray:
+        """``T force - T_load S`` (n_columns, L)."""
+        table = np.concatenate([force, -self.source]).T
+        return (receptance @ table[..., None])[..., 0].T
+
+
+def harmonic_balance(
+    problem: NonlinearSystem,
+    *,
+    harmonics: int | None = None,
+    orders=None,
+    samples=None,
+    reduction: Reduction | None = None,
+) -> HarmonicBalance:
+    """The harmonic equations of a problem.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    harmonics : int, optional
+        Highest harmonic; with several base frequencies the highest sum of orders (`harmonic_lines`).
+    orders : (L, n_bases) int array, optional
+        The lines themselves, such as those of `side_bands`. One of the two must be given.
+    samples : int or tuple of int, optional
+        Points of the phase grid along every base; see `sample_counts` for the default.
+    reduction : Reduction, optional
+        Of the same problem, from `reduce_problem`; made here when not given.
+
+    Raises
+    ------
+    CaseError
+        Lines that cannot be used, a harmonic force without line, too few samples.
+    ConvergenceError
+        A rigid motion that strains a column, see `reduce_problem`.
+    """
+    if (harmonics is None) == (orders is None):
+        raise CaseError("give the number of harmonics or the lines", code="E-LINES", limit="one of the two")
+    orders = harmonic_lines(harmonics, problem.bases) if orders is None else checked_lines(orders)
+    bases = orders.shape[1]
+    if bases < problem.bases:
+        raise CaseError(
+            f"lines of {bases} base frequencies, elements and forces of {problem.bases}", code="E-LINES",
+            remedy="give one order a base frequency",
+        )  # fmt: skip
+    if samples is not None:
+        samples = (samples,) * bases if np.ndim(samples) == 0 else tuple(samples)
+        if len(samples) != bases or any(int(count) != count for count in samples):
+            raise CaseError(f"samples {samples} for {bases} base frequencies", code="E-SAMPLES")
+    reduction = reduce_problem(problem) if reduction is None else reduction
+    columns, loads = len(reduction.reference), 1 + 2 * len(problem.forces)
+    if reduction.static.shape != (columns, columns + loads) or columns != problem.system.W.shape[1]:
+        raise CaseError("the reduction belongs to another problem", code="E-SHAPE", key="reduction")
+    source = source_columns(problem, orders)
+    grid = phase_grid(orders, samples or sample_counts(problem, orders))
+    elements = tuple(on_grid(element, grid.theta) for element in problem.elements)
+    scale = _typical_deflection(problem, reduction, source)
+    return HarmonicBalance(problem, orders, reduction, grid, elements, coupled_pairs(elements), source, scale)
+
+
+def _typical_deflection(problem, reduction, source) -> float:
+    """Largest static deflection; else the largest length that an element names; else one metre."""
+    loads = reduction.static[:, len(reduction.reference) :]
+    static = np.abs(loads @ source).max(initial=0.0)
+    if static > 0.0:
+        return float(static)
+    names = ("backlash", "clearance", "breaks", "smoothing")
+    lengths = [np.ravel(getattr(e, name)) for e in problem.elements for name in names if hasattr(e, name)]
+    sizes = np.abs(np.concatenate([*lengths, np.zeros(1)]))
+    return float(sizes[np.isfinite(sizes)].max()) or 1.0
+
+
+def relative_residual(error, y, scale) -> float:
+    """Largest violation relative to the largest deflection."""
+    return float(np.abs(error).max() / max(np.abs(y).max(), 1e-9 * scale))

@@ -1,0 +1,289 @@
+"""Stability of periodic solutions: Floquet multipliers from the monodromy matrix or by Hill's method."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.floquet import monodromy
+from femgear.solvers.nonlinear import NonlinearSystem, element_forces
+from femgear.solvers.periodic import PeriodicSolution
+from femgear.solvers.tangent_jumps import tangent_jumps
+from femgear.solvers.variational import Frame, frame_of, passage
+
+# Multipliers beyond the unit circle by less than this are taken as on it.
+_CIRCLE = 1e-6
+# A multiplier is real when its imaginary part is smaller than this share of it.
+_REAL = 1e-7
+# States treated together, and instants of a piece at which tangents are compared.
+_BATCH = 32
+_INSIDE = 7
+
+
+@dataclass(frozen=True)
+class FloquetVerdict:
+    """Whether a periodic solution is stable.
+
+    Parameters
+    ----------
+    multipliers : (m,) complex array
+        Of one period of the base frequency, largest modulus first; empty where there is no verdict.
+    exponents : (m,) complex array
+        ``log(multiplier) / period`` [1/s].
+    stable : bool or None
+        None where the method does not cover the solution or its error leaves the question open.
+    loss : str
+        ``""`` when stable; how the largest multiplier leaves the unit circle: ``"fold"`` (through +1: limit
+        point, pitchfork, transcritical), ``"flip"`` (through -1) or ``"Neimark-Sacker"`` (complex pair).
+    method : str
+        ``"exact exponentials"``, ``"splitting"``, ``"Hill"`` or ``""``.
+    message : str
+    error : float
+        Estimated relative error of the monodromy matrix; of Hill's method it is not known (nan).
+    """
+
+    multipliers: np.ndarray
+    exponents: np.ndarray
+    stable: bool | None
+    loss: str
+    method: str
+    message: str
+    error: float = 0.0
+
+
+def floquet_verdict(
+    problem: NonlinearSystem,
+    solution: PeriodicSolution,
+    *,
+    method: str = "monodromy",
+    tolerance: float = 1e-7,
+    harmonics: int | None = None,
+    modes: int = 100,
+) -> FloquetVerdict:
+    """Stability of one periodic solution; see :func:`floquet_verdicts`."""
+    return floquet_verdicts(
+        problem, [solution], method=method, tolerance=tolerance, harmonics=harmonics, modes=modes
+    )[0]
+
+
+def floquet_verdicts(
+    problem: NonlinearSystem,
+    solutions: Sequence[PeriodicSolution],
+    *,
+    method: str = "monodromy",
+    tolerance: float = 1e-7,
+    harmonics: int | None = None,
+    modes: int = 100,
+) -> tuple[FloquetVerdict, ...]:
+    """Stability of periodic solutions of one problem.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    solutions : sequence of PeriodicSolution
+        All with the same lines. With two base frequencies the verdict is "not covered".
+    method : str
+        ``"monodromy"``: exact exponentials where the tangents are constant in pieces, otherwise a splitting,
+        with steps that end where contacts open or close. ``"hill"``: eigenvalues of the harmonic operator.
+    tolerance : float
+        Relative error of the monodromy matrix.
+    harmonics : int, optional
+        Of Hill's method; by default twice those of the solution.
+    modes : int
+        Largest number of modes followed; the others count as static flexibility.
+
+    Raises
+    ------
+    CaseError
+        An unknown method.
+    ConvergenceError
+        Modes left out that are too flexible.
+
+    Notes
+    -----
+    Free motions that no element and no damping feels (rotation of a free train) have the multiplier one and
+    are left out.
+    """
+    if method not in ("monodromy", "hill"):
+        raise CaseError(
+            f"stability by {method!r}", code="E-METHOD", key="method", limit='"monodromy" or "hill"'
+        )
+    frame = frame_of(problem, modes=modes)
+    out = [_not_covered(solution) for solution in solutions]
+    covered = [i for i, verdict in enumerate(out) if verdict is None]
+    for first in range(0, len(covered), _BATCH):
+        part = covered[first : first + _BATCH]
+        chosen = [solutions[i] for i in part]
+        if method == "hill":
+            found = [_by_hill(frame, problem, solution, harmonics) for solution in chosen]
+        else:
+            found = _by_monodromy(frame, problem, chosen, tolerance)
+        for i, verdict in zip(part, found):
+            out[i] = verdict
+    return tuple(out)
+
+
+def _not_covered(solution: PeriodicSolution) -> FloquetVerdict | None:
+    if solution.orders.shape[1] > 1:
+        reason = "not covered: a solution with several base frequencies is not periodic"
+    elif not solution.converged:
+        reason = "not covered: the solution did not converge"
+    else:
+        return None
+    return FloquetVerdict(np.zeros(0, complex), np.zeros(0, complex), None, "", "", reason, np.nan)
+
+
+def tangents_of(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution]):
+    """Function ``(fraction (m, s), states (m,)) -> tangents (m, s, n_c, n_c)`` [N/m] along the solutions."""
+    lines = np.stack([solution.deflection for solution in solutions])
+    orders = solutions[0].orders[:, 0]
+
+    def tangents(fraction, states):
+        phase = 2.0 * np.pi * fraction
+        wave = np.exp(1j * phase)[..., None] ** orders
+        x = (wave @ np.swapaxes(lines[states], 1, 2)).real
+        return element_forces(problem, x, phase[..., None])[1]
+
+    return tangents
+
+
+def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[FloquetVerdict]:
+    period = np.array([2.0 * np.pi / abs(solution.frequency[0]) for solution in solutions])
+    tangents = tangents_of(problem, solutions)
+    breaks = tangent_jumps(tangents, np.arange(len(solutions)))
+    exact = [_constant_pieces(tangents, i, inner) for i, inner in enumerate(breaks)]
+    out = [
+        None if pieces is None else _exact_verdict(frame, T, inner, pieces)
+        for T, inner, pieces in zip(period, breaks, exact)
+    ]
+    rest = np.array([i for i, pieces in enumerate(exact) if pieces is None], int)
+    if len(rest):
+        moved = passage(
+            frame, period[rest], lambda f, states: tangents(f, rest[states]), [breaks[i] for i in rest],
+            tolerance=tolerance,
+        )  # fmt: skip
+        values = np.linalg.eigvals(moved.matrix)
+        for i, multipliers, error in zip(rest, values, moved.error):
+            out[i] = verdict_of(multipliers, period[i], "splitting", float(error), tolerance)
+    return out
+
+
+def _constant_pieces(tangents, state: int, inner: np.ndarray) -> np.ndarray | None:
+    """Tangents (pieces, n_c, n_c) of a state whose tangents are constant between the breaks."""
+    ends = np.concatenate([[0.0], inner, [1.0]])
+    inside = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(_INSIDE) + 0.5) / _INSIDE
+    values = tangents(inside.reshape(1, -1), np.array([state]))[0]
+    values = values.reshape(*inside.shape, *values.shape[1:])
+    spread = np.abs(values - values[:, :1]).max(initial=0.0)
+    return values[:, 0] if spread <= 1e-13 * np.abs(values).max(initial=0.0) else None
+
+
+def _exact_verdict(frame: Frame, period: float, inner, pieces) -> FloquetVerdict:
+    durations = np.diff(np.concatenate([[0.0], inner, [1.0]])) * period
+    unit = frame.fastest or 1.0
+    both = np.concatenate([np.ones(len(frame.square)), np.full(len(frame.square), unit)])
+    matrices = frame.state_matrices(frame.kappa(pieces)) * both / both[:, None]
+    multipliers = np.linalg.eigvals(monodromy(matrices, durations))
+    return verdict_of(multipliers, period, "exact exponentials", 0.0, np.inf)
+
+
+def verdict_of(multipliers, period: float, method: str, error: float, tolerance: float) -> FloquetVerdict:
+    """Verdict on the multipliers of one period.
+
+    Parameters
+    ----------
+    multipliers : (m,) complex array
+    period : float
+        [s].
+    method : str
+    error, tolerance : float
+        Estimated and allowed relative error of the monodromy matrix.
+    """
+    multipliers = np.asarray(multipliers, complex)
+    size = np.abs(multipliers)
+    # of a complex pair the one with positive imaginary part first, whatever rounding does to the moduli
+    rounded = np.round(size / max(size.max(initial=0.0), 1e-300), 9)
+    multipliers = multipliers[np.lexsort((-multipliers.imag, -rounded))]
+    largest = float(np.abs(multipliers[0])) if len(multipliers) else 0.0
+    with np.errstate(divide="ignore"):
+        exponents = np.log(multipliers) / period
+    stable: bool | None = largest <= 1.0 + _CIRCLE
+    message = f"largest multiplier {largest:.6g}"
+    if error > tolerance and abs(largest - 1.0) <= max(10.0 * error, _CIRCLE):
+        stable = None
+        message += f", undecided: error of the monodromy matrix {error:.1e}, aimed at {tolerance:.1e}"
+    loss = "" if stable is not False else loss_of(multipliers[0])
+    outside = int(np.sum(np.abs(multipliers) > 1.0 + _CIRCLE))
+    if loss:
+        message += f" ({loss}); {outside} outside the unit circle"
+    return FloquetVerdict(multipliers, exponents, stable, loss, method, message, error)
+
+
+def loss_of(multiplier: complex) -> str:
+    """How a multiplier outside the unit circle left it: "fold", "flip" or "Neimark-Sacker"."""
+    if abs(multiplier.imag) > _REAL * abs(multiplier):
+        return "Neimark-Sacker"
+    return "fold" if multiplier.real > 0.0 else "flip"
+
+
+def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int | None) -> FloquetVerdict:
+    count = 2 * int(np.abs(solution.orders).max()) if harmonics is None else int(harmonics)
+    if count < 1:
+        raise CaseError("Hill's method needs a harmonic", code="E-HARMONICS", value=count, limit=">= 1")
+    omega = abs(float(solution.frequency[0]))
+    samples = max(512, 16 * count)
+    fraction = np.arange(samples)[None] / samples
+    kappa = frame.kappa(tangents_of(problem, [solution])(fraction, np.array([0]))[0])
+    exponents = hill_exponents(frame, kappa, omega, harmonics=count)
+    period = 2.0 * np.pi / omega
+    return verdict_of(np.exp(exponents * period), period, "Hill", np.nan, np.inf)
+
+
+def hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:
+    """Floquet exponents (2 n,) [1/s] by Hill's method.
+
+    ``z = exp(lambda t) sum_h z_h exp(i h omega t)`` in the first-order form gives the eigenvalues of the
+    block Toeplitz matrix ``A_(h - m) - i h omega``. Of every exponent it holds copies ``lambda + i k omega``;
+    those with the most symmetric eigenvectors are the converged ones (Moore, SIAM J. Numer. Anal. 42, 2005):
+    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each.
+
+    Parameters
+    ----------
+    frame : Frame
+    kappa : (samples, n_c, n_c) array
+        Change of stiffness from the reference over one period [N/m].
+    omega : float
+        Base frequency [rad/s].
+    harmonics : int
+    """
+    n, orders = len(frame.square), np.arange(-harmonics, harmonics + 1)
+    lines = np.fft.fft(kappa, axis=0) / len(kappa)
+    both = np.concatenate([np.ones(n), np.full(n, omega)])
+    change = np.zeros((4 * harmonics + 1, 2 * n, 2 * n), complex)
+    for number in range(-2 * harmonics, 2 * harmonics + 1):
+        change[number, n:, :n] = -frame.rows.T @ lines[number] @ frame.rows
+    change[0] += frame.state_matrices(np.zeros_like(lines[0].real))
+    change *= both / both[:, None]
+    size = 2 * n * len(orders)
+    matrix = change[orders[:, None] - orders].swapaxes(1, 2).reshape(size, size)
+    matrix[range(size), range(size)] -= 1j * omega * np.repeat(orders, 2 * n)
+    values, vectors = np.linalg.eig(matrix)
+    weight = (np.abs(vectors.reshape(len(orders), 2 * n, -1)) ** 2).sum(axis=1)
+    centre = np.abs(orders @ weight) / weight.sum(axis=0)
+    return _one_copy_each(values[np.argsort(centre, kind="stable")], omega, 2 * n)
+
+
+def _one_copy_each(values: np.ndarray, omega: float, count: int) -> np.ndarray:
+    """The first ``count`` values of which none is another one shifted by a multiple of ``i omega``."""
+    chosen: list[complex] = []
+    for value in values:
+        shift = (value - np.array(chosen)) / (1j * omega)
+        turns = np.round(shift.real)
+        if not np.any((np.abs(shift - turns) < 1e-4) & (turns != 0)):
+            chosen.append(value)
+        if len(chosen) == count:
+            break
+    return np.array(chosen)

@@ -1,0 +1,187 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femgear.errors import CaseError
+from femgear.solvers.branches import (
+    branch_maximum,
+    crossing_branches,
+    frequency_response_curve,
+    parameter_curve,
+)
+from femgear.solvers.continuation import StepOptions
+from femgear.solvers.elements import GearMeshes, PolynomialSprings, gear_meshes
+from femgear.solvers.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, modal_damping
+from femgear.solvers.series import FourierSeries
+from femgear.solvers.stability_chart import stability_boundary
+from femgear.system import MechanicalSystem
+
+ONE = np.ones((1, 1))
+
+
+def duffing(amplitude=0.18):
+    system = MechanicalSystem(ONE, 0.05 * ONE, ONE, ONE, np.zeros(1), ("x",))
+    cubic = PolynomialSprings(np.array([0]), np.array([[0.0, 0.0, 0.1]]))
+    return NonlinearSystem(system, (cubic,), (HarmonicForce(np.array([amplitude])),))
+
+
+def first(lines):
+    return abs(lines[0, 1])
+
+
+@pytest.fixture(scope="module")
+def eleven():
+    return frequency_response_curve(duffing(), (0.8, 1.5), harmonics=11, options=StepOptions(largest=0.2))
+
+
+def test_limit_points_of_the_published_example(eleven):
+    # NLvib example 01 with 11 harmonics
+    upper, lower = eleven.folds
+    assert eleven.complete and eleven.parameter[-1] == 1.5 and not len(eleven.branch_points)
+    assert eleven.parameter[upper] == pytest.approx(1.2696019555, abs=1e-9)
+    assert first(eleven.lines[upper]) == pytest.approx(2.8250167129, abs=1e-8)
+    assert eleven.parameter[lower] == pytest.approx(1.1157002518, abs=1e-9)
+    assert first(eleven.lines[lower]) == pytest.approx(1.0818703234, abs=1e-8)
+    assert eleven.residual.max() < 1e-10 and eleven.converged.all() and eleven.tail.max() < 1e-4
+
+
+def test_stability_changes_at_the_limit_points_only(eleven):
+    upper, lower = eleven.folds
+    assert eleven.stable[:upper].all() and eleven.stable[lower + 1 :].all()
+    assert not eleven.stable[upper + 1 : lower].any()
+    assert set(eleven.loss[upper + 1 : lower]) == {"fold"}
+    np.testing.assert_allclose(eleven.largest_multiplier[[upper, lower]], 1.0, atol=2e-6)
+
+
+def test_largest_amplitude_between_the_points(eleven):
+    frequency, amplitude, solution = branch_maximum(eleven, first)
+    assert amplitude == pytest.approx(2.830197, abs=2e-6)
+    assert frequency == pytest.approx(1.26869, abs=5e-5)
+    assert solution.residual < 1e-9 and first(solution.deflection) == amplitude
+
+
+def test_one_harmonic_equals_the_closed_form():
+    found = frequency_response_curve(
+        duffing(), (1.6, 0.8), harmonics=1, stability=False, options=StepOptions(largest=0.2)
+    )
+    assert found.verdicts == ()
+    lower, upper = found.folds
+    assert found.parameter[[upper, lower]] == pytest.approx([1.2675369595, 1.1155859272], abs=1e-9)
+    a = np.array([first(lines) for lines in found.lines])
+    assert a[[upper, lower]] == pytest.approx([2.8362225966, 1.0840801128], abs=1e-8)
+    w = found.parameter
+    implicit = (a * (1.0 - w**2) + 0.075 * a**3) ** 2 + (0.05 * w * a) ** 2
+    np.testing.assert_allclose(implicit, 0.18**2, rtol=1e-8)
+
+
+def test_force_amplitude_as_parameter_reaches_the_same_solutions(eleven):
+    found = parameter_curve(
+        duffing, (0.02, 0.6), 1.2, harmonics=11, stability=False, scale=1.0, options=StepOptions(largest=0.2)
+    )
+    assert len(found.folds) == 2 and found.parameter[-1] == 0.6
+    # the amplitudes at 0.18 on both curves
+    across = np.flatnonzero(np.diff(np.sign(found.parameter - 0.18)) != 0)
+    amplitudes = []
+    for i in across:
+        solution = solve_harmonic_balance(duffing(), 1.2, harmonics=11, start=found.solutions[i])
+        amplitudes.append(first(solution.deflection))
+    assert sorted(amplitudes) == pytest.approx([0.4175204536, 2.2605488905, 2.5091975811], abs=1e-7)
+
+
+def gear_pair(backlash=2.0, depth=0.3):
+    """One mesh with play, loaded by 0.5: it parts at resonance."""
+    system = MechanicalSystem(ONE, 0.06 * ONE, 0.0 * ONE, ONE, np.array([0.5]), ("x",))
+    return NonlinearSystem(
+        system, (GearMeshes(np.array([0]), FourierSeries([[1.0, depth]]), backlash=backlash),)
+    )
+
+
+def test_gear_pair_with_backlash_bends_over_twice():
+    found = frequency_response_curve(gear_pair(), (1.3, 0.6), harmonics=9, options=StepOptions(largest=0.2))
+    assert found.complete and len(found.folds) == 4 and not len(found.branch_points)
+    # loss of contact softens: the curve from above turns back, then contact of the back sides stiffens
+    legs = np.split(np.arange(len(found.parameter)), found.folds)
+    direction = [np.sign(np.diff(found.parameter[leg])) for leg in legs]
+    assert [set(signs) for signs in direction] == [{-1.0}, {1.0}, {-1.0}, {1.0}, {-1.0}]
+    stable = [set(found.stable[leg[2:-2]].tolist()) for leg in legs]
+    assert stable == [{True}, {False}, {True}, {False}, {True}]
+    # every point is a solution for a solver that knows nothing of the curve
+    for i in (5, int(found.folds[:2].mean()), len(found.parameter) - 3):
+        again = solve_harmonic_balance(gear_pair(), found.parameter[i], harmonics=9, start=found.solutions[i])
+        np.testing.assert_allclose(again.deflection, found.lines[i], atol=1e-8)
+
+
+def test_backlash_as_parameter_and_a_limit_that_nothing_may_pass():
+    start = solve_harmonic_balance(gear_pair(0.5), 0.9, harmonics=7)
+    found = parameter_curve(gear_pair, (0.5, 0.0), 0.9, harmonics=7, start=start, stability=False)
+    assert found.complete and found.parameter[-1] == 0.0
+    linear = NonlinearSystem(
+        gear_pair().system, (GearMeshes(np.array([0]), FourierSeries([[1.0, 0.3]]), separates=False),)
+    )
+    expected = solve_harmonic_balance(linear, 0.9, harmonics=7)
+    np.testing.assert_allclose(found.lines[-1], expected.deflection, atol=1e-9)
+
+
+def test_parametric_resonance_is_a_branch_point_and_can_be_entered():
+    # x'' + c x' + (1 + 0.4 cos 2 theta) x + 0.1 x^3 = 0: rest loses its stability in the Mathieu tongue
+    system = MechanicalSystem(ONE, 0.05 * ONE, 0.0 * ONE, ONE, np.zeros(1), ("x",))
+    wave = FourierSeries([[1.0, 0.4]], orders=(2,))
+    mesh = GearMeshes(np.array([0]), wave, separates=False)
+    cubic = PolynomialSprings(np.array([0]), np.array([[0.0, 0.0, 0.1]]))
+    problem = NonlinearSystem(system, (mesh, cubic))
+    rest = frequency_response_curve(problem, (0.7, 1.4), harmonics=9, start=np.zeros((1, 10)), scale=1.0)
+    assert not np.any(rest.lines) and len(rest.branch_points) == 2
+    linear = NonlinearSystem(system, ())
+    tongue = [
+        stability_boundary(linear, FourierSeries([[1.0, 0.4]]), ends, depth=1.0, tolerance=1e-10) / 2.0
+        for ends in ((1.4, 2.0), (2.0, 2.6))
+    ]
+    found = rest.parameter[rest.branch_points]
+    np.testing.assert_allclose(found, tongue, atol=1e-6)
+    inside = (rest.parameter > tongue[0] + 1e-6) & (rest.parameter < tongue[1] - 1e-6)
+    away = inside | (rest.parameter < tongue[0] - 1e-6) | (rest.parameter > tongue[1] + 1e-6)
+    assert not rest.stable[inside].any() and rest.stable[away & ~inside].all()
+    sides = crossing_branches(rest, rest.branch_points[0], options=StepOptions(largest=0.2))
+    ends = [side.lines[-1][0, 1] for side in sides]
+    assert sides[0].complete and sides[1].complete and abs(ends[0]) > 1.0
+    # the two sides are one motion, half a period apart
+    assert ends[0] == pytest.approx(-ends[1], rel=1e-8)
+    assert sides[0].stable[5] and abs(sides[0].lines[5][0, 0]) < 1e-12
+
+
+def test_held_base_and_a_second_tone():
+    problem = replace(
+        duffing(), forces=(HarmonicForce(np.array([0.05]), (1, 0)), HarmonicForce(np.array([0.02]), (0, 1)))
+    )
+    found = frequency_response_curve(problem, (0.6, 0.8), harmonics=3, base=0, held=(1.0, 0.37))
+    np.testing.assert_allclose(found.frequency[:, 1], 0.37)
+    assert found.frequency[-1, 0] == 0.8 and found.complete
+    again = solve_harmonic_balance(problem, (0.8, 0.37), harmonics=3)
+    np.testing.assert_allclose(found.lines[-1], again.deflection, atol=1e-9)
+    assert not found.stable.any() and all("not covered" in v.message for v in found.verdicts)
+
+
+def test_planet_set_keeps_its_equations_and_verdicts(planet_set, planet_excitation):
+    excitation = planet_excitation(np.array([0.0, 1 / 3, 2 / 3, 0.1, 0.1 + 1 / 3, 0.1 + 2 / 3]), depth=0.25)
+    excitation = replace(excitation, backlash=np.full(6, 0.5))
+    system = planet_set()
+    system = replace(system, C=modal_damping(system, excitation.stiffness.mean(axis=1), 0.03))
+    problem = NonlinearSystem(system, (gear_meshes(excitation, harmonics=3),))
+    found = frequency_response_curve(problem, (2.5, 2.7), harmonics=8, options=StepOptions(largest=0.2))
+    assert found.complete and found.residual.max() < 1e-10 and len(found.verdicts) == len(found.parameter)
+    assert all(v.error < 1e-7 and len(v.multipliers) == 30 for v in found.verdicts)
+    again = solve_harmonic_balance(problem, 2.7, harmonics=8)
+    np.testing.assert_allclose(found.lines[-1], again.deflection, atol=1e-9)
+
+
+def test_refusals():
+    with pytest.raises(CaseError, match="E-RANGE"):
+        frequency_response_curve(duffing(), (1.0, 1.0), harmonics=3)
+    with pytest.raises(CaseError, match="E-FREQUENCY"):
+        frequency_response_curve(duffing(), (1.0, 1.2), harmonics=3, base=1)
+    with pytest.raises(CaseError, match="start_at"):
+        frequency_response_curve(duffing(), (1.0, 1.2), harmonics=3, start_at=1.3)
+    with pytest.raises(CaseError, match="E-RANGE"):
+        parameter_curve(duffing, (0.1, 0.1), 1.2, harmonics=3)

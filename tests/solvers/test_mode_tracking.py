@@ -1,0 +1,261 @@
+"""Modes over a parameter: veering and crossing in closed form, equal planets, Campbell diagrams, energies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+from scipy.optimize import minimize_scalar
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.models.kinds import motion_planes
+from femgear.models.planar import planar_system
+from femgear.models.planar_modes import planar_kinds, planar_modes, planar_springs
+from femgear.solvers.campbell import campbell_data
+from femgear.solvers.complex_modes import complex_modes
+from femgear.solvers.mode_energy import body_groups, kinetic_shares, stiffness_of, strain_shares
+from femgear.solvers.mode_tracking import mac, oscillating, track_modes
+from femgear.solvers.veering import approaches, coupling_factor
+from femgear.system import MechanicalSystem
+from femgear.validation.planar import lin_parker_set
+
+# two masses 1 on springs 1 + p and 2 - p, joined by kc: eigenvalues 1.5 + kc -+ sqrt((p - 1/2)^2 + kc^2)
+SPLIT = np.diag([1.0, -1.0])
+
+
+def pair(p, kc):
+    return np.diag([1.0 + p, 2.0 - p]) + kc * np.array([[1.0, -1.0], [-1.0, 1.0]])
+
+
+def real_family(stiffness, mass):
+    def family(p):
+        square, shape = eigh(stiffness(p), mass)
+        return 1j * np.sqrt(square), shape
+
+    return family
+
+
+@pytest.mark.parametrize("kc", [0.05, 1e-3, 1e-4])
+@pytest.mark.parametrize("steps", [2, 4, 9])
+def test_known_veering(kc, steps):
+    """Even one step over the veering is not taken for a crossing."""
+    tracked = track_modes(
+        real_family(lambda p: pair(p, kc), np.eye(2)), np.linspace(0.1, 0.9, steps), np.eye(2)
+    )
+    assert tracked.unresolved == () and tracked.agreement.min() >= 0.9
+    low = tracked.frequency[:, 0]
+    exact = np.sqrt(1.5 + kc - np.sqrt((tracked.value - 0.5) ** 2 + kc**2)) / (2 * np.pi)
+    assert low == pytest.approx(exact, rel=1e-12)
+    (found,) = approaches(tracked, np.eye(2), within=0.3)
+    high, below = np.sqrt(1.5 + kc + kc), np.sqrt(1.5 + kc - kc)
+    assert found.kind == "veering"
+    assert found.gap == pytest.approx((high - below) / (2 * np.pi), rel=0.02)
+    assert found.value == pytest.approx(0.5, abs=0.05)
+    if kc < 0.05:
+        assert found.exchange > 0.9
+
+
+@pytest.mark.parametrize("steps", [2, 5, 8])
+def test_known_crossing(steps):
+    values = np.linspace(0.0, 0.9, steps)
+    tracked = track_modes(real_family(lambda p: pair(p, 0.0), np.eye(2)), values, np.eye(2))
+    assert tracked.frequency[:, 0] == pytest.approx(np.sqrt(1.0 + tracked.value) / (2 * np.pi), rel=1e-12)
+    assert np.array_equal(tracked.value[tracked.given], values)
+    assert tracked.unresolved == () and len(tracked.value) < steps + 8
+    (found,) = approaches(tracked, np.eye(2), within=0.3)
+    assert found.kind == "crossing" and found.gap == 0.0 and found.exchange < 1e-6
+    assert found.value == pytest.approx(0.5, abs=1e-5)
+    assert found.frequency == pytest.approx(np.sqrt(1.5) / (2 * np.pi), rel=1e-5)
+
+
+def test_coupling_factor_predicts_the_smallest_distance():
+    """The smallest distance of the squares is 2 kc whatever the point it is predicted from."""
+    for kc, p in ((0.05, 0.2), (0.01, 0.45), (0.05, 0.5)):
+        square, shape = eigh(pair(p, kc))
+        factor = coupling_factor(shape[:, 0], shape[:, 1], np.eye(2), SPLIT, squared=square)
+        assert factor * (square[1] - square[0]) == pytest.approx(2 * kc, rel=1e-12)
+    square, shape = eigh(pair(0.2, 0.0))
+    assert coupling_factor(shape[:, 0], shape[:, 1], np.eye(2), SPLIT, squared=square) == 0.0
+
+
+def test_mac_weighs_with_the_mass():
+    mass = np.diag([1.0, 4.0])
+    a, b = np.array([[2.0], [1.0]]), np.array([[2.0], [-1.0]])
+    assert mac(a, b, mass) == pytest.approx(np.zeros((1, 1)))
+    assert mac(a, 3j * a, mass) == pytest.approx(np.ones((1, 1)))
+
+
+def planet_veering(data, near):
+    """Bearing stiffness and smallest distance [Hz] of the middle and upper mode of a planet on springs."""
+    a, mass = data.pressure_angle_sun_planet, np.array([0.66, 0.66, 0.61])
+    rows = np.array([[-np.sin(a), -np.cos(a), 1.0], [np.sin(a), -np.cos(a), -1.0]])
+    meshes = rows.T @ (np.array([[5e8], [5.2e8]]) * rows)
+
+    def distance(k):
+        stiffness = meshes + np.diag([k, k, 0.0])
+        return np.diff(np.sqrt(np.linalg.eigvalsh(stiffness / np.sqrt(np.outer(mass, mass)))))[1] / (
+            2 * np.pi
+        )
+
+    best = minimize_scalar(distance, bounds=(0.7 * near, 1.4 * near), method="bounded")
+    return best.x, best.fun
+
+
+def test_equal_planets_cross_and_keep_their_kinds():
+    """Lin and Parker (2001): modes of different kinds cross, of the same kind veer; over the planet bearings.
+
+    Sun and ring meshes of unlike stiffness: with the equal ones of the published data the tangential motion
+    of a planet mode is free of the other two, and planet modes cross as well.
+    """
+    base = replace(lin_parker_set(4), stiffness_planet_ring=5.2e8)
+    system = planar_system(base)
+
+    def at(bearing):
+        return replace(base, planet_bearing=bearing)
+
+    def family(bearing):
+        modes = complex_modes(planar_system(at(bearing)), base.mesh_stiffness)
+        return oscillating(modes)
+
+    tracked = track_modes(family, np.geomspace(1e7, 1e9, 9), system.M)
+    assert tracked.unresolved == () and tracked.eigenvalue.shape[1] == 20
+    ends = [planar_kinds(at(tracked.value[i]), tracked.shape[i], frequency=np.ones(20)) for i in (0, -1)]
+    # double modes are followed as a space: any pair of shapes in it is translational
+    assert ends[0] == ends[1] and "mixed" not in ends[0]
+    found, kinds = approaches(tracked, system.M), np.array(ends[0])
+    crossing = [one for one in found if one.kind == "crossing"]
+    assert len(crossing) > 10 and all(kinds[one.first] != kinds[one.second] for one in crossing)
+    veering = [one for one in found if one.kind == "veering"]
+    assert veering and all(kinds[one.first] == kinds[one.second] for one in veering)
+    # planet modes are those of one planet between springs: 3 x 3 by hand (tests/models/test_planar_modes.py)
+    (planet,) = (one for one in veering if kinds[one.first] == "planet")
+    where, gap = planet_veering(base, planet.value)
+    assert planet.gap == pytest.approx(gap, rel=0.02) and planet.value == pytest.approx(where, rel=0.02)
+    exact = planar_modes(at(1e9)).frequency[1:]
+    assert np.sort(tracked.frequency[-1]) == pytest.approx(exact, rel=1e-9)
+
+
+def test_pairs_that_split_later_are_followed():
+    """Double at first; then a spring in a direction that the first basis does not know."""
+    direction = np.array([np.cos(0.7), np.sin(0.7)])
+
+    def stiffness(p):
+        return np.diag([4.0, 4.0]) + max(p, 0.0) * np.outer(direction, direction)
+
+    tracked = track_modes(real_family(stiffness, np.eye(2)), [-1.0, -0.5, 0.0, 0.5, 1.0], np.eye(2))
+    assert tracked.unresolved == ()
+    assert np.sort(tracked.frequency[-1]) * 2 * np.pi == pytest.approx([2.0, np.sqrt(5.0)])
+
+
+def test_lost_modes_and_wrong_values_are_refused():
+    def family(p):
+        square, shape = eigh(pair(p, 0.01))
+        return 1j * np.sqrt(square[: 1 + (p < 0.5)]), shape[:, : 1 + (p < 0.5)]
+
+    with pytest.raises(ConvergenceError, match=r"E-MODE-LOST.*0\.6"):
+        track_modes(family, [0.2, 0.6], np.eye(2))
+    with pytest.raises(CaseError, match="E-VALUES"):
+        track_modes(family, [0.2, 0.2], np.eye(2))
+
+
+def rotating(m=2.0, k=800.0, gap=0.0):
+    """A mass in a turning frame; `gap` makes the springs of the frame unlike."""
+
+    def at(speed):
+        K = np.diag([k, k + gap]) - m * speed**2 * np.eye(2)
+        G = 2.0 * m * np.array([[0.0, -1.0], [1.0, 0.0]])
+        return MechanicalSystem(
+            m * np.eye(2), np.zeros((2, 2)), K, np.zeros((2, 0)), np.zeros(2), ("mass: x", "mass: y"), G
+        )
+
+    return at
+
+
+def test_campbell_of_the_rotating_mass():
+    """20 -+ speed, split from a double mode; the line of order 3 meets them at 20/4 and 20/2."""
+    at = rotating()
+    planes = motion_planes(at(0.0).dofs)
+    data = campbell_data(at, np.linspace(0.0, 15.0, 7), np.zeros(0), orders=[3.0], planes=planes)
+    forward = int(np.argmin(data.frequency[-1]))
+    assert data.frequency[:, forward] * 2 * np.pi == pytest.approx(20.0 - data.speed, rel=1e-9)
+    assert data.frequency[:, 1 - forward] * 2 * np.pi == pytest.approx(20.0 + data.speed, rel=1e-9)
+    assert data.whirl[:, forward] == pytest.approx(np.ones(len(data.speed)), abs=1e-6)
+    assert data.whirl[:, 1 - forward] == pytest.approx(-np.ones(len(data.speed)), abs=1e-6)
+    assert [one.speed for one in data.critical] == pytest.approx([5.0, 10.0], rel=1e-9)
+    assert [one.branch for one in data.critical] == [forward, 1 - forward]
+    assert data.critical[0].frequency == pytest.approx(15.0 / (2 * np.pi))
+    assert np.abs(data.damping_ratio).max() < 1e-9
+
+
+def test_critical_speeds_converge():
+    """Unlike springs: (k1 - m W^2 - m w^2)(k2 - ..) = 4 m^2 W^2 w^2 with w = 3 W has two roots in W."""
+    errors = []
+    for steps in (6, 11, 21):
+        data = campbell_data(rotating(gap=400.0), np.linspace(0.5, 15.0, steps), np.zeros(0), orders=[3.0])
+        found = np.array([one.speed for one in data.critical])
+        roots = np.roots([100 * 4.0 - 36 * 4.0, 0, -10 * 2.0 * 2000.0, 0, 800.0 * 1200.0])
+        exact = np.sort(roots.real[roots.real > 0])
+        errors.append(np.abs(found - exact).max())
+    assert errors[2] < 1e-3 and errors[2] < errors[0] / 8
+
+
+def test_campbell_of_the_planar_set():
+    data = lin_parker_set(3)
+    found = campbell_data(
+        lambda speed: planar_system(data, carrier_speed=speed), np.linspace(0.0, 300.0, 4),
+        data.mesh_stiffness, orders=[73.0], count=17, planes=motion_planes(planar_system(data).dofs),
+    )  # fmt: skip
+    assert found.tracked.unresolved == ()
+    # translational pairs split into one forward and one backward mode
+    first = np.flatnonzero(np.abs(found.frequency[0] - 743.1639) < 0.01)
+    assert len(first) == 2 and found.whirl[-1, first].prod() < 0.0
+    line = 73.0 * found.speed[-1] / (2 * np.pi)
+    below = np.count_nonzero(found.frequency[-1] < line)
+    assert len(found.critical) >= below > 3
+    for one in found.critical:
+        system = planar_system(data, carrier_speed=one.speed)
+        exact = complex_modes(system, data.mesh_stiffness, speed=one.speed).damped_frequency
+        assert np.abs(exact / one.frequency - 1.0).min() < 1e-4
+
+
+def test_energy_shares():
+    data = lin_parker_set(3)
+    system, modes, springs = planar_system(data), planar_modes(data), planar_springs(data)
+    total = system.K + (system.W * data.mesh_stiffness) @ system.W.T
+    assert np.abs(stiffness_of(springs) - total).max() < 1e-12 * np.abs(total).max()
+    kinetic = kinetic_shares(system.M, modes.shape, body_groups(system.dofs))
+    strain = strain_shares(springs, modes.shape)
+    assert list(kinetic) == ["carrier", "ring", "sun", "planet 1", "planet 2", "planet 3"]
+    assert sum(kinetic.values()) == pytest.approx(np.ones(18), abs=1e-12)
+    assert sum(strain.values())[0] == 0.0
+    assert sum(strain.values())[1:] == pytest.approx(np.ones(17), abs=1e-12)
+    # strain energy is the derivative of the frequency: Rayleigh, dw^2/dk = (w^T phi)^2
+    rotational = list(modes.kind).index("rotational")
+    for name, change in (
+        ("sun-planet 1", "stiffness_sun_planet"),
+        ("planet 2-ring", "stiffness_planet_ring"),
+    ):
+        k = np.array(getattr(data, change))
+        k[int(name.split("planet ")[1][0]) - 1 if "ring" in name else 0] *= 1.0 + 1e-4
+        stiffer = planar_modes(replace(data, **{change: k})).frequency[rotational]
+        slope = 2.0 * (stiffer / modes.frequency[rotational] - 1.0) / 1e-4
+        assert strain[name][rotational] == pytest.approx(slope, rel=1e-2)
+
+
+def test_energy_of_two_masses_by_hand():
+    """Equal masses on equal springs 1, joined by 4: modes 1 (joint at rest) and 9 (8/9 in the joint)."""
+    shape = np.array([[1.0, 1.0], [1.0, -1.0]]) / np.sqrt(2)
+    parts = {
+        "ground": (np.eye(2), np.ones(2)),
+        "joint": (np.array([[1.0], [-1.0]]), np.array([4.0])),
+    }
+    strain = strain_shares(parts, shape)
+    assert strain["joint"] == pytest.approx([0.0, 8.0 / 9.0])
+    assert strain["ground"] == pytest.approx([1.0, 1.0 / 9.0])
+    # complex shapes count with their mean over a period
+    assert strain_shares(parts, shape * np.exp(0.3j))["joint"] == pytest.approx([0.0, 8.0 / 9.0])
+    assert kinetic_shares(np.diag([3.0, 1.0]), shape, {"a": [0], "b": [1]})["a"] == pytest.approx(
+        [0.75, 0.75]
+    )
+    with pytest.raises(CaseError, match="E-GROUPS"):
+        kinetic_shares(np.eye(2), shape, {"a": [0]})
