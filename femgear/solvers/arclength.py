@@ -11,15 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.solvers.acceptance import check_return, strain
 from femgear.solvers.bifurcation import Segment, branch_point, folds
 from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, correct
 
 # A loop is closed when it meets its start within this (scaled) distance.
 _CLOSED = 1e-6
-# Deviation of a chord from the mean of its tangents [rad], beyond a share of the angle between them.
-_CHORD, _CHORD_SHARE = 0.003, 0.15
-# Steps below this part of the largest one may turn in a corner, where a chord can have half the angle aside.
-_CORNER, _CORNER_SHARE = 1e-3, 0.6
+# Steps below this part of the largest one may turn in a corner of the curve.
+_CORNER = 1e-3
 
 
 @dataclass(frozen=True)
@@ -112,12 +111,15 @@ def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: Step
             if new is None:
                 new = correct(curve, point.z + h * point.tangent, point.tangent)
             corner = h <= _CORNER * options.largest
-            strain = _strain(point, new, options, _CORNER_SHARE if corner else _CHORD_SHARE)
+            aims = {"angle": options.angle, "contraction": options.contraction, "corner": corner}
+            effort = strain(point, new, **aims)
+            if not corner:
+                check_return(curve, point, new)
             segment = Segment(curve, point, new)
             special = folds(segment)
             if point.orientation * new.orientation < 0.0:
                 special.append(branch_point(segment))
-            factor = np.clip(1.0 / max(strain, 1e-3), 0.5, 2.0)
+            factor = np.clip(1.0 / max(effort, 1e-3), 0.5, 2.0)
             return segment, sorted(special, key=lambda s: s[0]), h * factor
         except LostError as lost:
             reason = str(lost)
@@ -145,28 +147,6 @@ def _at_parameter(curve: ScaledCurve, guess: np.ndarray, bound: float, along: np
     axis[-1] = 1.0
     found = correct(curve, np.append(guess[:-1], bound), axis, along=along)
     return replace(found, z=np.append(found.z[:-1], bound))
-
-
-def _strain(point: CurvePoint, new: CurvePoint, options: StepOptions, share: float) -> float:
-    """How far the step was from what is aimed at: 1 on target; refused from 2 on, or beyond the chord rule.
-
-    On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
-    a jump from curve to curve turns the chord but not the tangents.
-    """
-    cosine = float(np.clip(point.tangent @ new.tangent, -1.0, 1.0))
-    angle = np.arccos(cosine)
-    if angle > 2.0 * options.angle:
-        raise LostError(f"the tangent turns by {angle:.2g} rad")
-    if new.contraction > 4.0 * options.contraction:
-        raise LostError(f"Newton's method contracts only by {new.contraction:.2g}")
-    chord = new.z - point.z
-    mean = point.tangent + new.tangent
-    mean /= np.linalg.norm(mean)
-    along = chord @ mean
-    aside = np.arctan2(np.linalg.norm(chord - along * mean), along)
-    if aside > _CHORD + share * angle:
-        raise LostError(f"the chord leaves the tangents by {aside:.2g} rad: another curve was reached")
-    return max(angle / options.angle, np.sqrt(new.contraction / options.contraction))
 
 
 def _until_end(segment: Segment, events, bounds):

@@ -131,13 +131,17 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     """
     from scipy import linalg
 
-    z, lengths = guess.copy(), []
+    z, lengths, contraction = guess.copy(), [], 0.0
     unit = np.zeros(len(z))
     unit[-1] = 1.0
     for _ in range(curve.max_iterations):
         residual, derivative = curve.equations(z)
-        factors, sign = factored(np.vstack([derivative, normal]))
         right = np.append(residual, normal @ (z - guess))
+        if len(lengths) == 1:
+            # natural monotonicity: what the next step would be with the first derivative
+            again = linalg.lu_solve(factors, right, check_finite=False)
+            contraction = np.linalg.norm(again) / (1.0 + np.linalg.norm(z)) / lengths[0]
+        factors, sign = factored(np.vstack([derivative, normal]))
         step = linalg.lu_solve(factors, right, check_finite=False)
         z = z - step
         lengths.append(float(np.linalg.norm(step) / (1.0 + np.linalg.norm(z))))
@@ -154,5 +158,5 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     if along is not None and tangent @ along < 0.0:
         # normal . tangent is positive as solved, so only a turned tangent changes the sign of the determinant
         tangent, sign = -tangent, -sign
-    contraction = lengths[1] / lengths[0] if len(lengths) > 1 and lengths[1] > curve.tolerance else 0.0
-    return CurvePoint(z, tangent, derivative, sign, len(lengths), contraction, lengths[-1])
+    if lengths[0] <= 1e2*curve.tolerance: contraction=0.0
+    return CurvePoint(z, tangent, derivative, sign, len(lengths), float(contraction), lengths[-1])

@@ -109,8 +109,10 @@ class GearMeshes:
             return line[..., None], np.broadcast_to(k, line.shape)[..., None, None]
         force, slope = positive_part(line, self.smoothing * k)
         if np.isfinite(self.backlash).any():
-            back, back_slope = positive_part(-line - k * self.backlash, self.smoothing * k)
-            force, slope = force - back, slope + back_slope
+            has_back = np.isfinite(self.backlash)
+            play = k * np.where(has_back, self.backlash, 0.0)
+            back, back_slope = positive_part(-line - play, self.smoothing * k)
+            force, slope = force - has_back * back, slope + has_back * back_slope
         return force[..., None], (k * slope)[..., None, None]
 
 

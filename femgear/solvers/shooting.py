@@ -1,0 +1,319 @@
+"""Periodic solutions by shooting: the start is sought from which the motion returns to itself.
+
+R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed., sections 7.1 to 7.4; M. Peeters et al.,
+Mech. Syst. Signal Process. 23 (2009) 195-216, for free vibrations. The derivatives of the motion by its start
+are integrated with it; over one period they are the monodromy matrix. Contact forces are continuous, so the
+derivatives are too at every contact change: no jump has to be added (R. I. Leine and H. Nijmeijer, Dynamics
+and Bifurcations of Non-Smooth Mechanical Systems, section 7.2: the saltation matrix is the unit matrix).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.adaptive import Flow, flow, trajectory
+from femgear.solvers.harmonics import harmonics_of
+from femgear.solvers.nonlinear import NonlinearSystem, element_forces
+from femgear.solvers.periodic import PeriodicSolution
+from femgear.solvers.strobe import common_period
+from femgear.solvers.transient import sampled, solve_transient
+
+# Directions that the map changes by less than this share of the strongest one are left as they are.
+_SINGULAR = 1e-11
+# Steps of the integrator in one segment, more of which a motion of interest does not need.
+_MOST_STEPS = 50_000
+# Multipliers outside the unit circle by less than this are on it.
+_CIRCLE = 1e-6
+
+
+@dataclass(frozen=True)
+class ShootingSolution:
+    """A periodic motion, its start and its multipliers.
+
+    Parameters
+    ----------
+    solution : PeriodicSolution
+        Lines of the deflections and forces; ``residual`` is the relative distance of start and end.
+    period : float
+        [s].
+    displacement, velocity : (n,) arrays
+        At the start of the period.
+    monodromy : (2n, 2n) array
+        Derivatives of (q, v / rate) after the period by those at its start.
+    multipliers : (2n,) complex array
+        Its eigenvalues, the largest modulus first.
+    time : (n_samples,) array
+        Equidistant instants of one period.
+    motion : (n_samples, n) array
+        Displacements there.
+    """
+
+    solution: PeriodicSolution
+    period: float
+    displacement: np.ndarray
+    velocity: np.ndarray
+    monodromy: np.ndarray
+    multipliers: np.ndarray
+    time: np.ndarray
+    motion: np.ndarray
+
+    @property
+    def stable(self) -> bool:
+        """No multiplier lies outside the unit circle by more than 1e-6."""
+        return bool(np.abs(self.multipliers).max() <= 1.0 + _CIRCLE)
+
+
+def solve_shooting(
+    problem: NonlinearSystem,
+    frequency,
+    *,
+    start=None,
+    periods: int = 1,
+    segments: int = 1,
+    settle: int = 20,
+    harmonics: int = 20,
+    samples: int = 2048,
+    events: bool = True,
+    integration: float = 1e-11,
+    tolerance: float = 1e-9,
+    max_iterations: int = 30,
+) -> ShootingSolution:
+    """Forced periodic motion by Newton iterations on its start.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    frequency : float or (n_bases,) array
+        Base frequencies [rad/s]; all must be multiples of the first over ``periods``.
+    start : pair of (n,) arrays, optional
+        First guess; without one the motion ``settle`` periods after rest.
+    periods : int
+        Periods of the first base frequency that make one period of the motion.
+    segments : int
+        Pieces of the period whose starts are all unknown: multiple shooting, for motions that grow fast.
+    settle : int
+    harmonics : int
+        Lines of the result, of the period.
+    samples : int
+        Instants from which the lines are computed.
+    events : bool
+        Stop at contact changes, see `adaptive`.
+    integration : float
+        Tolerance of the integrator.
+    tolerance : float
+        Of the distance between start and end, relative to the size of the motion.
+    max_iterations : int
+
+    Returns
+    -------
+    ShootingSolution
+        ``solution.converged`` is false, and its message says so, where the iterations end without success.
+        Rigid motions stay where the first guess has them.
+
+    Raises
+    ------
+    CaseError
+        Frequencies without the common period, numbers out of range.
+    """
+    frequency = np.atleast_1d(np.asarray(frequency, float))
+    period = common_period(frequency, periods)
+    if segments < 1 or harmonics < 1 or samples < 4 * harmonics:
+        raise CaseError(
+            f"{segments} segments, {harmonics} harmonics, {samples} samples", code="E-SHOOTING",
+            limit="a segment and a harmonic or more, four samples a harmonic or more",
+        )  # fmt: skip
+    if start is None:
+        start = _settled(problem, frequency, period, settle)
+    moving = flow(problem, frequency, variational=True)
+    unknowns = _guess(moving, start, period, segments, integration, events)
+    options = {"tolerance": integration, "events": events, "max_steps": _MOST_STEPS}
+    history, factorisations = [], 0
+    for _ in range(max_iterations + 1):
+        ends, maps = _shoot(moving, unknowns, period, options)
+        defect = ends - np.roll(unknowns, -1, axis=0)
+        size = max(_size(moving, unknowns), np.finfo(float).tiny)
+        history.append(float(np.abs(defect).max() / size))
+        if history[-1] <= tolerance or len(history) > max_iterations:
+            break
+        update, factorisations = _update(maps, defect), factorisations + 1
+        unknowns = _improved(moving, unknowns, update, np.abs(defect).max(), period, options)
+    whole = np.linalg.multi_dot(maps[::-1]) if segments > 1 else maps[0]
+    lines = 2.0 * np.pi / period, harmonics, samples
+    return _result(problem, moving, unknowns[0], whole, lines, options, history, tolerance, factorisations)
+
+
+def solve_free_vibration(
+    problem: NonlinearSystem,
+    start,
+    period: float,
+    *,
+    fixed: int = 0,
+    conservative: bool = True,
+    harmonics: int = 20,
+    samples: int = 2048,
+    events: bool = True,
+    integration: float = 1e-12,
+    tolerance: float = 1e-10,
+    max_iterations: int = 30,
+) -> ShootingSolution:
+    """Periodic motion of a system that nothing drives: its period is unknown too.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+        Without harmonic forces and without coefficients that change in time.
+    start : pair of (n,) arrays
+        First guess; the degree of freedom ``fixed`` keeps zero velocity there, which sets the phase.
+    period : float
+        First guess [s].
+    fixed : int
+    conservative : bool
+        The displacement of ``fixed`` is kept as the amplitude. A limit cycle, which has its own amplitude,
+        needs ``False``.
+    harmonics, samples, events, integration, tolerance, max_iterations
+        As for `solve_shooting`.
+    """
+    if problem.forces or not (np.isfinite(period) and period > 0.0):
+        raise CaseError(
+            f"free vibration with {len(problem.forces)} harmonic forces and a period of {period} s",
+            code="E-SHOOTING", limit="no forces and a period above 0 s",
+        )  # fmt: skip
+    n = len(problem.system.M)
+    moving = flow(problem, 0.0, variational=True)
+    y = flow(problem, 0.0).state(*start)
+    y[n + fixed] = 0.0
+    free = np.setdiff1d(np.arange(2 * n), [n + fixed, fixed] if conservative else [n + fixed])
+    options = {"tolerance": integration, "events": events, "max_steps": _MOST_STEPS}
+    history = []
+    for _ in range(max_iterations + 1):
+        ends, maps = _shoot(moving, y[None], period, options)
+        defect = ends[0] - y
+        history.append(float(np.abs(defect).max() / _size(moving, y[None])))
+        if history[-1] <= tolerance or len(history) > max_iterations:
+            break
+        slope = _derivative(moving, ends[0], period)
+        matrix = np.column_stack([(maps[0] - np.eye(2 * n))[:, free], slope / moving.rate])
+        update = np.linalg.lstsq(matrix, -defect, rcond=_SINGULAR)[0]
+        y, period = _closer(moving, y, period, free, update, np.abs(defect).max(), options)
+    lines = 2.0 * np.pi / period, harmonics, samples
+    return _result(problem, moving, y, maps[0], lines, options, history, tolerance, len(history) - 1)
+
+
+def _settled(problem, frequency, period, settle):
+    """Motion ``settle`` periods after rest at the static deflection, by average acceleration."""
+    system = problem.system
+    stiffness = system.K + (system.W * problem.reference) @ system.W.T
+    rest = np.linalg.lstsq(stiffness, system.load, rcond=1e-12)[0], np.zeros(len(system.M))
+    if not settle:
+        return rest
+    times = np.array([0.0, settle * period])
+    found = solve_transient(problem, frequency, times, start=rest, step=period / 200.0)
+    return found.displacement[-1], found.velocity[-1]
+
+
+def _guess(moving: Flow, start, period, segments, integration, events):
+    """States (segments, 2n) at the starts of the segments, along the motion from the first one."""
+    plain = replace(moving, variational=False)
+    y = plain.state(*start)
+    out = [y]
+    for k in range(segments - 1):
+        span = period * k / segments, period * (k + 1) / segments
+        steps = trajectory(plain, y, *span, tolerance=max(integration, 1e-8), events=events)
+        y = sampled(steps, np.array(span[1:]), y)[0][0]
+        out.append(y)
+    return np.array(out)
+
+
+def _shoot(moving: Flow, unknowns, period, options):
+    """Ends (segments, 2n) of the segments and their derivatives (segments, 2n, 2n)."""
+    count, size = unknowns.shape
+    ends, maps = [], []
+    for k, y in enumerate(unknowns):
+        state = np.column_stack([y, np.eye(size)]).ravel() if moving.variational else y
+        span = period * k / count, period * (k + 1) / count
+        end, _ = sampled(trajectory(moving, state, *span, **options), np.array(span[1:]), state)
+        end = end[0]
+        ends.append(end.reshape(size, -1)[:, 0])
+        maps.append(moving.tangents(end) if moving.variational else None)
+    return np.array(ends), maps
+
+
+def _update(maps, defect):
+    """Newton step (segments, 2n): ``maps[k] d_k - d_{k+1} = -defect_k``, cyclic."""
+    count, size = defect.shape
+    matrix = np.zeros((count * size, count * size))
+    for k, part in enumerate(maps):
+        rows, following = slice(k * size, (k + 1) * size), (k + 1) % count
+        matrix[rows, rows] += part
+        matrix[rows, following * size : (following + 1) * size] -= np.eye(size)
+    return np.linalg.lstsq(matrix, -defect.ravel(), rcond=_SINGULAR)[0].reshape(count, size)
+
+
+def _improved(moving: Flow, unknowns, update, before, period, options):
+    """The Newton step, halved until the defect gets smaller; integrated without derivatives."""
+    plain, share = replace(moving, variational=False), 1.0
+    for _ in range(8):
+        tried = unknowns + share * update
+        ends, _ = _shoot(plain, tried, period, options)
+        if np.abs(ends - np.roll(tried, -1, axis=0)).max() < before:
+            return tried
+        share *= 0.5
+    return unknowns + update
+
+
+def _closer(moving: Flow, y, period, free, update, before, options):
+    """The Newton step in state and period, halved until the defect gets smaller."""
+    plain = replace(moving, variational=False)
+    # a change of the period by half would shoot at another motion
+    share = min(1.0, 0.3 * period * moving.rate / max(abs(update[-1]), 1e-300))
+    for _ in range(8):
+        tried, longer = y.copy(), period + share * update[-1] / moving.rate
+        tried[free] += share * update[:-1]
+        ends, _ = _shoot(plain, tried[None], longer, options)
+        if np.abs(ends[0] - tried).max() < before:
+            break
+        share *= 0.5
+    return tried, longer
+
+
+def _size(moving: Flow, unknowns) -> float:
+    return float(np.abs(unknowns).max())
+
+
+def _derivative(moving: Flow, y, time):
+    """``dy/dt`` of the state without derivatives."""
+    from femgear.solvers.switching import Contacts
+
+    law = Contacts(moving.problem.elements, moving.problem.system.W.shape[1])
+    return replace(moving, variational=False).derivative(law)(time, y)
+
+
+def _result(problem, moving, y, monodromy, lines, options, history, tolerance, factorisations):
+    """Lines of the motion from ``y`` on, with the verdict."""
+    omega, harmonics, samples = lines
+    period, plain = 2.0 * np.pi / omega, replace(moving, variational=False)
+    times = period * np.arange(samples) / samples
+    found, _ = sampled(trajectory(plain, y, 0.0, period, **options), times, y)
+    q, v, x = (part.T for part in plain.split(found.T))
+    force = element_forces(problem, x, times[:, None] * moving.frequency)[0]
+    deflection, forces = harmonics_of(x.T, harmonics), harmonics_of(force.T, harmonics)
+    size = np.abs(deflection[:, 1:]).sum()
+    upper = np.abs(deflection[:, harmonics // 2 + 1 :]).sum()
+    converged = history[-1] <= tolerance
+    message = "the motion returns to its start" if converged else (
+        f"after {len(history) - 1} iterations start and end differ by {history[-1]:.2g} of the motion: "
+        "give a better start, or more segments"
+    )  # fmt: skip
+    solution = PeriodicSolution(
+        frequency=[omega], orders=np.arange(harmonics + 1)[:, None], deflection=deflection, force=forces,
+        converged=converged, residual=history[-1], iterations=len(history) - 1,
+        factorisations=factorisations, tail=float(upper / size) if size else 0.0, message=message,
+        history=tuple(history),
+    )  # fmt: skip
+    values = np.linalg.eigvals(monodromy)
+    return ShootingSolution(
+        solution, period, q[0], v[0], monodromy, values[np.argsort(-np.abs(values))], times, q
+    )
