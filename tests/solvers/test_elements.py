@@ -27,6 +27,9 @@ ELEMENTS = {
     "meshes": GearMeshes([0, 2], STIFFNESS, deflection=constant([0.1, 0.0]), backlash=[0.5, np.inf]),
     "loaded meshes": GearMeshes([0, 1], STIFFNESS, force=constant([0.2, 0.4]), backlash=0.3),
     "smooth meshes": GearMeshes([0, 1], STIFFNESS, backlash=0.3, smoothing=0.05),
+    "smooth meshes with and without back side": GearMeshes(
+        [0, 2], STIFFNESS, backlash=[0.3, np.inf], smoothing=0.05
+    ),
     "meshes that hold": GearMeshes([0, 1], STIFFNESS, force=constant([0.2, 0.4]), separates=False),
     "stepped meshes": GearMeshes([0], StepSeries([[1.0, 2.0]], [0.0, 0.4])),
     "bearings": RadialBearings([[0, 1], [2, 3]], [2.0, 3.0], clearance=[0.4, 0.0]),
