@@ -140,13 +140,18 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None 
 
 
 def _influences(case: Case, static: StaticResult) -> RootStresses:
-    """Root influences of the bodies as the static solution holds them."""
-    from femgear.contact.root_stress import RootStresses, root_stress
+    """Root influences of the bodies as the static solution holds them.
+
+    Sun and planet were observed with their flanks; only the ring, whose contact has two plane states, is
+    solved again.
+    """
+    from femgear.contact.root_stress import RootStresses, observed_root_stress, root_stress
     from femgear.fe.elasticity import Material, foundation
 
     material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-    sectors = static.sectors
-    sun, planet = (root_stress(s.grid, s.gear, material) for s in (sectors.sun, sectors.planet))
+    sectors, bodies = static.sectors, static.bodies
+    pairs = (sectors.sun, bodies.sun), (sectors.planet, bodies.planet)
+    sun, planet = (observed_root_stress(sector.gear, flank.root) for sector, flank in pairs)
     grid, gear = sectors.ring.grid, sectors.ring.gear
     held, support = "rim", None
     if case.static.members == "elastic":

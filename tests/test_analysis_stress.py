@@ -14,7 +14,7 @@ from femgear.analysis_spectrum import LOAD_BINS, LoadedTeeth, body_stress, load_
 from femgear.analysis_stress import nominal_stresses, solve_stress
 from femgear.case import read_case, with_value
 from femgear.contact.flanks import LEFT, RIGHT
-from femgear.contact.root_stress import LOADED, root_stress_cycle, worst_history
+from femgear.contact.root_stress import LOADED, root_stress_cycle, set_root_stress, worst_history
 from femgear.gears import half_thickness_angle
 
 FILE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
@@ -24,15 +24,21 @@ P, N = 16, 3
 def coarse(**changes):
     case = read_case(FILE)
     settings = {"dynamics.mesh_harmonics": 3, "static.positions": P, "static.flank_elements": 8}
-    settings["static.stresses"] = True
     for key, value in (settings | changes).items():
         case = with_value(case, key, value)
     return case
 
 
+@pytest.fixture(scope="module", autouse=True)
+def grids(tmp_path_factory):
+    """Folder of the grids, which most cases share."""
+    global CACHE
+    CACHE = tmp_path_factory.mktemp("grids")
+
+
 def solved(**changes):
     case = coarse(**changes)
-    static = solve_static(case)
+    static = solve_static(case, cache=CACHE)
     return case, static, solve_stress(case, static)
 
 
@@ -72,6 +78,15 @@ def assert_fields_are_root_cycles(static, result, cycles, *, reverse=False):
 def test_field_of_a_body_is_that_of_the_root_cycles(reference, reversed_torque):
     for (_, static, result), reverse in ((reference, False), (reversed_torque, True)):
         assert_fields_are_root_cycles(static, result, result.roots, reverse=reverse)
+
+
+def test_influences_are_those_of_solutions_of_their_own(reference):
+    """Sun and planet are observed with their flanks; each gear alone gives the same to rounding."""
+    _, static, result = reference
+    alone = set_root_stress(static.sectors, static.bodies.material)
+    for kind in ("sun", "planet", "ring"):
+        found, expected = (getattr(one, kind).influence for one in (result.influences, alone))
+        assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
 def test_loads_on_back_flanks_are_part_of_the_field(reference):

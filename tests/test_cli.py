@@ -19,6 +19,7 @@ from femgear.storage import finish, open_results, write_dataset, write_text
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
+STAGES = ("static", "stress", "modes", "dynamics", "housing")
 
 
 def synthetic():
@@ -252,8 +253,8 @@ def fake_run(case, out, *, only=None, pictures=True, progress=None):
     data = synthetic()
     names = ["case.toml"]
     write_text(case.source, out / "case.toml")
-    for step, stage in enumerate(("static", "modes", "dynamics", "housing")):
-        progress(stage, step + 1, 4)
+    for step, stage in enumerate(STAGES):
+        progress(stage, step + 1, len(STAGES))
         dataset = getattr(data, stage)()
         for name in dataset.coords:
             dataset[name].attrs.setdefault("units", "1")
@@ -278,10 +279,10 @@ def test_run_writes_and_sums_up(tmp_path, capsys, pipeline):
     out = tmp_path / "out"
     assert cli.main(["run", str(CASE), "-o", str(out)]) == 0
     printed = capsys.readouterr()
-    for title in ("Static", "Modes", "Dynamics", "Housing", "Time", "load share"):
+    for title in ("Static", "Stresses", "Modes", "Dynamics", "Housing", "Time", "load share"):
         assert title in printed.out
     assert "static" in printed.err
-    assert open_results(out).stages == ("static", "modes", "dynamics", "housing")
+    assert open_results(out).stages == STAGES
     assert (out / "case.toml").read_text(encoding="utf-8") == TEXT
 
 
@@ -323,7 +324,7 @@ def test_force_keeps_the_old_results_until_the_new_ones_are_there(tmp_path, caps
         assert open_results(out).stages == ("static",) and len(list(out.iterdir())) == 3
     pipeline(fake_run)
     assert cli.main(["run", str(CASE), "-o", str(out), "--force"]) == 0
-    assert len(open_results(out).stages) == 4
+    assert open_results(out).stages == STAGES
     assert f"results: {out}\n" in capsys.readouterr().out
 
 
@@ -354,9 +355,9 @@ def test_an_interrupted_run_says_how_far_it_came(tmp_path, capsys, monkeypatch):
     assert cli.main(["run", str(CASE), "-o", str(out)]) == 130
     assert cli.main(["report", str(out)]) == 4
     err = capsys.readouterr().err
-    assert "the run was interrupted after: static, modes" in err
+    assert "the run was interrupted after: static, stress, modes" in err
     assert f"femgear run {out / 'case.toml'} -o {out}" in err
-    with pytest.warns(UserWarning, match="interrupted after: static, modes"):
+    with pytest.warns(UserWarning, match="interrupted after: static, stress, modes"):
         results = open_results(out)
     assert results.static.sizes["planet"] == 3 and results.case.title == "Planetary set 27/40/108"
 

@@ -197,7 +197,7 @@ class StaticSection(_Section):
     flank_elements: Count(4, 200) = 24
     members: Literal["fixed", "elastic"] = "fixed"
     back_flanks: StrictBool = False
-    stresses: StrictBool = False
+    stresses: StrictBool = True
     longest_record: Count(1, 4096) = 256
     depth: Quantity(LENGTH, 1e-6, 0.1) | None = None
 

@@ -91,8 +91,11 @@ def make_bodies(
     ring_foundation : sparse matrix, optional
         Stiffness of an elastic foundation of the ring, which then is not held [N/m].
     """
+    # the ring's roots need a solution of their own: its sector is not of one plane state, see `root_stress`
     compliances = [
-        flank_compliance(s.grid, s.gear, material, s.stiffness, held="rim", depth=depth)
+        flank_compliance(
+            s.grid, s.gear, material, s.stiffness, held="rim", depth=depth, root_state=TEETH_STATE
+        )
         for s in (sectors.sun, sectors.planet)
     ]
     ring, held = sectors.ring, "rim"

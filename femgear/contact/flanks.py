@@ -9,7 +9,7 @@ The contact solution adds the half-plane displacement at the surface under its p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,11 +18,32 @@ from femgear.contact.halfplane import depth_displacement
 from femgear.errors import CaseError
 
 if TYPE_CHECKING:
+    from femgear.fe.compliance import SectorSchur
     from femgear.fe.elasticity import Material
     from femgear.fe.meshing import Grid
+    from femgear.fe.stress import BoundaryStress
     from femgear.gears.gear import Gear
 
 LEFT, RIGHT = 0, 1
+
+
+@dataclass(frozen=True)
+class ObservedRoot:
+    """Root of a tooth seen by the same factorisation as its flanks; the sectors are not tied yet.
+
+    Parameters
+    ----------
+    along : BoundaryStress
+        Functionals of the tangential stress along the root of the left flank.
+    stations : FlankStations
+        Where the loads act.
+    schur : SectorSchur
+        Sector with these loads and observations, those of the cuts themselves included.
+    """
+
+    along: BoundaryStress
+    stations: FlankStations
+    schur: SectorSchur
 
 
 @dataclass(frozen=True)
@@ -43,6 +64,8 @@ class FlankCompliance:
         Depth under each station at which body and half plane are joined [m].
     unknowns : int
         Degrees of freedom of the whole body that the sector stands for.
+    root : ObservedRoot, optional
+        For the stresses in the roots, where they were observed too.
     """
 
     roll: np.ndarray
@@ -50,6 +73,7 @@ class FlankCompliance:
     regular: np.ndarray
     depth: np.ndarray
     unknowns: int
+    root: ObservedRoot | None = None
 
 
 @dataclass(frozen=True)
@@ -108,8 +132,32 @@ def flank_load_columns(grid: Grid, stations: FlankStations) -> np.ndarray:
     return loads
 
 
+def root_functionals(grid: Grid, gear: Gear, material: Material, *, state: str) -> BoundaryStress:
+    """Tangential stress along fillet and root arc of the left flank, in the direction of the boundary."""
+    from femgear.fe.stress import tangential_stress
+
+    names = tuple(name for name in ("fillet_left", "root_left") if name in grid.boundaries)
+    return tangential_stress(grid, material, names[::-1] if gear.internal else names, state=state)
+
+
+def with_cut(schur: SectorSchur, grid: Grid, held: str | None, along: BoundaryStress) -> SectorSchur:
+    """Add what the root functionals see of the cut itself: the last edge of the root ends on it."""
+    from femgear.fe.compliance import mirror_nodes, mirrored_columns, split_sector
+
+    _, right, left = split_sector(grid, held)
+    both = np.hstack([along.columns, mirrored_columns(along.columns, mirror_nodes(grid))])
+    return replace(schur, observation_cut=schur.observation_cut + np.stack([both[right], both[left]]))
+
+
 def flank_compliance(
-    grid: Grid, gear: Gear, material: Material, stiffness, *, held: str, depth: float | None = None
+    grid: Grid,
+    gear: Gear,
+    material: Material,
+    stiffness,
+    *,
+    held: str | None,
+    depth: float | None = None,
+    root_state: str | None = None,
 ) -> FlankCompliance:
     """Regular flank compliance of a whole gear from the grid of one sector.
 
@@ -125,6 +173,8 @@ def flank_compliance(
         Boundary that is held: ``"rim"`` is the bore of an external gear and the outer surface of a ring.
     depth : float, optional
         Largest joining depth [m]; see `joining_depth`.
+    root_state : str, optional
+        Plane state of the whole of `stiffness`: the stresses in the roots are observed with the flanks.
 
     Raises
     ------
@@ -133,8 +183,14 @@ def flank_compliance(
     """
     from femgear.fe.compliance import tooth_compliance
 
-    stations, depths, schur = _condensed(grid, gear, stiffness, held, depth)
-    return _without_half_plane(gear, material, stations, depths, tooth_compliance(schur), len(grid.points))
+    along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
+    stations, depths, schur = _condensed(grid, gear, stiffness, held, depth, along)
+    root = None
+    if along is not None:
+        schur, seen = _split_observations(schur, 2 * len(stations.roll))
+        root = ObservedRoot(along, stations, with_cut(seen, grid, held, along))
+    found = _without_half_plane(gear, material, stations, depths, tooth_compliance(schur), len(grid.points))
+    return replace(found, root=root)
 
 
 def held_sector_compliance(
@@ -148,8 +204,8 @@ def held_sector_compliance(
     return _without_half_plane(gear, material, stations, depths, schur.C[None], len(grid.points))
 
 
-def _condensed(grid, gear, stiffness, held, depth):
-    """Stations, joining depths (n, 1) and the condensed sector that observes at one and two depths."""
+def _condensed(grid, gear, stiffness, held, depth, along=None):
+    """Stations, joining depths (n, 1) and the condensed sector that observes at both depths, and `along`."""
     from femgear.fe.compliance import condense_sector, directional, interpolation
 
     stations = flank_stations(grid, gear)
@@ -161,6 +217,8 @@ def _condensed(grid, gear, stiffness, held, depth):
         )
         for factor in (1.0, 2.0)
     ]
+    if along is not None:
+        observations.append(along.columns)
     schur = condense_sector(
         grid,
         stiffness,
@@ -170,6 +228,15 @@ def _condensed(grid, gear, stiffness, held, depth):
         observations=np.hstack(observations),
     )
     return stations, depths, schur
+
+
+def _split_observations(schur: SectorSchur, first: int) -> tuple[SectorSchur, SectorSchur]:
+    """The first observations of either half of the sector, and the others."""
+    rows = np.arange(len(schur.C)).reshape(2, -1)
+    return tuple(
+        replace(schur, C=schur.C[part.ravel()], observation_cut=schur.observation_cut[..., part.ravel()])
+        for part in (rows[:, :first], rows[:, first:])
+    )
 
 
 def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:

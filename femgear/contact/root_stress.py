@@ -7,13 +7,22 @@ to the stress at every position, loads on neighbouring teeth and on the other fl
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.contact.assembly import mesh_pairs
-from femgear.contact.flanks import LEFT, RIGHT, flank_load_columns, flank_stations, station_weights
+from femgear.contact.flanks import (
+    LEFT,
+    RIGHT,
+    ObservedRoot,
+    flank_load_columns,
+    flank_stations,
+    root_functionals,
+    station_weights,
+    with_cut,
+)
 
 if TYPE_CHECKING:
     from femgear.contact.bodies import Sectors
@@ -175,12 +184,10 @@ def root_stress(
     GridError
         When the body can move freely or the root is not one chain of edges.
     """
-    from femgear.fe.compliance import condense_sector, mirror_nodes, mirrored_columns, tooth_compliance
+    from femgear.fe.compliance import condense_sector
     from femgear.fe.elasticity import stiffness
-    from femgear.fe.stress import tangential_stress
 
-    names = tuple(name for name in ("fillet_left", "root_left") if name in grid.boundaries)
-    along = tangential_stress(grid, material, names[::-1] if gear.internal else names, state=state)
+    along = root_functionals(grid, gear, material, state=state)
     matrix = stiffness(grid, material, state=state, thickness=gear.face_width)
     stations = flank_stations(grid, gear)
     schur = condense_sector(
@@ -191,11 +198,24 @@ def root_stress(
         loads=flank_load_columns(grid, stations),
         observations=along.columns,
     )
-    both = np.hstack([along.columns, mirrored_columns(along.columns, mirror_nodes(grid))])
-    influence = tooth_compliance(_with_cut(schur, grid, held, both))
+    return observed_root_stress(gear, ObservedRoot(along, stations, with_cut(schur, grid, held, along)))
+
+
+def observed_root_stress(gear: Gear, root: ObservedRoot) -> RootStress:
+    """Root stress influence of a whole gear from what was observed with its flank compliance.
+
+    Parameters
+    ----------
+    gear : Gear
+    root : ObservedRoot
+        Of one sector of that gear, `flanks.flank_compliance` with ``root_state``.
+    """
+    from femgear.fe.compliance import tooth_compliance
+
+    along, stations = root.along, root.stations
     order = slice(None, None, -1 if gear.internal else 1)
     m, n = len(along.arc), len(stations.roll)
-    influence = influence.reshape(gear.teeth, 2, m, 2, n)[:, :, order].copy()
+    influence = tooth_compliance(root.schur).reshape(gear.teeth, 2, m, 2, n)[:, :, order].copy()
     # flank and root share one node: right under a nodal force there the stress has no limit
     end, beside = (n - 1, n - 2) if gear.internal else (0, 1)
     for side in (LEFT, RIGHT):
@@ -207,15 +227,6 @@ def root_stress(
         slope=np.arccos(np.clip(np.abs(along.tangents[order, 0]), 0.0, 1.0)),
         influence=influence.reshape(gear.teeth, 2 * m, 2 * n),
     )
-
-
-def _with_cut(schur, grid, held, observations):
-    """Add what the observations see of the cut itself: the last edge of the root ends on it."""
-    from femgear.fe.compliance import split_sector
-
-    _, right, left = split_sector(grid, held)
-    direct = np.stack([observations[right], observations[left]])
-    return replace(schur, observation_cut=schur.observation_cut + direct)
 
 
 def set_root_stress(sectors: Sectors, material: Material) -> RootStresses:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.plots.style import BLACK, BLUE, GREY, VERMILION, family, label, legend_below, new_figure
+from femgear.plots.style import BLACK, BLUE, GREY, SIZE, VERMILION, family, label, legend_below, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -125,6 +125,10 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
     label(axes[2], y="along the common tangent [µm]")
     figure.colorbar(image, ax=axes[2:], label="pressure [MPa]", extend="max")
     legend_below(figure, columns=2)
+    highest = float(stress["pressure_distribution"].max()) * 1e-6
+    if highest > top:
+        text = f"up to {highest:.0f} MPa where a tip edge carries, cut here: no limit as cells shrink"
+        figure.legends[0].set_title(text, prop={"size": SIZE - 1})
     return figure
 
 
