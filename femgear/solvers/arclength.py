@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.solvers.acceptance import check_return, strain
+from femgear.solvers.acceptance import check_step, strain
 from femgear.solvers.bifurcation import Segment, branch_point, folds
 from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, correct
 
@@ -28,12 +28,12 @@ class StepOptions:
     Parameters
     ----------
     first, smallest, largest : float
-        Step lengths. Curves nearer to each other than ``largest * angle / 10`` can only be told apart by how
-        Newton's method contracts: keep ``largest`` small where solutions crowd.
+        Step lengths.
     angle : float
         Angle between successive tangents that is aimed at [rad]; twice as much is refused.
     contraction : float
-        Ratio of the second to the first Newton step aimed at; four times as much is refused.
+        Ratio of the second to the first Newton step, both with the first derivative, aimed at
+        (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 5.1); it sets the next step.
     tolerance : float
         Last Newton step relative to ``1 + |z|``.
     max_iterations : int
@@ -46,7 +46,7 @@ class StepOptions:
     smallest: float = 1e-8
     largest: float = 0.1
     angle: float = 0.15
-    contraction: float = 0.15
+    contraction: float = 0.0625
     tolerance: float = 1e-10
     max_iterations: int = 10
     max_points: int = 5000
@@ -114,7 +114,7 @@ def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: Step
             aims = {"angle": options.angle, "contraction": options.contraction, "corner": corner}
             effort = strain(point, new, **aims)
             if not corner:
-                check_return(curve, point, new)
+                check_step(curve, point, new)
             segment = Segment(curve, point, new)
             special = folds(segment)
             if point.orientation * new.orientation < 0.0:

@@ -103,6 +103,11 @@ class Branch:
         return np.array([solution.tail for solution in self.solutions])
 
     @property
+    def spectral_radius(self) -> np.ndarray:
+        """Spectral radius of the fixed point, (p,); nan where it was not asked for."""
+        return np.array([solution.spectral_radius for solution in self.solutions])
+
+    @property
     def closed(self) -> bool:
         """The last solution is the first one again."""
         return self.curve.closed
@@ -130,6 +135,7 @@ def frequency_response_curve(
     start_at: float | None = None,
     stability: bool = True,
     tolerance: float = 1e-7,
+    radius: bool = False,
     samples=None,
     reduction=None,
     scale: float | None = None,
@@ -156,6 +162,8 @@ def frequency_response_curve(
         Floquet verdict at every point. With several base frequencies each says "not covered".
     tolerance : float
         Relative error of the monodromy matrices.
+    radius : bool
+        Spectral radius of the fixed point at every point.
     scale : float, optional
         Deflection [m] that counts as much as the whole range of frequencies; by default the larger of the
         static deflection and the start.
@@ -184,7 +192,7 @@ def frequency_response_curve(
             code="E-RANGE",
             limit="two different ones, not negative",
         )
-    route = FrequencyRoute(balance, tuple(np.asarray(others, float).tolist()), base)
+    route = FrequencyRoute(balance, tuple(np.asarray(others, float).tolist()), base, radius)
     return _follow(route, frequency, start, start_at, stability, tolerance, scale, options)
 
 
@@ -199,6 +207,7 @@ def parameter_curve(
     start_at: float | None = None,
     stability: bool = True,
     tolerance: float = 1e-7,
+    radius: bool = False,
     samples=None,
     scale: float | None = None,
     options: StepOptions | None = None,
@@ -213,7 +222,7 @@ def parameter_curve(
         The curve starts at the first value towards the last one.
     frequency : float or (n_bases,) array
         [rad/s].
-    harmonics, orders, start, start_at, stability, tolerance, samples, scale, options
+    harmonics, orders, start, start_at, stability, tolerance, radius, samples, scale, options
         As for :func:`frequency_response_curve`. The derivative by the parameter is taken by differences.
     """
     if not np.all(np.isfinite(parameter)) or min(parameter) == max(parameter):
@@ -223,7 +232,7 @@ def parameter_curve(
     begin = parameter[0] if start_at is None else start_at
     balance = harmonic_balance(family(begin), harmonics=harmonics, orders=orders, samples=samples)
     omega = tuple(np.atleast_1d(np.asarray(frequency, float)).tolist())
-    route = FamilyRoute(family, balance, omega, (min(parameter), max(parameter)), samples)
+    route = FamilyRoute(family, balance, omega, (min(parameter), max(parameter)), samples, radius)
     return _follow(route, parameter, start, start_at, stability, tolerance, scale, options)
 
 

@@ -78,7 +78,7 @@ class CurvePoint:
         Sign of the determinant of the derivative bordered by the tangent.
     iterations : int
     contraction : float
-        Second Newton step over the first; zero when one was enough.
+        Second Newton step, with the derivative of the first one, over the first; zero when one was enough.
     error : float
         Length of the last Newton step, relative to ``1 + |z|``.
     kind : str
@@ -131,14 +131,14 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     """
     from scipy import linalg
 
-    z, lengths, contraction = guess.copy(), [], 0.0
+    z, lengths, contraction, factors = guess.copy(), [], 0.0, None
     unit = np.zeros(len(z))
     unit[-1] = 1.0
     for _ in range(curve.max_iterations):
         residual, derivative = curve.equations(z)
         right = np.append(residual, normal @ (z - guess))
         if len(lengths) == 1:
-            # natural monotonicity: what the next step would be with the first derivative
+            # what the next step would be with the first derivative
             again = linalg.lu_solve(factors, right, check_finite=False)
             contraction = np.linalg.norm(again) / (1.0 + np.linalg.norm(z)) / lengths[0]
         factors, sign = factored(np.vstack([derivative, normal]))
@@ -158,5 +158,6 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     if along is not None and tangent @ along < 0.0:
         # normal . tangent is positive as solved, so only a turned tangent changes the sign of the determinant
         tangent, sign = -tangent, -sign
-    if lengths[0] <= 1e2*curve.tolerance: contraction=0.0
+    if lengths[0] <= 1e2 * curve.tolerance:
+        contraction = 0.0  # rounding
     return CurvePoint(z, tangent, derivative, sign, len(lengths), float(contraction), lengths[-1])

@@ -33,6 +33,7 @@ def solve_harmonic_balance(
     reduction: Reduction | None = None,
     tolerance: float = 1e-10,
     max_iterations: int = 50,
+    radius: bool = True,
 ) -> PeriodicSolution:
     """Periodic or quasi-periodic solution at given base frequencies, by Newton's method with line search.
 
@@ -49,6 +50,9 @@ def solve_harmonic_balance(
     tolerance : float
         Largest residual relative to the largest deflection.
     max_iterations : int
+    radius : bool
+        Whether the solution tells the spectral radius of the fixed point; it takes all eigenvalues of one
+        matrix of the size of the unknowns.
 
     Returns
     -------
@@ -82,6 +86,9 @@ def solve_harmonic_balance(
     found = newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
     if start is None and not found.converged:
         found = embed(balance, frequency, found, tolerance, max_iterations)
+    if radius and np.all(np.isfinite(found.deflection)):
+        value = balance.spectral_radius(balance.unknowns(found.deflection), frequency)
+        found = replace(found, spectral_radius=value)
     return found
 
 

@@ -27,6 +27,9 @@ from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.receptance import Reduction, reduce_problem, source_columns
 
+# Unknowns up to which all eigenvalues are computed for the spectral radius.
+_ALL_EIGENVALUES = 600
+
 
 @dataclass(frozen=True)
 class LineForces:
@@ -145,6 +148,17 @@ class HarmonicBalance:
         residual = self.unknowns(self.residual(lines, forces, value))
         return residual, self.jacobian(forces, value), slope
 
+    def spectral_radius(self, y, frequency) -> float:
+        """Spectral radius of the fixed point ``X <- T_load S - T (F - reference X)`` at the unknowns y.
+
+        Largest modulus of the eigenvalues of ``T d(F - reference X)/dX``, the Jacobian of the residual less
+        one. Beyond 600 unknowns by Arnoldi's method (ARPACK), by all eigenvalues where that fails.
+        """
+        receptance, _ = self.receptance(frequency)
+        matrix = self.jacobian(self.forces(self.lines(y)), receptance)
+        matrix[np.diag_indices(self.size)] -= 1.0
+        return largest_modulus(matrix)
+
     def linear_start(self, frequency) -> np.ndarray:
         """Unknowns of the response with reference springs, forced by what the elements do at its mean."""
         value, _ = self.receptance(frequency)
@@ -236,6 +250,24 @@ def _typical_deflection(problem, reduction, source) -> float:
     lengths = [np.ravel(getattr(e, name)) for e in problem.elements for name in names if hasattr(e, name)]
     sizes = np.abs(np.concatenate([*lengths, np.zeros(1)]))
     return float(sizes[np.isfinite(sizes)].max()) or 1.0
+
+
+def largest_modulus(matrix: np.ndarray) -> float:
+    """Largest modulus of the eigenvalues of a real matrix (n, n)."""
+    n = len(matrix)
+    if n <= _ALL_EIGENVALUES:
+        return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
+    from scipy.sparse import linalg
+
+    # a fixed start: the same value every time
+    start = np.random.default_rng(0).standard_normal(n)
+    try:
+        values = linalg.eigs(
+            matrix, k=2, ncv=40, v0=start, which="LM", tol=1e-10, maxiter=200, return_eigenvectors=False
+        )
+    except linalg.ArpackError:
+        values = np.linalg.eigvals(matrix)
+    return float(np.abs(values).max())
 
 
 def relative_residual(error, y, scale) -> float:

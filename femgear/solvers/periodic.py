@@ -33,6 +33,9 @@ class PeriodicSolution:
         What happened and, where it did not converge, what to do.
     history : tuple of float
         Relative residual at every iteration.
+    spectral_radius : float
+        Of the fixed point ``X <- T_load S - T (F - reference X)`` at the solution: below one the plain
+        iteration converges. It says nothing on stability. NaN where it was not asked for.
     """
 
     frequency: np.ndarray
@@ -46,6 +49,7 @@ class PeriodicSolution:
     tail: float
     message: str
     history: tuple[float, ...] = field(default=())
+    spectral_radius: float = np.nan
 
     def __post_init__(self):
         for name, kind in (

@@ -43,6 +43,7 @@ class FrequencyRoute:
     balance: HarmonicBalance
     held: tuple[float, ...]
     base: int
+    radius: bool = False
 
     @property
     def scale(self) -> float:
@@ -65,7 +66,7 @@ class FrequencyRoute:
         balance = self.balance
         return solve_harmonic_balance(
             balance.problem, self.frequency(parameter), orders=balance.orders, start=start,
-            samples=balance.grid.samples, reduction=balance.reduction,
+            samples=balance.grid.samples, reduction=balance.reduction, radius=False,
         )  # fmt: skip
 
     def unknowns(self, lines) -> np.ndarray:
@@ -78,7 +79,7 @@ class FrequencyRoute:
 
     def solution(self, y, parameter: float, error: float, iterations: int = 0) -> PeriodicSolution:
         """Solution at a corrected point."""
-        return _told(self.balance, y, self.frequency(parameter), error, iterations)
+        return _told(self.balance, y, self.frequency(parameter), error, iterations, self.radius)
 
     def verdicts(self, parameters, solutions, tolerance: float) -> tuple[FloquetVerdict, ...]:
         """Floquet verdict of every solution."""
@@ -94,6 +95,7 @@ class FamilyRoute:
     omega: tuple[float, ...]
     limits: tuple[float, float]
     samples: tuple[int, ...] | int | None
+    radius: bool = False
 
     @property
     def scale(self) -> float:
@@ -132,8 +134,9 @@ class FamilyRoute:
     def first(self, parameter: float, start) -> PeriodicSolution:
         """Solution near the start."""
         return solve_harmonic_balance(
-            self.family(parameter), self.omega, orders=self.balance.orders, start=start, samples=self.samples
-        )
+            self.family(parameter), self.omega, orders=self.balance.orders, start=start,
+            samples=self.samples, radius=False,
+        )  # fmt: skip
 
     def unknowns(self, lines) -> np.ndarray:
         """Real unknowns (n_y,)."""
@@ -145,7 +148,7 @@ class FamilyRoute:
 
     def solution(self, y, parameter: float, error: float, iterations: int = 0) -> PeriodicSolution:
         """Solution at a corrected point."""
-        return _told(self.balance_at(parameter), y, np.array(self.omega), error, iterations)
+        return _told(self.balance_at(parameter), y, np.array(self.omega), error, iterations, self.radius)
 
     def verdicts(self, parameters, solutions, tolerance: float) -> tuple[FloquetVerdict, ...]:
         """Floquet verdict of every solution, each of its own system."""
@@ -155,11 +158,15 @@ class FamilyRoute:
         )
 
 
-def _told(balance: HarmonicBalance, y, frequency, error: float, iterations: int) -> PeriodicSolution:
+def _told(
+    balance: HarmonicBalance, y, frequency, error: float, iterations: int, radius: bool
+) -> PeriodicSolution:
+    told = {"spectral_radius": balance.spectral_radius(y, frequency)} if radius else {}
     message = f"Point of a branch; last Newton step {error:.1e} of the scaled unknowns."
     return balance.solution(
-        y, frequency, converged=True, iterations=iterations, factorisations=iterations, message=message
-    )
+        y, frequency, converged=True, iterations=iterations, factorisations=iterations, message=message,
+        **told,
+    )  # fmt: skip
 
 
 def _same_linear_part(one: NonlinearSystem, other: NonlinearSystem) -> bool:

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from femgear.errors import CaseError
 from femgear.solvers.branches import (
@@ -99,7 +100,9 @@ def gear_pair(backlash=2.0, depth=0.3):
 
 
 def test_gear_pair_with_backlash_bends_over_twice():
-    found = frequency_response_curve(gear_pair(), (1.3, 0.6), harmonics=9, options=StepOptions(largest=0.2))
+    # contacts that cross the instants of few samples would ripple the curve into further limit points
+    lines = {"harmonics": 9, "samples": 2048}
+    found = frequency_response_curve(gear_pair(), (1.3, 0.6), options=StepOptions(largest=0.2), **lines)
     assert found.complete and len(found.folds) == 4 and not len(found.branch_points)
     # loss of contact softens: the curve from above turns back, then contact of the back sides stiffens
     legs = np.split(np.arange(len(found.parameter)), found.folds)
@@ -109,7 +112,7 @@ def test_gear_pair_with_backlash_bends_over_twice():
     assert stable == [{True}, {False}, {True}, {False}, {True}]
     # every point is a solution for a solver that knows nothing of the curve
     for i in (5, int(found.folds[:2].mean()), len(found.parameter) - 3):
-        again = solve_harmonic_balance(gear_pair(), found.parameter[i], harmonics=9, start=found.solutions[i])
+        again = solve_harmonic_balance(gear_pair(), found.parameter[i], start=found.solutions[i], **lines)
         np.testing.assert_allclose(again.deflection, found.lines[i], atol=1e-8)
 
 
@@ -149,6 +152,64 @@ def test_parametric_resonance_is_a_branch_point_and_can_be_entered():
     # the two sides are one motion, half a period apart
     assert ends[0] == pytest.approx(-ends[1], rel=1e-8)
     assert sides[0].stable[5] and abs(sides[0].lines[5][0, 0]) < 1e-12
+
+
+def subharmonic(force=4.0, damping=0.05, cubic=0.2):
+    """Duffing's oscillator forced at three times the base frequency."""
+    system = MechanicalSystem(ONE, damping * ONE, ONE, ONE, np.zeros(1), ("x",))
+    spring = PolynomialSprings(np.array([0]), np.array([[0.0, 0.0, cubic]]))
+    return NonlinearSystem(system, (spring,), (HarmonicForce(np.array([force]), (3,)),))
+
+
+def on_the_loop(frequency, amplitude):
+    """Subharmonic motion whose first harmonic has about this amplitude, whatever its phase."""
+    for phase in np.arange(16) * np.pi / 8:
+        start = np.zeros((1, 10), complex)
+        start[0, [1, 3]] = amplitude * np.exp(1j * phase), 4.0 / (1.0 - 9.0 * frequency**2)
+        found = solve_harmonic_balance(subharmonic(), frequency, harmonics=9, start=start, radius=False)
+        if found.converged and abs(first(found.deflection) - amplitude) < 0.01:
+            return found
+    raise AssertionError("no subharmonic motion found")
+
+
+def test_subharmonic_motions_of_order_three_form_an_isola():
+    """Nayfeh and Mook, Nonlinear Oscillations (1979), section 4.2.2: none grows out of the forced motion."""
+    options = {"harmonics": 9, "scale": 1.0, "options": StepOptions(largest=0.2)}
+    loops = [
+        frequency_response_curve(
+            subharmonic(), ends, start_at=w, start=on_the_loop(w, a), stability=k == 0, **options
+        )
+        for k, (ends, w, a) in enumerate(
+            [((0.9, 2.3), 1.6, 3.2369), ((2.3, 0.9), 1.2, 1.5102), ((0.9, 2.3), 1.8, 3.7703)]
+        )
+    ]
+    known = loops[0].lines[np.argmin(loops[0].parameter), 0, 1]
+    for loop in loops:
+        assert loop.closed and loop.complete and len(loop.folds) == 2 and not len(loop.branch_points)
+        np.testing.assert_allclose(loop.lines[-1], loop.lines[0], atol=1e-6)
+        left, right = sorted(loop.folds, key=lambda i: loop.parameter[i])
+        # the same loop from everywhere, up to a shift in time by periods of the force
+        np.testing.assert_allclose(loop.parameter[[left, right]], [1.0722824082, 1.8666984372], atol=1e-9)
+        turns = 3.0 * np.angle(loop.lines[left, 0, 1] / known) / (2.0 * np.pi)
+        assert turns == pytest.approx(round(turns), abs=1e-5)
+        assert loop.parameter.min() == loop.parameter[left] and loop.parameter.max() == loop.parameter[right]
+    # started on the upper side, which is stable; the lower one lies between the limit points
+    loop, (one, other) = loops[0], loops[0].folds
+    assert loop.stable[:one].all() and loop.stable[other + 1 :].all()
+    assert not loop.stable[one + 1 : other].any() and set(loop.loss[one + 1 : other]) == {"fold"}
+
+
+def test_motion_on_the_isola_is_what_integration_in_time_settles_on():
+    found = on_the_loop(1.6, 3.2369)
+    period = 2.0 * np.pi / 1.6
+    start = [found.at(0.0)[0], (1j * found.line_frequency * found.deflection[0]).sum().real]
+    times = period * (40 + np.arange(64) / 64)
+    run = solve_ivp(
+        lambda t, y: [y[1], 4.0 * np.cos(4.8 * t) - 0.05 * y[1] - y[0] - 0.2 * y[0] ** 3],
+        (0.0, times[-1]), start, method="DOP853", rtol=1e-9, atol=1e-10, t_eval=times,
+    )  # fmt: skip
+    settled = 2.0 * abs(np.fft.rfft(run.y[0])[1]) / 64
+    assert settled == pytest.approx(first(found.deflection), rel=2e-3)
 
 
 def test_held_base_and_a_second_tone():

@@ -111,19 +111,64 @@ def test_close_curves_are_never_spliced(gap, count):
     np.testing.assert_allclose(found.points[:, 0] - np.sin(6.0 * found.parameter), gap, rtol=1e-6)
 
 
-@pytest.mark.parametrize("gap, largest", [(0.07, 1.0), (0.04, 1.0), (0.03, 1.0), (0.02, 0.3), (0.005, 0.1)])
-def test_endless_family_of_curves_with_large_steps(gap, largest):
-    # Newton's method reaches some curve from everywhere, every second one with the same orientation
-    def family(u, p):
-        d = np.pi * (u[0] - np.sin(6.0 * p)) / gap
-        slope = np.cos(d) * np.pi / gap
-        return np.array([np.sin(d)]), np.array([[slope]]), np.array([-slope * 6.0 * np.cos(6.0 * p)])
+GAPS = (0.1, 0.07, 0.05, 0.04, 0.03, 0.02, 0.01, 0.005, 0.002)
 
-    found = continue_curve(
-        family, [0.0], 0.0, limits=(0.0, 2.0), options=StepOptions(first=largest, largest=largest)
-    )
-    assert found.complete
+
+def family(gap, rate=6.0):
+    """Curves ``sin(rate p) + k gap``: Newton's method reaches one from everywhere, every second one alike."""
+
+    def curves(u, p):
+        d = np.pi * (u[0] - np.sin(rate * p)) / gap
+        slope = np.cos(d) * np.pi / gap
+        return np.array([np.sin(d)]), np.array([[slope]]), np.array([-slope * rate * np.cos(rate * p)])
+
+    return curves
+
+
+@pytest.mark.parametrize("largest", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize("gap", GAPS)
+def test_endless_family_of_curves_with_large_steps(gap, largest):
+    options = StepOptions(first=largest, largest=largest)
+    found = continue_curve(family(gap), [0.0], 0.0, limits=(0.0, 1.0), options=options)
+    assert found.complete or "lost after" in found.message
     np.testing.assert_allclose(found.points[:, 0], np.sin(6.0 * found.parameter), atol=1e-9)
+
+
+@pytest.mark.parametrize("largest", [0.1, 1.0])
+@pytest.mark.parametrize("gap", [0.05, 0.005, 0.002])
+def test_curves_on_close_sheets_in_two_unknowns(gap, largest):
+    """Sheets ``u_1 = sin 6p + k gap``, crossed by the surface ``u_2 = cos 4p + u_1^2 - sin^2 6p``."""
+
+    def sheets(u, p):
+        s, c = np.sin(6.0 * p), np.cos(6.0 * p)
+        d = np.pi * (u[0] - s) / gap
+        slope = np.cos(d) * np.pi / gap
+        value = np.array([np.sin(d), u[1] - np.cos(4.0 * p) - u[0] ** 2 + s**2])
+        jacobian = np.array([[slope, 0.0], [-2.0 * u[0], 1.0]])
+        return value, jacobian, np.array([-6.0 * slope * c, 4.0 * np.sin(4.0 * p) + 12.0 * s * c])
+
+    options = StepOptions(first=largest, largest=largest)
+    found = continue_curve(sheets, [0.0, 1.0], 0.0, limits=(0.0, 1.0), options=options)
+    assert found.complete or "lost after" in found.message
+    right = np.column_stack([np.sin(6.0 * found.parameter), np.cos(4.0 * found.parameter)])
+    np.testing.assert_allclose(found.points, right, atol=1e-9)
+
+
+def test_detour_between_two_points_is_not_passed_over():
+    """A rise much narrower than the step; the prediction beyond it is exactly on another curve."""
+    height = np.tanh(8.0)
+    gap = height / 700.0
+
+    def rising(u, p):
+        d = np.pi * (u[0] - np.tanh(8.0 * (p - 1.0))) / gap
+        slope = np.cos(d) * np.pi / gap
+        rise = 8.0 / np.cosh(8.0 * (p - 1.0)) ** 2
+        return np.array([np.sin(d)]), np.array([[slope]]), np.array([-slope * rise])
+
+    options = StepOptions(first=1.2, largest=1.2)
+    found = continue_curve(rising, [-height], 0.0, limits=(0.0, 2.0), options=options)
+    assert found.complete
+    np.testing.assert_allclose(found.points[:, 0], np.tanh(8.0 * (found.parameter - 1.0)), atol=1e-9)
 
 
 def test_corner_of_a_piecewise_linear_curve_is_passed():
