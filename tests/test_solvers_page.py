@@ -1,0 +1,111 @@
+"""docs/solvers.md: its examples print what it says, the functions that it names exist."""
+
+import contextlib
+import importlib
+import inspect
+import io
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = (ROOT / "docs" / "solvers.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
+PRINTED = re.findall(r"^```text\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
+# options, fields and parameters, which are no functions
+WORDS = {
+    "converged",
+    "residual",
+    "tail",
+    "spectral_radius",
+    "message",
+    "samples",
+    "start",
+    "start_at",
+    "folds",
+    "complete",
+    "stable",
+    "loss",
+    "largest_multiplier",
+    "settled",
+    "settle",
+    "segments",
+    "orders",
+    "tolerance",
+    "fold",
+    "flip",
+    "MechanicalSystem",
+}
+
+
+@pytest.fixture(scope="module")
+def outputs():
+    """What the examples print, run one after the other as on the page."""
+    names, found = {"__name__": "__main__"}, []
+    for number, example in enumerate(EXAMPLES):
+        output = io.StringIO()
+        with contextlib.redirect_stdout(output):
+            exec(compile(example, f"docs/solvers.md, example {number + 1}", "exec"), names)
+        found.append(output.getvalue())
+    return found
+
+
+def test_every_example_has_its_output():
+    assert len(EXAMPLES) == len(PRINTED) >= 5
+
+
+@pytest.mark.parametrize("number", range(len(EXAMPLES)))
+def test_examples_print_what_the_page_says(outputs, number):
+    assert outputs[number] == PRINTED[number]
+
+
+def public_names() -> set[str]:
+    """Functions and classes of `femgear.solvers`."""
+    found = set()
+    for path in (ROOT / "femgear" / "solvers").glob("[a-z]*.py"):
+        module = importlib.import_module(f"femgear.solvers.{path.stem}")
+        found |= {
+            name
+            for name, value in inspect.getmembers(module)
+            if getattr(value, "__module__", "") == module.__name__
+        }
+    return found
+
+
+def test_named_functions_exist():
+    prose = re.sub(r"^```.*?^```", "", PAGE, flags=re.MULTILINE | re.DOTALL)
+    named = set(re.findall(r"`(\w+)(?:\([^`]*\)(?:\.\w+\(\))?)?`", prose))
+    assert named - public_names() <= WORDS
+    assert {"solve_spectral", "periodic_response", "frequency_response_curve", "solve_transient"} <= named
+
+
+def test_options_that_the_page_names_exist():
+    from femgear.solvers.branches import Branch, frequency_response_curve
+    from femgear.solvers.hill import FloquetVerdict, floquet_verdict
+    from femgear.solvers.periodic import PeriodicSolution
+    from femgear.solvers.periodic_response import PeriodicResponse
+    from femgear.solvers.shooting import solve_shooting
+    from femgear.solvers.transient import METHODS, solve_transient
+
+    def options(function):
+        return set(inspect.signature(function).parameters)
+
+    assert {"converged", "residual", "message"} <= set(PeriodicSolution.__dataclass_fields__)
+    assert {"stable", "loss", "multipliers"} <= set(FloquetVerdict.__dataclass_fields__)
+    assert all(hasattr(PeriodicResponse, name) for name in ("tail", "spectral_radius", "stable"))
+    for name in (
+        "converged",
+        "residual",
+        "tail",
+        "stable",
+        "loss",
+        "largest_multiplier",
+        "folds",
+        "complete",
+    ):
+        assert hasattr(Branch, name)
+    assert {"start", "start_at", "samples"} <= options(frequency_response_curve)
+    assert {"settle", "segments"} <= options(solve_shooting)
+    assert "events" in options(solve_transient) and {"modal", "DOP853"} <= set(METHODS)
+    assert "method" in options(floquet_verdict)
