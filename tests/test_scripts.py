@@ -18,6 +18,8 @@ SCRIPTS = (
     "tip_relief_design.py",
     "pin_error_load_sharing.py",
 )
+# of published sets, without a case file
+SET_SCRIPTS = ("campbell.py", "gravity_wedging.py", "bearing_clearance.py")
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 
 
@@ -55,11 +57,11 @@ def quick_case(tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize("name", SCRIPTS)
+@pytest.mark.parametrize("name", SCRIPTS + SET_SCRIPTS)
 def test_help(name, tmp_path):
     done = run(name, "--help", folder=tmp_path)
     assert done.returncode == 0
-    assert "--output" in done.stdout and "CASE" in done.stdout
+    assert "--output" in done.stdout and ("CASE" in done.stdout) == (name in SCRIPTS)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -85,6 +87,12 @@ def test_help(name, tmp_path):
         ("pin_error_load_sharing.py", ["--tangential=-1 um"], 2, "negative"),
         ("pin_error_load_sharing.py", ["--position", "2"], 2, "0 to 1"),
         ("pin_error_load_sharing.py", ["--support", "soft"], 2, "soft"),
+        ("campbell.py", ["--speeds", "2"], 2, "5 speeds or more"),
+        ("campbell.py", ["--train", "C"], 2, "--train"),
+        ("gravity_wedging.py", ["--backlash", "3"], 2, "needs its unit"),
+        ("gravity_wedging.py", ["--lowest", "90", "--highest", "30"], 2, "lowest < highest"),
+        ("bearing_clearance.py", ["--clearance=-1 um"], 2, "clearances of 0 or more"),
+        ("bearing_clearance.py", ["--points", "1"], 2, "two frequencies"),
     ],
 )
 def test_bad_input_ends_in_a_message(name, arguments, code, message, tmp_path):
@@ -240,3 +248,49 @@ def test_pin_error_load_sharing(quick_case, tmp_path):
     errors = np.array([data[f"tangential error of pin {n} [m]"] for n in (1, 2, 3)])
     late = errors - errors.mean(axis=0)
     assert np.corrcoef(late.ravel(), fixed.ravel())[0, 1] < -0.9
+
+
+def text_table(path):
+    with open(path, newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_campbell(tmp_path):
+    done = run("campbell.py", "--speeds", "7", "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert is_png(tmp_path / "campbell.png")
+    data = table(tmp_path / "campbell.csv")
+    still = data["frequency [Hz]"][data["carrier speed [rpm]"] == 0]
+    np.testing.assert_allclose(still[[0, 2, 3, 5]], [40.761, 69.563, 156.869, 302.710], rtol=1e-5)
+    # the second mesh harmonic meets the rotational mode: 69.563 Hz = 136 times 30.69 rpm
+    assert "30.69" in done.stdout
+
+
+def test_gravity_wedging(tmp_path):
+    arguments = ("--backlash", "482 um", "--harmonics", "3", "--no-stability", "--highest", "70")
+    done = run("gravity_wedging.py", *arguments, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    names = ("gravity_wedging", "carrier_orbit", "planet_bearings", "tooth_contact")
+    assert all(is_png(tmp_path / f"{name}.png") for name in names)
+    rows = text_table(tmp_path / "branches.csv")
+    hertz = np.array([float(row["frequency [Hz]"]) for row in rows])
+    # the branch turns back twice between its ends
+    assert hertz[0] == 25.0 and hertz[-1] == 70.0 and np.sum(np.diff(np.sign(np.diff(hertz))) != 0) == 2
+    assert {row["stable"] for row in rows} == {"not computed"}
+
+
+def test_bearing_clearance(tmp_path):
+    arguments = ("--clearance", "100 um", "--harmonics", "1", "--frequencies", "2", "--points", "3")
+    done = run("bearing_clearance.py", *arguments, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert is_png(tmp_path / "ring_resonance.png") and is_png(tmp_path / "tooth_contact.png")
+    rows = text_table(tmp_path / "ring_resonance.csv")
+    peaks = {}
+    for row in rows:
+        size, hertz = float(row["ring x r.m.s. [m]"]), float(row["frequency [Hz]"])
+        peaks[row["clearance"]] = max(peaks.get(row["clearance"], (0.0, 0.0)), (size, hertz))
+    assert peaks["no bearing"][1] == pytest.approx(28.2, rel=0.03)
+    assert peaks["clearance 100 um"][1] == pytest.approx(87.4, rel=0.03)
+    back = table(tmp_path / "tooth_contact.csv")
+    # 0.6, 1.2 and 1.8 times the play: only the last one wedges
+    np.testing.assert_array_equal(back["back flanks in contact [1]"] > 0, [False, False, True] * 2)
