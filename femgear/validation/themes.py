@@ -17,6 +17,7 @@ from femgear.validation import (
     modulation,
     nonlinear,
     nonlinear_tones,
+    nrel,
     parametric,
     parametric_routes,
     planar,
@@ -155,6 +156,13 @@ THEMES = (
             planar.balance,
             planar.wind_turbine,
         ),
+    ),
+    Theme(
+        "wind turbine sets",
+        "Planetary sets of two wind turbines",
+        "NREL/CP-5000-55355; what every reading of its tables gives stands in docs/nrel.md.",
+        (nrel.frequencies, nrel.linear_peak),
+        slow_parts=(nrel.ring_resonance, nrel.wedging, nrel.folds, nrel.extended),
     ),
     Theme(
         "dynamics",

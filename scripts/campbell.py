@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+"""Natural frequencies of a published wind turbine set over the carrier speed, with critical speeds."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter
+from script_tools import print_table, ready_folder, run_script, say_files, write_csv
+
+from femgear.errors import CaseError
+
+RPM = np.pi / 30.0
+RING_TEETH = {"A": 99, "B": 68}
+
+
+def main(
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/campbell"),
+    train: Literal["A", "B"] = "B",
+    highest: float = 600.0,
+    speeds: int = 41,
+    modes: int = 6,
+    harmonics: int = 2,
+) -> None:
+    """Follow the modes of set A or B (NREL/CP-5000-55355) over the speed: a table, a picture, a CSV file.
+
+    Gyroscopic and centripetal terms of the carrier frame are in; mesh stiffnesses are constant.
+
+    Parameters
+    ----------
+    output
+        Folder of the results.
+    train
+        The 750 kW set A or the 550 kW set B.
+    highest
+        Largest carrier speed [rpm].
+    speeds
+        Number of speeds, 5 or more.
+    modes
+        Lowest modes to follow.
+    harmonics
+        Mesh harmonics drawn as lines of excitation.
+    """
+    from femgear.models.planar import planar_system
+    from femgear.models.wind_turbine import wind_turbine_a, wind_turbine_b
+    from femgear.plots import save_figure
+    from femgear.solvers.campbell import campbell_data
+
+    if not (np.isfinite(highest) and highest > 0.0) or speeds < 5 or modes < 1 or harmonics < 0:
+        raise CaseError(
+            f"{speeds} speeds up to {highest} rpm, {modes} modes, {harmonics} harmonics", code="E-RANGE",
+            limit="5 speeds or more, above 0 rpm, one mode or more",
+        )  # fmt: skip
+    data = wind_turbine_a() if train == "A" else wind_turbine_b()
+    orders = [1.0, *(RING_TEETH[train] * h for h in range(1, harmonics + 1))]
+    found = campbell_data(
+        lambda speed: planar_system(data, carrier_speed=speed),
+        np.linspace(0.0, highest * RPM, speeds),
+        data.mesh_stiffness,
+        orders=orders,
+        count=modes,
+    )
+    folder = ready_folder(output)
+    header = ("carrier speed [rpm]", "mode", "frequency [Hz]")
+    records = (
+        (float(speed / RPM), number + 1, float(value))
+        for speed, row in zip(found.speed, found.frequency)
+        for number, value in enumerate(row)
+    )
+    write_csv(folder / "campbell.csv", header, records)
+    save_figure(_figure(found, train), folder / "campbell.png")
+    rows = [
+        (f"{c.order:g}", str(c.branch + 1), f"{c.speed / RPM:.2f}", f"{c.frequency:.2f}")
+        for c in found.critical
+    ]
+    print_table(f"Critical speeds of set {train}", ("order", "mode", "carrier [rpm]", "frequency [Hz]"), rows)
+    say_files(folder, ["campbell.csv", "campbell.png"])
+
+
+def _figure(found, train):
+    from femgear.plots.style import GREY, label, legend_below, line_style, new_figure
+
+    figure, (ax,) = new_figure(width=8.5, height=5.0)
+    speed = found.speed / RPM
+    for number, values in enumerate(found.frequency.T):
+        ax.plot(speed, values, label=f"mode {number + 1}", **line_style(number))
+    top = 1.1 * found.frequency.max()
+    for order in found.orders:
+        ax.plot(speed, order * found.speed / (2.0 * np.pi), color=GREY, linewidth=0.8, label="excitation")
+    for one in found.critical:
+        ax.plot(one.speed / RPM, one.frequency, "ko", markersize=4)
+    ax.set_ylim(0.0, top)
+    label(ax, "carrier speed [rpm]", "frequency [Hz]", f"wind turbine set {train}")
+    legend_below(figure, columns=4)
+    return figure
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(main))
