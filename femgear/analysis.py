@@ -15,6 +15,7 @@ import numpy as np
 
 from femgear.analysis_checks import (
     check_dynamic_case,
+    check_motions,
     highest_frequency,
     max_nodal_diameter,
     static_warnings,
@@ -156,13 +157,15 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
         sun_torque=sun_torque,
         positions=case.static.positions,
         contact=case.static.contact,
-        deviations=None if deviations.ideal else deviations,
+        # thickness errors separate the back flanks alone
+        deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
         supports=_supports(case),
         periods=periods,
         both_flanks=case.static.back_flanks,
         pressures=case.static.stresses and periods == 1,
         progress=None if progress is None else lambda done, total: progress("contact", done, total),
     )
+    check_motions(cycle, gears.sun.module)
     return StaticResult(gears, sectors, bodies, cycle, sun_torque, period_message)
 
 

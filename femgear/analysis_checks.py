@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case import Case, set_deviations
-from femgear.errors import CaseError
+from femgear.errors import CaseError, ContactError
 
 if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
@@ -79,17 +80,45 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             limit="not zero for modes, dynamics and housing",
             remedy="give a torque, or run with --only static",
         )
-    periods, _ = common_period(set_deviations(case), gears, limit=case.static.longest_record)
+    # whatever the longest record: one period cut out of many is no period
+    periods, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
     if periods > 1:
         raise CaseError(
             f"the errors of this set span {periods} mesh periods; modes, dynamics and housing take one",
             code="E-PERIODS",
-            key="static.longest_record",
-            value=case.static.longest_record,
+            key="operation.speeds",
             limit="errors that repeat with every tooth",
             remedy="run with --only static, or leave pitch errors and runouts out",
         )
     highest_frequency(case, gears)
+
+
+def check_motions(cycle: MeshCycle, module: float) -> None:
+    """Refuse a static result in which the gears have moved too far for small displacements.
+
+    Raises
+    ------
+    ContactError
+        E-MOTION: flanks that approach by more than half a module, members that move by more than two.
+    """
+    for name, motion, modules, remedy in (
+        ("the flanks approach", cycle.deflection, 0.5, "reduce operation.torque or the errors"),
+        (
+            "a member moves",
+            cycle.member_motion,
+            2.0,
+            "stiffen the supports and bearings, reduce the clearance or operation.torque",
+        ),
+    ):
+        largest = float(np.abs(motion).max(initial=0.0))
+        if largest > modules * module:
+            raise ContactError(
+                f"{name} by {largest * 1e3:.4g} mm: the model is one of small displacements",
+                code="E-MOTION",
+                value=f"{largest * 1e3:.4g} mm",
+                limit=f"{modules:g} modules, {modules * module * 1e3:.4g} mm",
+                remedy=remedy,
+            )
 
 
 def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
@@ -104,6 +133,11 @@ def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
         found.append(
             f"[W-DEFLECTION] the teeth deflect by {np.abs(cycle.deflection).max() * 1e6:.0f} um, more than "
             "5 % of the module: small displacements no longer hold"
+        )
+    if (moved := np.abs(cycle.member_motion).max(initial=0.0)) > 0.05 * module:
+        found.append(
+            f"[W-MOTION] a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points "
+            "and arms are those of the unmoved set"
         )
     edges = (cycle.force > 0) & (cycle.max_pressure <= 0)
     if edges.any():

@@ -146,6 +146,9 @@ def test_what_the_dynamics_cannot_represent_is_refused_before_computing(case):
         changed = with_value(case, key, value)
         with pytest.raises(CaseError, match=code):
             check_dynamic_case(changed, planetary_set(changed))
+    cut = with_value(with_value(case, "sun.errors", {"runout_amplitude": "5 um"}), "static.longest_record", 1)
+    with pytest.raises(CaseError, match="E-PERIODS"):
+        check_dynamic_case(cut, planetary_set(cut))
     check_dynamic_case(case, planetary_set(case))
 
 
@@ -160,6 +163,28 @@ def test_overload_is_said(case):
     )
     words = " ".join(overload.warnings)
     assert "W-PRESSURE" in words and "W-DEFLECTION" in words
+
+
+def test_motions_beyond_small_displacements_are_refused(case):
+    from femgear.errors import ContactError
+
+    coarse = with_value(case, "static.positions", 16)
+    with pytest.raises(ContactError, match="E-MOTION"):
+        solve_static(with_value(coarse, "operation.torque", "1e6 N m"))
+    soft = with_value(coarse, "static.members", "elastic")
+    with pytest.raises(ContactError, match="E-MOTION"):
+        solve_static(with_value(soft, "planet.bearing_stiffness", "1 N/m"))
+    loose = solve_static(with_value(soft, "planet.bearing_clearance", "0.5 mm"))
+    assert "W-MOTION" in " ".join(loose.warnings)
+
+
+def test_thick_teeth_wedge_without_any_other_error(case):
+    """Teeth thicker than the play allow load both flanks: errors of thickness alone reach the contact."""
+    coarse = with_value(with_value(case, "static.positions", 16), "static.back_flanks", True)
+    thick = with_value(coarse, "sun.errors", {"thickness_reduction": "-300 um"})
+    found = solve_static(thick)
+    assert found.cycle.wedged[:3].all()
+    assert found.cycle.force[:3].min() > 2 * solve_static(coarse).cycle.force.max()
 
 
 def test_with_elastic_members_standstill_is_the_static_state_even_with_pin_errors(case):

@@ -32,6 +32,8 @@ ROUGH_STIFFNESS = 10e9
 """Stiffness of a mesh per face width, to size windows [N/m^2]."""
 HELD = 2.56
 """A window is 3.2 half widths wide: it holds the contact of this many times the force that sized it."""
+LARGEST_RESIDUAL = 1e-9
+"""Of contact conditions and equilibrium; rounding leaves 1e-14."""
 
 
 def walk_mesh_cycle(
@@ -243,6 +245,14 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     out["force"][:, p] = force[: 2 * N]
     out["back_force"][: meshes - 2 * N, p] = force[2 * N :]
     out["sun_arc"][p] = state.motions[N]
+    if not state.residual <= LARGEST_RESIDUAL:
+        raise ContactError(
+            f"the contact solution at position {p} violates its conditions by {state.residual:.2g}",
+            code="E-CONTACT-RESIDUAL",
+            value=state.residual,
+            limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
+            remedy="look for stiffnesses, clearances or separations of very different size",
+        )
     out["residual"][p], out["iterations"][p] = state.residual, state.iterations
     # sprung members yield under the mesh forces, free ones are unknowns of the problem
     motion = np.zeros(len(members.names))

@@ -11,9 +11,11 @@ from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bearings import bearing_springs, solve_position
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.mirrored import mirrored_set, walk_either_flank
 from femgear.contact.supports import Supports, moving_members
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
+from femgear.gears.mirrored_deviations import mirrored_deviations
 from femgear.validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
@@ -63,7 +65,10 @@ def test_every_solution_is_in_equilibrium(gears, bodies, values, held):
 @few
 @given(pins, supports)
 def test_passing_the_errors_on_to_the_next_planet_passes_the_loads_on(gears, bodies, values, held):
-    """Three equal planets in phase: a rotation of the set by 120 deg."""
+    """Three equal planets in phase: a rotation of the set by 120 deg, and a permutation of the planets.
+
+    Other permutations change which planets are neighbours through the elastic sun and ring.
+    """
     one = walk(gears, bodies, values, held)
     two = walk(gears, bodies, values[1:] + values[:1], held)
     assert two.force[:3] == pytest.approx(one.force[[1, 2, 0]], rel=1e-6, abs=1e-6 * one.force.max())
@@ -181,3 +186,23 @@ def test_changes_superpose_while_the_same_cells_touch(gears, bodies, values, hel
     assert np.abs((turned - start) + (moved - start) - (both - start)).max() < rounding
     assert np.abs(twice - start - 2 * (both - start)).max() < rounding
     assert np.abs(both - start).max() > 100 * rounding
+
+
+@few
+@given(pins, supports)
+def test_the_mirror_image_under_the_reversed_torque_is_the_mirrored_result(gears, bodies, values, held):
+    mirrored, order = mirrored_set(gears)
+    errors = errors_of(gears, values)
+    one = walk(gears, bodies, values, held)
+    two = walk_either_flank(
+        mirrored,
+        bodies,
+        sun_torque=-TORQUE,
+        positions=2,
+        deviations=mirrored_deviations(errors, gears, mirrored, order),
+        supports=held,
+    )
+    places = np.concatenate([order, np.asarray(order) + 3])
+    expected = one.force[places]
+    assert two.force == pytest.approx(expected, rel=1e-9, abs=1e-9 * one.force.max())
+    assert two.stiffness == pytest.approx(one.stiffness[places], rel=1e-9)
