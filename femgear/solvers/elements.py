@@ -251,10 +251,14 @@ class PolynomialSprings:
     def __post_init__(self):
         columns = _columns(self.columns, 1)
         table = np.atleast_2d(np.array(self.coefficients, float))
-        if len(table) != len(columns) or not np.all(np.isfinite(table)):
+        if not np.all(np.isfinite(table)):
+            raise CaseError(
+                f"coefficients {table.tolist()}", code="E-FINITE", key="coefficients", limit="finite numbers"
+            )
+        if len(table) != len(columns):
             raise CaseError(
                 f"{len(table)} rows of coefficients for {len(columns)} springs", code="E-SHAPE",
-                limit="one row of finite numbers a spring",
+                limit="one row a spring",
             )  # fmt: skip
         object.__setattr__(self, "columns", columns)
         object.__setattr__(self, "coefficients", table)
@@ -297,6 +301,12 @@ class PiecewiseSprings:
     def __post_init__(self):
         columns = _columns(self.columns, 1)
         breaks, slopes = np.atleast_1d(np.array(self.breaks, float)), np.array(self.slopes, float)
+        if not (np.all(np.isfinite(breaks)) and np.all(np.isfinite(slopes))):
+            raise CaseError(
+                f"breaks {breaks.tolist()} with slopes {slopes.tolist()}",
+                code="E-FINITE",
+                limit="finite numbers",
+            )
         if len(slopes) != len(breaks) + 1 or np.any(np.diff(breaks) <= 0.0):
             raise CaseError(
                 f"{len(slopes)} slopes with breaks {breaks.tolist()}", code="E-SHAPE",

@@ -56,6 +56,7 @@ class NonlinearSystem:
     speed: float = 0.0
 
     def __post_init__(self):
+        _check_system(self.system)
         n, columns = self.system.W.shape
         for element in self.elements:
             if element.columns.max(initial=-1) >= columns:
@@ -92,6 +93,32 @@ class NonlinearSystem:
         for element in self.elements:
             orders += [s.orders for s in vars(element).values() if hasattr(s, "orders")]
         return max([len(o) for o in orders if any(o)], default=1)
+
+
+def _check_system(system: MechanicalSystem) -> None:
+    """Refuse matrices of wrong shapes, numbers that are not finite, wrong symmetries, W without columns."""
+    n = len(system.M)
+    shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "load": (n,), "gyroscopic": (n, n)}
+    for name, shape in shapes.items():
+        array = getattr(system, name)
+        if array is None and name == "gyroscopic":
+            continue
+        if array.shape != shape:
+            raise CaseError(f"{name} has shape {array.shape}", code="E-SHAPE", limit=f"{shape}, as M")
+        if not np.all(np.isfinite(array)):
+            raise CaseError(f"{name} holds numbers that are not finite", code="E-FINITE")
+        size = np.abs(array).max(initial=0.0)
+        sign = {"M": 1.0, "K": 1.0, "gyroscopic": -1.0}.get(name, 0.0)
+        if sign and np.abs(array - sign * array.T).max(initial=0.0) > 1e-9 * size:
+            kind = "symmetric" if sign > 0 else "skew-symmetric"
+            raise CaseError(f"{name} is not {kind}", code="E-SYMMETRY", limit=f"{kind} to 1e-9")
+    if system.W.ndim != 2 or len(system.W) != n or not system.W.shape[1]:
+        raise CaseError(
+            f"W has shape {system.W.shape}", code="E-SHAPE", limit=f"({n}, 1 or more deflections)",
+            remedy="give one column for every deflection of an element",
+        )  # fmt: skip
+    if not np.all(np.isfinite(system.W)):
+        raise CaseError("W holds numbers that are not finite", code="E-FINITE")
 
 
 def element_forces(problem: NonlinearSystem, x, theta) -> tuple[np.ndarray, np.ndarray]:

@@ -15,6 +15,7 @@ from femgear.solvers.nonlinear import (
 )
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.series import FourierSeries
+from femgear.system import MechanicalSystem
 
 
 def problem_of(system, **changes):
@@ -108,3 +109,23 @@ def test_periodic_solution_in_time():
     np.testing.assert_allclose(solution.at(t)[:, 0], wanted, atol=1e-14)
     with pytest.raises(ValueError, match="read-only"):
         solution.deflection[0, 0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "code"),
+    [
+        ("K", [[1.0, np.nan], [np.nan, 1.0]], "E-FINITE"),
+        ("K", [[1.0, 0.5], [0.0, 1.0]], "E-SYMMETRY"),
+        ("M", [[1.0]], "E-SHAPE"),
+        ("C", [[0.1]], "E-SHAPE"),
+        ("load", [0.0, np.inf], "E-FINITE"),
+        ("load", [0.0], "E-SHAPE"),
+        ("W", np.zeros((2, 0)), "E-SHAPE"),
+        ("W", [[1.0], [np.nan]], "E-FINITE"),
+        ("gyroscopic", np.eye(2), "E-SYMMETRY"),
+    ],
+)
+def test_systems_that_cannot_be_are_refused(name, value, code):
+    parts = {"M": np.eye(2), "C": np.zeros((2, 2)), "K": np.eye(2), "W": np.ones((2, 1)), "load": np.zeros(2)}
+    with pytest.raises(CaseError, match=code):
+        NonlinearSystem(MechanicalSystem(**parts | {name: np.array(value)}, dofs=("a", "b")), ())
