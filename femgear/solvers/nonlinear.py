@@ -108,7 +108,8 @@ def _check_system(system: MechanicalSystem) -> None:
         if not np.all(np.isfinite(array)):
             raise CaseError(f"{name} holds numbers that are not finite", code="E-FINITE")
         size = np.abs(array).max(initial=0.0)
-        sign = {"M": 1.0, "K": 1.0, "gyroscopic": -1.0}.get(name, 0.0)
+        # circulatory forces make K unsymmetric, which time integration and shooting take
+        sign = {"M": 1.0, "gyroscopic": -1.0}.get(name, 0.0)
         if sign and np.abs(array - sign * array.T).max(initial=0.0) > 1e-9 * size:
             kind = "symmetric" if sign > 0 else "skew-symmetric"
             raise CaseError(f"{name} is not {kind}", code="E-SYMMETRY", limit=f"{kind} to 1e-9")

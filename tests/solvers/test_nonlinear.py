@@ -115,7 +115,7 @@ def test_periodic_solution_in_time():
     ("name", "value", "code"),
     [
         ("K", [[1.0, np.nan], [np.nan, 1.0]], "E-FINITE"),
-        ("K", [[1.0, 0.5], [0.0, 1.0]], "E-SYMMETRY"),
+        ("M", [[1.0, 0.5], [0.0, 1.0]], "E-SYMMETRY"),
         ("M", [[1.0]], "E-SHAPE"),
         ("C", [[0.1]], "E-SHAPE"),
         ("load", [0.0, np.inf], "E-FINITE"),
