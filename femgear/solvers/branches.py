@@ -16,7 +16,7 @@ from femgear.solvers.bifurcation import Segment
 from femgear.solvers.continuation import Curve, StepOptions, continue_curve, scaled_curve, switch_branch
 from femgear.solvers.corrector import correct
 from femgear.solvers.harmonic_balance import harmonic_balance
-from femgear.solvers.hill import FloquetVerdict
+from femgear.solvers.hill import FloquetVerdict, require_period
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.routes import FamilyRoute, FrequencyRoute, Route
@@ -25,6 +25,9 @@ from femgear.solvers.routes import FamilyRoute, FrequencyRoute, Route
 @dataclass(frozen=True)
 class Branch:
     """Periodic solutions along a curve.
+
+    ``spectral_radius`` is nan all along unless the curve was asked for with ``radius=True``, and
+    ``verdicts`` is empty without stability.
 
     Parameters
     ----------
@@ -104,7 +107,7 @@ class Branch:
 
     @property
     def spectral_radius(self) -> np.ndarray:
-        """Spectral radius of the fixed point, (p,); nan where it was not asked for."""
+        """Spectral radius of the fixed point, (p,); nan unless ``radius=True`` was given."""
         return np.array([solution.spectral_radius for solution in self.solutions])
 
     @property
@@ -147,7 +150,8 @@ def frequency_response_curve(
     ----------
     problem : NonlinearSystem
     frequency : (first, last)
-        [rad/s]; the curve starts at the first one towards the last one, which may be lower.
+        [rad/s]; the curve starts at the first one towards the last one, which may be lower. With stability
+        both are above zero.
     harmonics, orders, samples, reduction
         As for ``harmonic_balance``.
     base : int
@@ -163,7 +167,7 @@ def frequency_response_curve(
     tolerance : float
         Relative error of the monodromy matrices.
     radius : bool
-        Spectral radius of the fixed point at every point.
+        Spectral radius of the fixed point at every point, which is nan otherwise.
     scale : float, optional
         Deflection [m] that counts as much as the whole range of frequencies; by default the larger of the
         static deflection and the start.
@@ -172,7 +176,7 @@ def frequency_response_curve(
     Raises
     ------
     CaseError
-        A range, start or base that cannot be used.
+        A range, start or base that cannot be used; stability at the frequency zero (E-FREQUENCY).
     ConvergenceError
         No solution at the start.
     """
@@ -192,6 +196,8 @@ def frequency_response_curve(
             code="E-RANGE",
             limit="two different ones, not negative",
         )
+    if stability and bases == 1:
+        require_period(min(frequency))
     route = FrequencyRoute(balance, tuple(np.asarray(others, float).tolist()), base, radius)
     return _follow(route, frequency, start, start_at, stability, tolerance, scale, options)
 
@@ -229,6 +235,8 @@ def parameter_curve(
         raise CaseError(
             f"a range of parameters {tuple(parameter)}", code="E-RANGE", limit="two different ones"
         )
+    if stability:
+        require_period(frequency)
     begin = parameter[0] if start_at is None else start_at
     balance = harmonic_balance(family(begin), harmonics=harmonics, orders=orders, samples=samples)
     omega = tuple(np.atleast_1d(np.asarray(frequency, float)).tolist())

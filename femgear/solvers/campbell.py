@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from femgear.errors import CaseError
 from femgear.solvers.complex_modes import complex_modes, whirl
 from femgear.solvers.mode_tracking import TrackedModes, oscillating, track_modes
 from femgear.system import MechanicalSystem
@@ -98,11 +99,23 @@ def campbell_data(
     count : int, optional
         Lowest modes to follow.
 
+    Raises
+    ------
+    CaseError
+        Fewer than two speeds, or speeds that do not ascend or descend (E-VALUES).
+
     Notes
     -----
     Critical speeds are roots of the monotone cubic interpolation (`scipy.interpolate.PchipInterpolator`) of
     each branch less the line: their error falls with the third power of the speed step.
     """
+    speeds = np.asarray(speeds, float)
+    if speeds.ndim != 1 or len(speeds) < 2 or not np.all(np.isfinite(speeds)):
+        raise CaseError(
+            f"a Campbell diagram over speeds of shape {speeds.shape}", code="E-VALUES", key="speeds",
+            limit="two or more finite speeds [rad/s], ascending or descending",
+            remedy="list the speeds at which the modes are wanted",
+        )  # fmt: skip
     mass = np.asarray(system_at(float(speeds[0])).M)
     tracked = track_modes(
         lambda speed: oscillating(complex_modes(system_at(speed), mesh_stiffness, speed=speed)),

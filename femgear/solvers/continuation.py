@@ -124,15 +124,28 @@ def scaled_curve(
 ) -> ScaledCurve:
     """The equations with their scales, checked; arguments as for :func:`continue_curve`."""
     options = options or StepOptions()
-    low, high = limits
+    low, high = _checked_limits(limits)
     unit = high - low if unit is None else unit
     scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
-    if not (np.isfinite([low, high]).all() and low < high):
-        raise CaseError(f"a range from {low} to {high}", code="E-RANGE", limit="low < high, both finite")
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
         raise CaseError("the scales of a curve must be positive", code="E-SCALE", limit="> 0")
     curve = ScaledCurve(evaluate, scale, float(unit), options.tolerance, options.max_iterations)
     return _with_rows(curve, curve.scaled(start, parameter))
+
+
+def _checked_limits(limits) -> tuple[float, float]:
+    """Low and high end of the range of the parameter."""
+    try:
+        low, high = (float(value) for value in limits)
+        valid = bool(np.isfinite([low, high]).all() and low < high)
+    except (TypeError, ValueError):
+        valid = False
+    if not valid:
+        raise CaseError(
+            f"a range of {limits}", code="E-RANGE", key="limits", limit="low < high, both finite",
+            remedy="give limits=(low, high) of the parameter",
+        )  # fmt: skip
+    return low, high
 
 
 def _with_rows(curve: ScaledCurve, z: np.ndarray) -> ScaledCurve:

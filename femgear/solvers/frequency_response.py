@@ -259,10 +259,16 @@ def _checked(frequency, inputs, outputs, n: int):
             f"inputs of shape {inputs.shape} and outputs of shape {outputs.shape}", code="E-SHAPE",
             limit=f"({n}, inputs) and (outputs, {n})",
         )  # fmt: skip
-    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)) or np.any(frequency < 0.0):
+    if (
+        frequency.ndim != 1
+        or not len(frequency)
+        or not np.all(np.isfinite(frequency))
+        or np.any(frequency < 0.0)
+    ):
         raise CaseError(
-            "frequencies of a response must be finite and not negative", code="E-FREQUENCY",
-            limit="a list of numbers >= 0 Hz",
+            f"frequencies of shape {frequency.shape} must be finite and not negative", code="E-FREQUENCY",
+            key="frequency", limit="a list of one or more numbers >= 0 Hz",
+            remedy="list the frequencies of the response",
         )  # fmt: skip
     return 2.0 * np.pi * frequency, inputs, outputs
 

@@ -21,6 +21,10 @@ _REAL = 1e-7
 # States treated together, and instants of a piece at which tangents are compared.
 _BATCH = 32
 _INSIDE = 7
+# Steps of the first sequence over one period beyond which a verdict is not sought, and the most entries of
+# stiffness matrices at these steps that are held at once.
+_MOST_STEPS = 20_000
+_MOST_ENTRIES = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,8 @@ class FloquetVerdict:
     exponents : (m,) complex array
         ``log(multiplier) / period`` [1/s].
     stable : bool or None
-        None where the method does not cover the solution or its error leaves the question open.
+        None where the method does not cover the solution, its period is too long for the fastest mode, or
+        the error leaves the question open.
     loss : str
         ``""`` when stable; how the largest multiplier leaves the unit circle: ``"fold"`` (through +1: limit
         point, pitchfork, transcritical), ``"flip"`` (through -1) or ``"Neimark-Sacker"`` (complex pair).
@@ -84,7 +89,8 @@ def floquet_verdicts(
     ----------
     problem : NonlinearSystem
     solutions : sequence of PeriodicSolution
-        All with the same lines. With two base frequencies the verdict is "not covered".
+        All with the same lines. With two base frequencies or the frequency zero the verdict is "not
+        covered"; "not determined" where the fastest mode would need more than 20000 steps in a period.
     method : str
         ``"monodromy"``: exact exponentials where the tangents are constant in pieces, otherwise a splitting,
         with steps that end where contacts open or close. ``"hill"``: eigenvalues of the harmonic operator.
@@ -112,7 +118,7 @@ def floquet_verdicts(
             f"stability by {method!r}", code="E-METHOD", key="method", limit='"monodromy" or "hill"'
         )
     frame = frame_of(problem, modes=modes)
-    out = [_not_covered(solution) for solution in solutions]
+    out = [_not_covered(solution) or _too_long(frame, solution) for solution in solutions]
     covered = [i for i, verdict in enumerate(out) if verdict is None]
     for first in range(0, len(covered), _BATCH):
         part = covered[first : first + _BATCH]
@@ -131,8 +137,48 @@ def _not_covered(solution: PeriodicSolution) -> FloquetVerdict | None:
         reason = "not covered: a solution with several base frequencies is not periodic"
     elif not solution.converged:
         reason = "not covered: the solution did not converge"
+    elif solution.frequency[0] == 0.0:
+        reason = "not covered: the frequency zero has no period"
     else:
         return None
+    return _open(reason)
+
+
+def _too_long(frame: Frame, solution: PeriodicSolution) -> FloquetVerdict | None:
+    with np.errstate(over="ignore"):
+        steps = float(frame.steps(2.0 * np.pi / np.abs(solution.frequency[0])))
+    if steps <= _MOST_STEPS:
+        return None
+    return _open(
+        f"not determined: {steps:.3g} steps in a period at {solution.frequency[0]:.3g} rad/s, "
+        f"at most {_MOST_STEPS}: raise the frequency or keep fewer modes"
+    )
+
+
+def require_period(frequency) -> None:
+    """Refuse the single base frequency zero, which has no period to judge stability over.
+
+    Parameters
+    ----------
+    frequency : float or (n_bases,) array
+        [rad/s]; several ones are let through, their verdict is "not covered".
+
+    Raises
+    ------
+    CaseError
+        The only base frequency is zero (E-FREQUENCY).
+    """
+    frequency = np.atleast_1d(np.asarray(frequency, float))
+    if frequency.size == 1 and frequency.ravel()[0] == 0.0:
+        raise CaseError(
+            "stability needs a period, and the base frequency is zero", code="E-FREQUENCY", key="frequency",
+            value=0.0, limit="> 0 rad/s",
+            remedy="give a positive frequency, or solve without stability: solve_harmonic_balance, "
+            "stability=False of a curve",
+        )  # fmt: skip
+
+
+def _open(reason: str) -> FloquetVerdict:
     return FloquetVerdict(np.zeros(0, complex), np.zeros(0, complex), None, "", "", reason, np.nan)
 
 
@@ -159,15 +205,27 @@ def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[Fl
         None if pieces is None else _exact_verdict(frame, T, inner, pieces)
         for T, inner, pieces in zip(period, breaks, exact)
     ]
-    rest = np.array([i for i, pieces in enumerate(exact) if pieces is None], int)
-    if len(rest):
+    open_states = np.array([i for i, pieces in enumerate(exact) if pieces is None], int)
+    for rest in _portions(frame, period, open_states):
         moved = passage(
-            frame, period[rest], lambda f, states: tangents(f, rest[states]), [breaks[i] for i in rest],
-            tolerance=tolerance,
+            frame, period[rest], lambda f, states, rest=rest: tangents(f, rest[states]),
+            [breaks[i] for i in rest], tolerance=tolerance,
         )  # fmt: skip
         values = np.linalg.eigvals(moved.matrix)
         for i, multipliers, error in zip(rest, values, moved.error):
             out[i] = verdict_of(multipliers, period[i], "splitting", float(error), tolerance)
+    return out
+
+
+def _portions(frame: Frame, period, states: np.ndarray) -> list[np.ndarray]:
+    """The states in portions whose stiffness matrices are held at once; long periods stand together."""
+    states = states[np.argsort(period[states], kind="stable")]
+    out, first = [], 0
+    entries = 2 * max(len(frame.rows), 1) ** 2 * frame.steps(period[states])
+    for last in range(1, len(states) + 1):
+        if last == len(states) or entries[last] * (last + 1 - first) > _MOST_ENTRIES:
+            out.append(states[first:last])
+            first = last
     return out
 
 

@@ -11,6 +11,8 @@ from femgear.system import MechanicalSystem, Modes, Response
 _MULTIPLE = 1e-6
 # Strain of a mesh, or work of the load, on a rigid mode relative to the sum of the absolute terms.
 _RIGID_TOLERANCE = 1e-6
+# Entries of a rigid mode this small relative to its largest one are rounding.
+_RIGID_ROUNDING = 1e-9
 
 
 def solve_modes(
@@ -240,24 +242,36 @@ def _held(mass, stiffness, rigid):
 
 def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
     """Refuse rigid modes that strain a mesh or on which the load does work."""
-    strain, size = np.abs(system.W.T @ rigid), np.abs(system.W).T @ np.abs(rigid)
-    if np.any(strain > _RIGID_TOLERANCE * size):
-        mesh = int(np.argmax((strain - _RIGID_TOLERANCE * size).max(axis=1)))
+    strain, allowed = np.abs(system.W.T @ rigid), _allowed(system.W, rigid)
+    if np.any(strain > allowed):
+        mesh = int(np.argmax((strain - allowed).max(axis=1)))
         raise ConvergenceError(
             f"a motion without stiffness strains mesh {mesh + 1}: its mean stiffness is missing or too small",
             code="E-RIGID-MODE", remedy="give every mesh a mean stiffness",
         )  # fmt: skip
-    work, size = np.abs(rigid.T @ system.load), np.abs(rigid).T @ np.abs(system.load)
-    if np.any(work > _RIGID_TOLERANCE * size):
-        mode = int(np.argmax(work - _RIGID_TOLERANCE * size))
+    work, allowed = np.abs(system.load @ rigid), _allowed(system.load[:, None], rigid)[0]
+    if np.any(work > allowed):
+        mode = int(np.argmax(work - allowed))
+        size = np.abs(system.load) @ np.abs(rigid[:, mode])
         dof = int(np.argmax(np.abs(rigid[:, mode])))
         name = system.dofs[dof] if system.dofs else str(dof)
         raise CaseError(
             f"the constant load does work on a rigid-body motion (largest at {name}): "
-            f"{work[mode]:.3e} of {size[mode]:.3e}",
+            f"{work[mode]:.3e} of {size:.3e}",
             code="E-LOAD-BALANCE", limit="a load in equilibrium with itself",
             remedy="add the reaction torque of the output, or hold that motion by a support",
         )  # fmt: skip
+
+
+def _allowed(columns: np.ndarray, rigid: np.ndarray) -> np.ndarray:
+    """Products (n_columns, n_rigid) of columns and rigid modes that count as zero.
+
+    A share of the absolute terms; where the mode does not move the column these terms are rounding
+    themselves, so that entries of the mode below the rounding of its largest one count as zero.
+    """
+    terms = _RIGID_TOLERANCE * np.abs(columns).T @ np.abs(rigid)
+    largest = np.abs(columns).max(axis=0, initial=0.0)[:, None] * np.abs(rigid).max(axis=0, initial=0.0)
+    return np.maximum(terms, _RIGID_ROUNDING * largest)
 
 
 def rigid_basis(system: MechanicalSystem, modes: Modes):

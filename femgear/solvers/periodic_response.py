@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.hill import FloquetVerdict, floquet_verdict
+from femgear.solvers.hill import FloquetVerdict, floquet_verdict, require_period
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
 
@@ -18,7 +18,8 @@ class PeriodicResponse:
     ----------
     solution : PeriodicSolution
     verdict : FloquetVerdict
-        Its ``stable`` is None where the solution did not converge or has several base frequencies.
+        Its ``stable`` is None where the solution did not converge, has several base frequencies or too long
+        a period for its fastest mode.
     """
 
     solution: PeriodicSolution
@@ -54,7 +55,7 @@ def periodic_response(
     ----------
     problem : NonlinearSystem
     frequency : float or (n_bases,) array
-        Base frequencies [rad/s].
+        Base frequencies [rad/s]; a single one must be positive.
     method, stability_tolerance
         Method and tolerance of `floquet_verdicts`.
     options
@@ -63,10 +64,11 @@ def periodic_response(
     Raises
     ------
     CaseError
-        Input that cannot be used.
+        Input that cannot be used, a single base frequency of zero (E-FREQUENCY).
     ConvergenceError
         An undamped resonance of the system with reference springs at a line.
     """
+    require_period(frequency)
     solution = solve_harmonic_balance(problem, frequency, **options)
     verdict = floquet_verdict(problem, solution, method=method, tolerance=stability_tolerance)
     return PeriodicResponse(solution, verdict)

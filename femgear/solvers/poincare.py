@@ -12,6 +12,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.adaptive import flow, trajectory
+from femgear.solvers.initial_state import checked_start, motion_scale
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.strobe import strobe
 
@@ -110,7 +111,7 @@ def stroboscopic_section(
             limit="one point or more, no negative skip, a phase between 0 and 1",
         )  # fmt: skip
     period = strobe(problem, frequency, steps=steps, periods=periods, method=method)
-    state, g = period.enter(np.zeros((2, len(problem.system.M))) if start is None else start)
+    state, g = period.enter(start)
     place = np.array([round(phase * steps)])
     rows = []
     for count in range(skip + points):
@@ -164,9 +165,10 @@ def surface_section(
         )  # fmt: skip
     moving = flow(problem, frequency)
     row = np.concatenate([row[:n], row[n:] * moving.rate])
-    y = moving.state(*(np.zeros((2, n)) if start is None else start))
+    start = checked_start(problem, start)
+    options = {"tolerance": tolerance, "events": events, "scale": motion_scale(moving, start)}
     times, states = [], []
-    for t0, t1, dense in trajectory(moving, y, 0.0, end, tolerance=tolerance, events=events):
+    for t0, t1, dense in trajectory(moving, moving.state(*start), 0.0, end, **options):
         if t1 >= begin:
             found = _crossings(dense, row, value, direction, t0, t1)
             times += found
@@ -200,8 +202,18 @@ def bifurcation_diagram(
         For ``repeats``, see `PoincareSection.repeats_after`.
     points, skip, start, steps, periods, method
         As for `stroboscopic_section`.
+
+    Raises
+    ------
+    CaseError
+        No values or some that are not finite (E-VALUES), a start that does not fit (E-START).
     """
     parameters = np.atleast_1d(np.asarray(parameters, float))
+    if parameters.ndim != 1 or not len(parameters) or not np.all(np.isfinite(parameters)):
+        raise CaseError(
+            f"a bifurcation diagram over parameters of shape {parameters.shape}", code="E-VALUES",
+            key="parameters", limit="one or more finite numbers", remedy="list the values to sweep over",
+        )  # fmt: skip
     rows = []
     for value in parameters:
         problem, frequency = build(value)

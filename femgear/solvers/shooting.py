@@ -16,6 +16,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.solvers.adaptive import Flow, flow, trajectory
 from femgear.solvers.harmonics import harmonics_of
+from femgear.solvers.initial_state import checked_start, motion_scale
 from femgear.solvers.nonlinear import NonlinearSystem, element_forces
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.strobe import common_period
@@ -23,6 +24,8 @@ from femgear.solvers.transient import sampled, solve_transient
 
 # Directions that the map changes by less than this share of the strongest one are left as they are.
 _SINGULAR = 1e-11
+# So are those that it changes by less than this many tolerances of the integrator: rounding, not stiffness.
+_ROUNDING = 100.0
 # Steps of the integrator in one segment, more of which a motion of interest does not need.
 _MOST_STEPS = 50_000
 # Multipliers outside the unit circle by less than this are on it.
@@ -61,8 +64,10 @@ class ShootingSolution:
     motion: np.ndarray
 
     @property
-    def stable(self) -> bool:
-        """No multiplier lies outside the unit circle by more than 1e-6."""
+    def stable(self) -> bool | None:
+        """No multiplier lies outside the unit circle by more than 1e-6; None for a motion not converged."""
+        if not self.solution.converged:
+            return None
         return bool(np.abs(self.multipliers).max() <= 1.0 + _CIRCLE)
 
 
@@ -111,12 +116,14 @@ def solve_shooting(
     -------
     ShootingSolution
         ``solution.converged`` is false, and its message says so, where the iterations end without success.
-        Rigid motions stay where the first guess has them.
+        Rigid motions stay where the first guess has them. No solution exists where ``monodromy - 1`` is
+        singular to the accuracy of the integrator and does not reach the defect: an undamped linear resonance
+        or a free system out of balance (Seydel, section 7.2); the iterations end there.
 
     Raises
     ------
     CaseError
-        Frequencies without the common period, numbers out of range.
+        Frequencies without the common period, numbers out of range, a start that does not fit (E-START).
     """
     frequency = np.atleast_1d(np.asarray(frequency, float))
     period = common_period(frequency, periods)
@@ -125,12 +132,11 @@ def solve_shooting(
             f"{segments} segments, {harmonics} harmonics, {samples} samples", code="E-SHOOTING",
             limit="a segment and a harmonic or more, four samples a harmonic or more",
         )  # fmt: skip
-    if start is None:
-        start = _settled(problem, frequency, period, settle)
+    start = checked_start(problem, _settled(problem, frequency, period, settle) if start is None else start)
     moving = flow(problem, frequency, variational=True)
     unknowns = _guess(moving, start, period, segments, integration, events)
-    options = {"tolerance": integration, "events": events, "max_steps": _MOST_STEPS}
-    history, factorisations = [], 0
+    options = _options(moving, start, integration, events)
+    history, factorisations, stuck = [], 0, False
     for _ in range(max_iterations + 1):
         ends, maps = _shoot(moving, unknowns, period, options)
         defect = ends - np.roll(unknowns, -1, axis=0)
@@ -138,11 +144,17 @@ def solve_shooting(
         history.append(float(np.abs(defect).max() / size))
         if history[-1] <= tolerance or len(history) > max_iterations:
             break
-        update, factorisations = _update(maps, defect), factorisations + 1
+        update, out_of_reach = _update(maps, defect, _ROUNDING * integration)
+        factorisations += 1
+        stuck = out_of_reach > 0.5 and np.abs(update).max() <= tolerance * size
+        if stuck:
+            break
         unknowns = _improved(moving, unknowns, update, np.abs(defect).max(), period, options)
     whole = np.linalg.multi_dot(maps[::-1]) if segments > 1 else maps[0]
     lines = 2.0 * np.pi / period, harmonics, samples
-    return _result(problem, moving, unknowns[0], whole, lines, options, history, tolerance, factorisations)
+    return _result(
+        problem, moving, unknowns[0], whole, lines, options, history, tolerance, factorisations, stuck
+    )
 
 
 def solve_free_vibration(
@@ -175,6 +187,11 @@ def solve_free_vibration(
         needs ``False``.
     harmonics, samples, events, integration, tolerance, max_iterations
         As for `solve_shooting`.
+
+    Raises
+    ------
+    CaseError
+        Forces, a period or a ``fixed`` out of range (E-SHOOTING), a start that does not fit (E-START).
     """
     if problem.forces or not (np.isfinite(period) and period > 0.0):
         raise CaseError(
@@ -182,12 +199,21 @@ def solve_free_vibration(
             code="E-SHOOTING", limit="no forces and a period above 0 s",
         )  # fmt: skip
     n = len(problem.system.M)
+    if not 0 <= fixed < n:
+        raise CaseError(
+            f"degree of freedom {fixed} fixed", code="E-SHOOTING", key="fixed", limit=f"0 to {n - 1}"
+        )
+    if start is None:
+        raise CaseError(
+            "a free vibration without a start", code="E-START", key="start",
+            limit=f"displacements and velocities of shape ({n},)", remedy="give a first guess of the motion",
+        )  # fmt: skip
+    start = checked_start(problem, start)
     moving = flow(problem, 0.0, variational=True)
     y = flow(problem, 0.0).state(*start)
     y[n + fixed] = 0.0
     free = np.setdiff1d(np.arange(2 * n), [n + fixed, fixed] if conservative else [n + fixed])
-    options = {"tolerance": integration, "events": events, "max_steps": _MOST_STEPS}
-    history = []
+    options, history = _options(moving, start, integration, events), []
     for _ in range(max_iterations + 1):
         ends, maps = _shoot(moving, y[None], period, options)
         defect = ends[0] - y
@@ -200,6 +226,12 @@ def solve_free_vibration(
         y, period = _closer(moving, y, period, free, update, np.abs(defect).max(), options)
     lines = 2.0 * np.pi / period, harmonics, samples
     return _result(problem, moving, y, maps[0], lines, options, history, tolerance, len(history) - 1)
+
+
+def _options(moving: Flow, start, integration, events) -> dict:
+    """Options of the integrator; a scale is set only where the integrator has none of its own."""
+    options = {"tolerance": integration, "events": events, "max_steps": _MOST_STEPS}
+    return options | {"scale": motion_scale(moving, start)}
 
 
 def _settled(problem, frequency, period, settle):
@@ -218,10 +250,10 @@ def _guess(moving: Flow, start, period, segments, integration, events):
     """States (segments, 2n) at the starts of the segments, along the motion from the first one."""
     plain = replace(moving, variational=False)
     y = plain.state(*start)
-    out = [y]
+    scale, out = motion_scale(plain, start), [y]
     for k in range(segments - 1):
         span = period * k / segments, period * (k + 1) / segments
-        steps = trajectory(plain, y, *span, tolerance=max(integration, 1e-8), events=events)
+        steps = trajectory(plain, y, *span, tolerance=max(integration, 1e-8), events=events, scale=scale)
         y = sampled(steps, np.array(span[1:]), y)[0][0]
         out.append(y)
     return np.array(out)
@@ -241,15 +273,21 @@ def _shoot(moving: Flow, unknowns, period, options):
     return np.array(ends), maps
 
 
-def _update(maps, defect):
-    """Newton step (segments, 2n): ``maps[k] d_k - d_{k+1} = -defect_k``, cyclic."""
+def _update(maps, defect, rounding):
+    """Newton step (segments, 2n): ``maps[k] d_k - d_{k+1} = -defect_k``, cyclic; the share it leaves over."""
     count, size = defect.shape
     matrix = np.zeros((count * size, count * size))
     for k, part in enumerate(maps):
         rows, following = slice(k * size, (k + 1) * size), (k + 1) % count
         matrix[rows, rows] += part
         matrix[rows, following * size : (following + 1) * size] -= np.eye(size)
-    return np.linalg.lstsq(matrix, -defect.ravel(), rcond=_SINGULAR)[0].reshape(count, size)
+    left, value, right = np.linalg.svd(matrix)
+    # lstsq has no absolute bound, and here the whole matrix may be rounding
+    kept = value > max(_SINGULAR * value[0], rounding)
+    step = -right[kept].T @ ((left[:, kept].T @ defect.ravel()) / value[kept])
+    wanted = np.linalg.norm(defect)
+    over = np.linalg.norm(matrix @ step + defect.ravel()) / wanted if wanted else 0.0
+    return step.reshape(count, size), float(over)
 
 
 def _improved(moving: Flow, unknowns, update, before, period, options):
@@ -291,7 +329,9 @@ def _derivative(moving: Flow, y, time):
     return replace(moving, variational=False).derivative(law)(time, y)
 
 
-def _result(problem, moving, y, monodromy, lines, options, history, tolerance, factorisations):
+def _result(
+    problem, moving, y, monodromy, lines, options, history, tolerance, factorisations, stuck=False
+):  # fmt: skip
     """Lines of the motion from ``y`` on, with the verdict."""
     omega, harmonics, samples = lines
     period, plain = 2.0 * np.pi / omega, replace(moving, variational=False)
@@ -307,6 +347,11 @@ def _result(problem, moving, y, monodromy, lines, options, history, tolerance, f
         f"after {len(history) - 1} iterations start and end differ by {history[-1]:.2g} of the motion: "
         "give a better start, or more segments"
     )  # fmt: skip
+    if stuck and not converged:
+        message = (
+            f"no start returns: a period changes the motion by {history[-1]:.2g} of it where "
+            "monodromy - 1 is singular; give some damping, balance free loads or move the frequency"
+        )
     solution = PeriodicSolution(
         frequency=[omega], orders=np.arange(harmonics + 1)[:, None], deflection=deflection, force=forces,
         converged=converged, residual=history[-1], iterations=len(history) - 1,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.initial_state import checked_start
 from femgear.solvers.marching import Law, Marched, march
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.transient import fixed_step_scheme, start_state
@@ -42,7 +43,8 @@ class Strobe:
     theta: np.ndarray
 
     def enter(self, start):
-        """State of the scheme and column forces for displacement and velocity (n,)."""
+        """State of the scheme and column forces for displacement and velocity (n,); rest for None."""
+        start = checked_start(self.problem, start)
         return start_state(self.scheme, start, self.theta[:1], self.law)
 
     def run(self, state, g) -> Marched:

@@ -93,21 +93,22 @@ def sweep_response(
     Raises
     ------
     CaseError
-        Frequencies that are not positive, numbers out of range.
+        No frequencies or some that are not positive, numbers out of range, a start that does not fit.
     ConvergenceError
         A step whose column equations do not converge.
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, float))
-    if not np.all(np.isfinite(frequencies)) or np.any(frequencies <= 0.0) or not 1 <= least <= most:
+    valid = frequencies.ndim == 1 and len(frequencies) and np.all(np.isfinite(frequencies))
+    if not valid or np.any(frequencies <= 0.0) or not 1 <= least <= most:
         raise CaseError(
             "a sweep needs positive frequencies and a period or more to settle", code="E-FREQUENCY",
-            key="frequencies", limit="> 0 rad/s, 1 <= least <= most",
+            key="frequencies", limit="one or more > 0 rad/s, 1 <= least <= most",
+            remedy="list the frequencies in the order of the sweep",
         )  # fmt: skip
     rows = []
     for value in frequencies:
         case, bases = problem(value) if callable(problem) else (problem, value)
         period = strobe(case, bases, steps=steps, periods=periods, method=method)
-        start = np.zeros((2, len(case.system.M))) if start is None else start
         block, settled, count = settle(period, start, least=least, most=most, tolerance=tolerance)
         x = period.columns(block)
         q, v = (part[0] for part in period.motion(block, np.array([-1])))

@@ -9,6 +9,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.solvers import adaptive
 from femgear.solvers.elements import GearMeshes, PiecewiseSprings
+from femgear.solvers.initial_state import checked_start, motion_scale
 from femgear.solvers.marching import march_times
 from femgear.solvers.modal_steps import modal_scheme
 from femgear.solvers.newmark import (
@@ -26,6 +27,8 @@ from femgear.solvers.tabulated import tabulated_law
 _STEPS_A_PERIOD = 40
 # Largest local error of a step, relative to the motion, that goes without a word.
 _COARSE = 1e-3
+# Local error of a step, relative to the motion, above which there is no solution.
+_WRONG = 1.0
 # Phases at which the largest mesh stiffness is looked for.
 _PHASES = 256
 METHODS = (*RULES, "newmark", "generalised alpha", "modal", *adaptive.METHODS)
@@ -45,6 +48,7 @@ class TransientResponse:
         ``W^T q`` [m] and the forces of the elements [N].
     method : str
     converged : bool
+        Every step converged, and none errs by more than the whole motion (``error`` up to 1).
     residual : float
         Largest violation of the column equations relative to the deflections; zero for explicit methods.
     error : float
@@ -132,12 +136,13 @@ def solve_transient(
     Raises
     ------
     CaseError
-        A step beyond the stability limit, instants that do not ascend, unknown methods, wrong shapes.
+        A step beyond the stability limit, instants that do not ascend, unknown methods, a start that
+        does not fit (E-START).
     ConvergenceError
         A mass matrix that is not positive definite, an adaptive integrator that gives up.
     """
     times = _checked_times(times)
-    q, v = _checked_start(problem, start)
+    q, v = checked_start(problem, start)
     frequency = np.atleast_1d(np.asarray(frequency, float))
     if not np.all(np.isfinite(frequency)) or frequency.ndim != 1:
         raise CaseError("base frequencies must be finite numbers", code="E-FREQUENCY", key="frequency")
@@ -244,7 +249,7 @@ def _stepped(problem, scheme, frequency, times, start, number, method, options) 
     q, v = (np.full((len(times), len(start[0])), np.nan) for _ in range(2))
     x = np.full((len(times), len(g)), np.nan)
     steps = iterations = 0
-    residual = error = 0.0
+    residual = error = size = 0.0
     for done, block, theta in march_times(
         problem, scheme, frequency, state, g, begin=begin, step=step, count=number, **options
     ):
@@ -258,11 +263,13 @@ def _stepped(problem, scheme, frequency, times, start, number, method, options) 
             x[inside] = _columns(problem, scheme, states, excess, theta, at, q[inside])
         if block.steps:
             error = max(error, float(scheme.local_error(states, excess).max()))
+            # the instants asked for may all lie at one phase: the size is that of all steps
+            size = max(size, _amplitude(problem, scheme.motion(states, excess, theta)[0]))
         steps, iterations = steps + block.steps, iterations + block.iterations
         residual = max(residual, block.residual)
     theta = times[:, None] * frequency
     force = element_forces(problem, x, theta)[0]
-    relative = error / size if (size := _amplitude(problem, q)) else 0.0
+    relative = error / size if size else 0.0
     converged, message = _verdict(steps, number, begin + steps * step, relative, step)
     return TransientResponse(
         times, q, v, x, force, method, converged, residual, relative, steps, iterations,
@@ -312,6 +319,10 @@ def _verdict(steps, number, time, error, step) -> tuple[bool, str]:
             f"the column equations did not converge in the step after {time:.6g} s: shorten the step of "
             f"{step:.3g} s or smooth the contact"
         )
+    if not error <= _WRONG:
+        return False, (
+            f"too coarse: a step errs by {error:.2g} of the motion; shorten the step of {step:.3g} s"
+        )
     if error > _COARSE:
         return (
             True,
@@ -323,6 +334,7 @@ def _verdict(steps, number, time, error, step) -> tuple[bool, str]:
 def _adaptive(problem, frequency, times, q, v, method, options) -> TransientResponse:
     motion = adaptive.flow(problem, frequency)
     y = motion.state(q, v)
+    options["scale"] = options["scale"] or motion_scale(motion, (q, v))
     found, steps = sampled(
         adaptive.trajectory(motion, y, times[0], times[-1], method=method, **options), times, y
     )
@@ -360,14 +372,3 @@ def _checked_times(times) -> np.ndarray:
             "instants must be finite and ascend", code="E-TIMES", key="times", limit="two instants or more"
         )
     return times
-
-
-def _checked_start(problem: NonlinearSystem, start) -> tuple[np.ndarray, np.ndarray]:
-    n = len(problem.system.M)
-    q, v = (np.zeros(n), np.zeros(n)) if start is None else (np.array(part, float) for part in start)
-    if q.shape != (n,) or v.shape != (n,) or not np.all(np.isfinite([q, v])):
-        raise CaseError(
-            f"a start of shapes {q.shape} and {v.shape} for {n} unknowns", code="E-SHAPE", key="start",
-            limit="finite displacements and velocities, one a degree of freedom",
-        )  # fmt: skip
-    return q, v

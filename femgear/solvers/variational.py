@@ -18,6 +18,8 @@ from femgear.system import Modes
 # Angle [rad] that the fastest mode turns in a step of the first sequence, and sequences of halved steps.
 _STEP_ANGLE = 0.7
 _LEVELS = 7
+# Steps in a period beyond which they are not halved again.
+_MOST_HALVED = 320_000
 # Eigenvalues this small relative to the largest one, and rows relative to theirs, are zero.
 _RIGID = 1e-11
 _UNMOVED = 1e-9
@@ -54,6 +56,10 @@ class Frame:
         """Whether the damping leaves the modes uncoupled."""
         off = self.damping - np.diag(np.diag(self.damping))
         return not np.any(np.abs(off) > 1e-12 * max(np.abs(self.damping).max(initial=0.0), 1e-300))
+
+    def steps(self, period):
+        """Steps of the first sequence over a period [s], as floats: they may be beyond all bounds."""
+        return np.ceil(np.maximum(8.0, self.fastest * np.asarray(period, float) / _STEP_ANGLE))
 
     @property
     def fastest(self) -> float:
@@ -185,13 +191,14 @@ def passage(
     breaks : list of p arrays
         Ascending fractions inside the period where tangents jump.
     tolerance : float
-        Relative error of the matrix at which halving ends, after at most 7 sequences.
+        Relative error of the matrix at which halving ends, after at most 7 sequences, fewer where a
+        period takes thousands of steps.
     """
     period = np.asarray(period, float)
     size, n = len(period), len(frame.square)
     out = Passage(np.empty((size, 2 * n, 2 * n)), np.full(size, np.inf), np.zeros(size, int))
     open_states, table = np.arange(size), None
-    base = int(np.ceil(max(8.0, frame.fastest * period.max(initial=0.0) / _STEP_ANGLE)))
+    base = int(frame.steps(period.max(initial=0.0)))
     for level in range(_LEVELS):
         start, duration = _steps([breaks[i] for i in open_states], base, level)
         found = _through(frame, period[open_states], start, duration, tangents, open_states)
@@ -200,7 +207,7 @@ def passage(
         out.steps[open_states] = start.shape[1]
         rest = error > tolerance
         open_states, table = open_states[rest], [entry[rest] for entry in table]
-        if not len(open_states):
+        if not len(open_states) or (level and base << (level + 1) > _MOST_HALVED):
             break
     return out
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.models.planar_data import PlanarTorque
-from femgear.models.planar_problem import planar_meshes, planar_problem
+from femgear.models.planar_problem import Clearances, planar_meshes, planar_problem
 from femgear.solvers.elements import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.harmonics import harmonics_of
@@ -211,3 +211,14 @@ def test_commensurable_bases_give_the_one_base_signal():
     times = np.linspace(0.0, 4.0 * np.pi, 200)
     assert two.converged and single.converged
     np.testing.assert_allclose(two.at(times), single.at(times), atol=1e-5)
+
+
+def test_sun_that_floats_in_its_bearing():
+    """The clearance adds columns that free rotation does not move; by symmetry the sun stays centred."""
+    data, torque = lin_parker_set(3), PlanarTorque(300.0)
+    floating = planar_problem(data, clearances=Clearances(sun=5e-6), torque=torque, damping=0.03)
+    found = solve_harmonic_balance(floating, 1000.0, harmonics=3)
+    held = solve_harmonic_balance(planar_problem(data, torque=torque, damping=0.03), 1000.0, harmonics=3)
+    assert found.converged
+    assert np.abs(found.deflection[6:]).max() < 1e-9 * np.abs(found.deflection[:6]).max()
+    np.testing.assert_allclose(found.deflection[:6], held.deflection, rtol=1e-9, atol=1e-18)

@@ -1,10 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.models.planar import planar_system
 from femgear.solvers.modal import output_load, output_response, residual_output, solve_modes
 from femgear.solvers.spectral import solve_spectral
 from femgear.system import MechanicalSystem
+from femgear.validation.planar import lin_parker_set
 
 
 def pair(m1=2.0, m2=3.0, load=(5.0, 5.0)):
@@ -129,8 +133,6 @@ def test_open_mesh_is_refused():
     ],
 )
 def test_bad_systems_are_refused(change, match):
-    from dataclasses import replace
-
     with pytest.raises((CaseError, ConvergenceError), match=match):
         solve_modes(replace(pair(), **change), [30.0], damping_ratio=0.05)
 
@@ -154,3 +156,29 @@ def test_bad_damping_is_refused(damping):
 def test_bad_requests_are_refused(stiffness, options):
     with pytest.raises(CaseError):
         solve_modes(pair(), stiffness, damping_ratio=0.05, **options)
+
+
+def test_load_on_a_part_that_the_rigid_mode_leaves_at_rest():
+    """Free rotation moves no centre but by rounding: a weight on the sun is held by its bearing."""
+    system = planar_system(lin_parker_set(3))
+    sun = system.dofs.index("sun: x")
+    load = np.zeros(len(system.M))
+    load[sun] = 50.0
+    stiffness = lin_parker_set(3).mesh_stiffness
+    modes = solve_modes(replace(system, load=load), stiffness, damping_ratio=0.0)
+    assert modes.kind.count("rigid") == 1
+    # reactions of the supports carry the weight: least squares of the singular equations
+    total = system.K + (system.W * stiffness) @ system.W.T
+    size = np.sqrt(np.diag(total))
+    exact = np.linalg.lstsq(total / np.outer(size, size), load / size, rcond=1e-12)[0] / size
+    np.testing.assert_allclose(modes.load_deflection, system.W.T @ exact, rtol=1e-7, atol=1e-16)
+    load[system.dofs.index("sun: u")] = 1e-3
+    with pytest.raises(CaseError, match="E-LOAD-BALANCE"):
+        solve_modes(replace(system, load=load), stiffness, damping_ratio=0.0)
+
+
+def test_weak_strain_of_a_rigid_mode_is_still_refused():
+    """A column that takes a millionth of the free motion is strained, and without stiffness it is refused."""
+    system = replace(pair(), W=np.array([[1.0, 1e-6], [1.0, 0.0]]))
+    with pytest.raises(ConvergenceError, match="strains mesh 2"):
+        solve_modes(system, [30.0, 0.0], damping_ratio=0.05)

@@ -1,13 +1,18 @@
 """What a periodic solution says about itself: truncation, spectral radius of the fixed point, stability."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from femgear.solvers.branches import frequency_response_curve
+from femgear.errors import CaseError
+from femgear.solvers import hill
+from femgear.solvers.branches import frequency_response_curve, parameter_curve
 from femgear.solvers.elements import GearMeshes, PolynomialSprings, gear_meshes
 from femgear.solvers.harmonic_balance import harmonic_balance, solve_harmonic_balance
 from femgear.solvers.harmonic_equations import largest_modulus
 from femgear.solvers.harmonics import harmonics_of
+from femgear.solvers.hill import floquet_verdict, floquet_verdicts
 from femgear.solvers.modal import solve_modes
 from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, modal_damping
 from femgear.solvers.periodic_response import periodic_response
@@ -118,3 +123,48 @@ def test_radius_is_nan_only_where_it_is_not_asked_for():
 def test_verdict_of_what_did_not_converge_is_open():
     found = periodic_response(duffing(), 1.2, harmonics=3, start=np.ones((1, 4)), max_iterations=1)
     assert found.stable is None and "did not converge" in found.verdict.message
+
+
+def test_frequency_zero_has_no_verdict():
+    """It is refused before anything is computed; without stability the static solution is there."""
+    for call in (
+        lambda: periodic_response(duffing(), 0.0, harmonics=5),
+        lambda: frequency_response_curve(duffing(), (0.0, 2.0), harmonics=5),
+        lambda: frequency_response_curve(duffing(), (2.0, 0.0), harmonics=5),
+        lambda: parameter_curve(duffing, (0.1, 0.2), 0.0, harmonics=5),
+    ):
+        with pytest.raises(CaseError, match="E-FREQUENCY") as caught:
+            call()
+        assert caught.value.value == 0.0 and caught.value.limit and caught.value.remedy
+    found = frequency_response_curve(duffing(), (0.0, 0.3), harmonics=5, stability=False)
+    assert found.complete and found.parameter[0] == 0.0 and not found.verdicts
+    still = solve_harmonic_balance(duffing(), 0.0, harmonics=5)
+    verdict = floquet_verdict(duffing(), still)
+    assert verdict.stable is None and "no period" in verdict.message
+
+
+@pytest.mark.parametrize("method", ["monodromy", "hill"])
+@pytest.mark.parametrize("frequency", [1e-12, 1e-310])
+def test_period_too_long_for_the_fastest_mode_is_left_open(frequency, method):
+    found = periodic_response(duffing(), frequency, harmonics=5, method=method)
+    assert found.solution.converged and found.stable is None
+    assert "not determined" in found.verdict.message and not len(found.verdict.multipliers)
+
+
+def test_long_period_within_the_bound_has_its_verdict():
+    """The product of the multipliers is the dissipation of one period, ``exp(-c T)`` (Liouville)."""
+    problem = replace(duffing(), system=replace(duffing().system, C=1e-3 * ONE))
+    found = periodic_response(problem, 1e-2, harmonics=9)
+    assert found.stable is True and found.verdict.method == "splitting"
+    period = 2.0 * np.pi / 1e-2
+    assert np.prod(found.verdict.multipliers).real == pytest.approx(np.exp(-1e-3 * period), rel=1e-6)
+
+
+def test_portions_of_long_periods_change_no_verdict(monkeypatch):
+    solutions = [solve_harmonic_balance(duffing(), f, harmonics=7) for f in (1.8, 0.2, 1.6, 0.3)]
+    together = floquet_verdicts(duffing(), solutions)
+    monkeypatch.setattr(hill, "_MOST_ENTRIES", 40)
+    apart = floquet_verdicts(duffing(), solutions)
+    for one, other in zip(together, apart):
+        np.testing.assert_allclose(one.multipliers, other.multipliers, atol=1e-7)
+        assert one.stable is other.stable is True

@@ -350,7 +350,7 @@ def test_bad_input_is_refused():
     for options, code in (
         ({"method": "euler"}, "E-METHOD"),
         ({"events": True}, "E-METHOD"),
-        ({"start": ([1.0, 2.0], [0.0])}, "E-SHAPE"),
+        ({"start": ([1.0, 2.0], [0.0])}, "E-START"),
         ({"step": -1.0}, "E-STEP"),
         ({"method": "newmark", "gamma": 0.4}, "E-STEP-RULE"),
         ({"method": "generalised alpha", "radius": 1.2}, "E-STEP-RULE"),
