@@ -17,7 +17,11 @@ from femgear.errors import CaseError
 def main(
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/bearing_clearance"),
-    clearance: Annotated[tuple[str, ...], Parameter(negative="")] = ("0 um", "100 um", "400 um"),
+    clearance: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (
+        "0 um",
+        "100 um",
+        "400 um",
+    ),
     harmonics: int = 5,
     backlash: str = "150 um",
     frequencies: int = 8,

@@ -19,7 +19,11 @@ FLANKS = ("sun-planet 1, drive", "planet 1-ring, drive", "sun-planet 1, back", "
 def main(
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/gravity_wedging"),
-    backlash: Annotated[tuple[str, ...], Parameter(negative="")] = ("482 um", "321 um", "161 um"),
+    backlash: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (
+        "482 um",
+        "321 um",
+        "161 um",
+    ),
     harmonics: int = 9,
     lowest: float = 25.0,
     highest: float = 90.0,

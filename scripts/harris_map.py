@@ -29,7 +29,7 @@ def main(
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/harris_map"),
     relief: Annotated[tuple[str, ...], Parameter(negative="")] = ("0 um", "2 um", "4 um", "6 um", "8 um"),
     length: float = 1.0,
-    torque: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    torque: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
     positions: int = 32,
 ) -> None:
     """Compute the transmission error over torque for each tip relief: a table, a picture and a CSV file.
@@ -52,7 +52,7 @@ def main(
     from femgear import planetary_set, read_case
     from femgear.casefile.units import LENGTH, TORQUE, to_si
     from femgear.design.basis import design_basis, sun_torque
-    from femgear.design.relief import harris_map, relief_starts, with_tip_relief
+    from femgear.design.relief import harris_map, loads_back, relief_starts, with_tip_relief
     from femgear.plots.design import harris_curves
     from femgear.plots.style import save_figure
     from femgear.run import grid_cache
@@ -63,15 +63,17 @@ def main(
     amounts = [_checked(to_si(text, LENGTH), text, data.sun.module) for text in relief]
     gears = planetary_set(data)
     relief_starts(gears, length=length)
-    given = [to_si(text, TORQUE) for text in torque]
+    # a torque given twice is one point of the curves
+    given = list(dict.fromkeys(to_si(text, TORQUE) for text in torque))
     inputs = np.array(given or data.operation.torque * np.append(0.1, np.linspace(0.2, 2.0, 10)))
     on_sun = [sun_torque(data, gears, float(value)) for value in inputs]
+    back = loads_back(np.array(on_sun))
     folder = ready_folder(output)
     with Progress() as progress:
         progress("compliance", 0, 1)
         basis = design_basis(data, cache=grid_cache())
         progress("compliance", 1, 1)
-        options = {"length": length, "back": on_sun[0] < 0}
+        options = {"length": length, "back": back}
         variants = [with_tip_relief(basis.deviations, gears, amount=a, **options) for a in amounts]
         found = harris_map(
             gears,
@@ -111,20 +113,21 @@ def _records(amounts, inputs, found):
 
 
 def _print_summary(amounts, inputs, found):
+    title = "Transmission error of the sun-planet meshes, peak to peak"
+    curves = found.peak_to_peak[:, 0] * 1e6
+    names = [f"{amount * 1e6:g}" for amount in amounts]
+    if len(inputs) == 1:
+        # no torque is the best of one
+        rows = [(name, f"{curve[0]:.3f}") for name, curve in zip(names, curves)]
+        print_table(title, ("relief [um]", f"STE p-p at {inputs[0]:g} N m [um]"), rows)
+        return
     rows = []
-    for v, amount in enumerate(amounts):
-        curve = found.peak_to_peak[v, 0] * 1e6
+    for name, curve in zip(names, curves):
         lowest = int(curve.argmin())
         ends = (f"{curve[0]:.3f}", f"{curve[-1]:.3f}")
-        rows.append((f"{amount * 1e6:g}", f"{inputs[lowest]:g}", f"{curve[lowest]:.3f}", *ends))
-    header = (
-        "relief [um]",
-        "least at [N m]",
-        "STE p-p there [um]",
-        f"at {inputs[0]:g} N m",
-        f"at {inputs[-1]:g} N m",
-    )
-    print_table("Transmission error of the sun-planet meshes, peak to peak", header, rows)
+        rows.append((name, f"{inputs[lowest]:g}", f"{curve[lowest]:.3f}", *ends))
+    ends = (f"at {inputs[0]:g} N m", f"at {inputs[-1]:g} N m")
+    print_table(title, ("relief [um]", "least at [N m]", "STE p-p there [um]", *ends), rows)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,11 @@ def main(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/load_sharing"),
-    gap: Annotated[tuple[str, ...], Parameter(negative="")] = ("0 um", "1 um", "3 um"),
+    gap: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (
+        "0 um",
+        "1 um",
+        "3 um",
+    ),
     planet: int = 1,
 ) -> None:
     """Compute the load share of every planet and the tooth loads: a table, pictures and CSV files.

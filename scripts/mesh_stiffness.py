@@ -27,7 +27,7 @@ def main(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/mesh_stiffness"),
-    torque: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    torque: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
     contact: Literal["profile", "line_of_action"] | None = None,
     positions: int | None = None,
 ) -> None:

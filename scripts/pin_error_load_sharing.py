@@ -15,6 +15,7 @@ from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, ru
 from femgear.errors import CaseError
 
 QUANTILES = (0.5, 0.9, 0.99)
+Length = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 
 def main(
@@ -22,9 +23,9 @@ def main(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/pin_error_load_sharing"),
-    tangential: str = "3 um",
-    radial: str = "3 um",
-    tolerance: str | None = None,
+    tangential: Length = "3 um",
+    radial: Length = "3 um",
+    tolerance: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     support: Annotated[
         tuple[Literal["fixed", "floating", "case"], ...], Parameter(negative="", consume_multiple=True)
     ] = ("fixed", "floating", "case"),
@@ -44,9 +45,11 @@ def main(
     output
         Folder of the results.
     tangential, radial
-        Standard deviations of the normally distributed errors of every pin, with their unit.
+        Standard deviations of the normally distributed errors of every pin, with their unit; three of them
+        at most 0.2 modules.
     tolerance
-        Tolerance of the pins in both directions, plus or minus: three standard deviations.
+        Tolerance of the pins in both directions, plus or minus: three standard deviations, at most 0.2
+        modules.
     support
         All members fixed, the sun floating with all others fixed, or the stiffnesses of the case.
     samples
@@ -67,9 +70,12 @@ def main(
     data = read_case(case)
     gears = planetary_set(data)
     torque = sun_torque(data, gears)
-    sigma = [to_si(text, LENGTH) for text in (radial, tangential)]
-    sigma = sigma if tolerance is None else [to_si(tolerance, LENGTH) / 3] * 2
-    _check(sigma, seed, position)
+    given = {"--radial": radial, "--tangential": tangential}
+    given = given if tolerance is None else {"--tolerance": tolerance}
+    parts = 1 if tolerance is None else 3
+    _check(given, {key: to_si(text, LENGTH) for key, text in given.items()}, parts, data.sun.module)
+    _check_place(seed, position)
+    sigma = [to_si(text, LENGTH) / parts for text in given.values()] * (2 // len(given))
     pins = pin_samples(gears.n_planets, samples=samples, radial=sigma[0], tangential=sigma[1], seed=seed)
     place = {"position": round(position * 16) % 16, "positions": 16, "contact": data.static.contact}
     folder = ready_folder(output)
@@ -92,9 +98,28 @@ def main(
     say_files(folder, ["load_sharing_samples.csv", "load_sharing_histogram.png"])
 
 
-def _check(sigma, seed: int, position: float) -> None:
-    if min(sigma) < 0:
-        raise CaseError("a standard deviation is negative", code="E-RANGE", limit="0 m or more")
+def _check(texts, lengths, parts: int, module: float) -> None:
+    """Refuse lengths that are negative or put three standard deviations over what a case file takes.
+
+    ``parts`` is the number of standard deviations in a length.
+    """
+    from femgear.gears.modifications import LARGEST_DEVIATION
+
+    most = LARGEST_DEVIATION * module * parts / 3
+    for key, length in lengths.items():
+        if not 0 <= length <= most:
+            wrong = "cannot be negative" if length < 0 else "is not plausible"
+            raise CaseError(
+                f"the spread of the pins {wrong}",
+                code="E-RANGE",
+                key=key,
+                value=texts[key],
+                limit=f"0 to {most * 1e6:.6g} um (three standard deviations: {LARGEST_DEVIATION} modules)",
+                remedy="give a manufacturing tolerance, a few micrometres",
+            )
+
+
+def _check_place(seed: int, position: float) -> None:
     if seed < 0:
         raise CaseError("a seed cannot be negative", code="E-RANGE", key="--seed", value=seed)
     if not 0 <= position <= 1:

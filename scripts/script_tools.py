@@ -30,10 +30,10 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
         Exit code: 0, 2 (bad input), 3 (numerical failure), 4 (storage), 130 (interrupted).
     """
     from cyclopts import App, CycloptsError
-    from femgear.threads import one_blas_thread
 
     from femgear.cli import show_warning, wrong_arguments
     from femgear.files import storage_error
+    from femgear.threads import one_blas_thread
 
     program = Path(sys.argv[0]).name
     app = App(

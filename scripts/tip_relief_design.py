@@ -27,8 +27,8 @@ def main(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/tip_relief_design"),
-    torque: str | None = None,
-    also: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    torque: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    also: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
     largest: str | None = None,
     shape: Literal["linear", "parabolic"] = "linear",
     points: int = 7,
@@ -94,15 +94,14 @@ def main(
         amounts = top * np.arange(1, points + 1) / points
         grid, best, fine = _search(basis, amounts, on_sun, target, options, progress)
     write_csv(folder / "tip_relief.csv", HEADER, _records(inputs, grid))
-    figure = relief_contours(
-        grid.amounts, grid.lengths, grid.ratio, inputs, optimum=(best.amount, best.length)
-    )
+    optimum = best.amount, best.length
+    figure = relief_contours(grid.amounts, grid.lengths, grid.ratio, inputs, optimum=optimum, design=design)
     save_figure(figure, folder / "tip_relief.png")
     snippet = relief_snippet(gears, amount=best.amount, length=best.length, power=power, back=target < 0)
     write_text(snippet, folder / "relief.toml")
     _print_summary(inputs, grid, design, best)
     print(f"at {2 * positions} positions: {fine:.1%}")
-    _print_slopes(basis, best, target, options)
+    _print_verdict(best, grid)
     print(f"for the case file (relief.toml):\n\n{snippet}")
     say_files(folder, ["tip_relief.csv", "tip_relief.png", "relief.toml"])
 
@@ -130,7 +129,8 @@ def _mean_deflection(basis, torque: float, contact: str) -> float:
 
 def _search(basis, amounts, on_sun, target, options, progress):
     """The grid, the optimum at the target torque, and its ratio at twice the positions."""
-    from femgear.design.relief import optimise_relief, relief_grid
+    from femgear.design.relief import relief_grid
+    from femgear.design.relief_optimum import optimise_relief
 
     grid = relief_grid(
         basis.gears,
@@ -166,40 +166,26 @@ def _at_more_positions(basis, best, torque: float, options) -> float:
     return float(found[1] / found[0])
 
 
-AMOUNT_STEP, LENGTH_STEP = 0.1e-6, 0.05e-3
-"""Tolerances [m] over which the slopes at the optimum are taken."""
+def _print_verdict(best, grid) -> None:
+    """Slopes on either side of the optimum, and whether it is a minimum."""
+    from femgear.design.relief_optimum import AMOUNT_STEP, LENGTH_STEP
 
-
-def _print_slopes(basis, best, torque: float, options) -> None:
-    """Slopes of the peak to peak at the optimum, from one linearised mesh cycle."""
-    from femgear.design import (
-        linearise,
-        peak_to_peak_slopes,
-        relief_amount,
-        relief_length,
-        sensitivity,
-        two_pair_length,
-    )
-
-    gears, base = basis.gears, basis.deviations
-    law = {"power": options["power"], "back": torque < 0}
-    amount = relief_amount(base, gears, length=best.length, **law)
-    length = relief_length(base, gears, amount=best.amount, **law)
-    contact = {key: options[key] for key in ("positions", "contact", "supports")}
-    linear = linearise(gears, basis.bodies, sun_torque=torque, deviations=amount(best.amount), **contact)
-    meshes, unit = slice(gears.n_planets), two_pair_length(gears)
-    per_amount = sensitivity(linear, amount, best.amount, step=1e-9).deflection[meshes]
-    per_length = sensitivity(linear, length, best.length, step=1e-5).deflection[meshes] / unit
-    signal = linear.deflection[meshes]
-    for name, change, step, (down, up), number, unit in (
-        ("amount", per_amount, AMOUNT_STEP, ("less", "more"), 1.0, "um per um"),
-        ("length", per_length, LENGTH_STEP, ("shorter", "longer"), 1e3, "um per mm"),
+    for name, slopes, step, words, number, unit in (
+        ("amount", best.amount_slopes, AMOUNT_STEP, ("less", "more"), 1.0, "um per um"),
+        ("length", best.length_slopes, LENGTH_STEP, ("shorter", "longer"), 1e3, "um per mm"),
     ):
-        left, right = (number * slope for slope in peak_to_peak_slopes(signal, change, step=step))
-        print(
-            f"slopes of the STE peak to peak over the {name}, within {step * 1e6:g} um: "
-            f"{-left:+.3f} {unit} {down}, {right:+.3f} {unit} {up}"
-        )
+        parts = [
+            f"end of the range searched to {word}"
+            if np.isnan(slope)
+            else f"{number * slope:+.3f} {unit} {word}"
+            for slope, word in zip(slopes, words)
+        ]
+        print(f"slopes of the STE peak to peak over the {name}, within {step * 1e6:g} um: {', '.join(parts)}")
+    if not best.minimum:
+        print("NOT A MINIMUM: the search ended where a neighbour still lies lower; use more --points")
+    elif best.at_end:
+        ends = f"up to {grid.amounts[-1] * 1e6:.3f} um, lengths {grid.lengths[0]:g} to {grid.lengths[-1]:g}"
+        print(f"NOT A MINIMUM: {' and '.join(best.at_end)} at an end of the range searched ({ends})")
 
 
 def _records(inputs, grid):

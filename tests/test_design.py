@@ -191,6 +191,43 @@ def test_the_optimum_is_far_under_the_unmodified_pair_and_the_map_has_its_minimu
     np.testing.assert_allclose(found.peak_to_peak[1, 1], found.peak_to_peak[0, 1], rtol=0.01)
 
 
+def test_the_slopes_of_the_optimum_are_those_of_single_mesh_cycles(basis):
+    """Same peaks as mesh cycles with the reliefs beside it; a search cut short says it is no minimum."""
+    from femgear.design import two_pair_length
+
+    gears, bodies = basis.gears, basis.bodies
+    grid = relief_grid(
+        gears, bodies, amounts=[2.7e-6, 5.3e-6], lengths=[0.8, 1.2], torques=[TORQUE], positions=16
+    )
+    best = optimise_relief(gears, bodies, grid, torque=TORQUE, positions=16)
+    assert best.minimum and best.at_end == ()
+    assert min(*best.amount_slopes, *best.length_slopes) >= 0
+    short = optimise_relief(gears, bodies, grid, torque=TORQUE, positions=16, max_evaluations=3)
+    assert not short.minimum and short.peak_to_peak > best.peak_to_peak
+    away = 0.05e-3 / two_pair_length(gears)
+    places = [(best.amount + d, best.length) for d in (-0.1e-6, 0.1e-6)]
+    places += [(best.amount, best.length + d) for d in (-away, away)]
+    variants = [with_tip_relief(None, gears, amount=a, length=length) for a, length in places]
+    found = harris_map(gears, bodies, torques=[TORQUE], deviations=variants, positions=16)
+    rises = found.peak_to_peak[:, 0, 0] - best.peak_to_peak
+    np.testing.assert_allclose(rises[:2], 0.1e-6 * np.array(best.amount_slopes), atol=1e-13)
+    np.testing.assert_allclose(rises[2:], 0.05e-3 * np.array(best.length_slopes), atol=1e-13)
+
+
+def test_the_optimum_is_marked_under_its_torque_alone():
+    from femgear.plots.design import relief_contours
+
+    amounts, lengths = np.array([2e-6, 4e-6, 6e-6]), np.array([0.4, 0.8, 1.2])
+    ratios = np.array([np.full((3, 3), 0.8), [[0.9, 0.6, 0.1], [0.7, 0.5, 0.4], [0.9, 0.8, 0.7]]])
+    figure = relief_contours(amounts, lengths, ratios, [50.0, 100.0], optimum=(3e-6, 1.1), design=100.0)
+    names = [ax.get_legend_handles_labels()[1] for ax in figure.axes[:2]]
+    assert names == [["chosen for 100 N m"], ["25% of unmodified", "optimum at 100 N m"]]
+    (legend,) = figure.legends
+    assert {text.get_text() for text in legend.get_texts()} == {name for one in names for name in one}
+    faces = [ax.lines[-1].get_markerfacecolor() for ax in figure.axes[:2]]
+    assert faces[0] == "white" and faces[1] == figure.axes[1].lines[-1].get_color()
+
+
 def test_a_map_of_negative_torques_is_that_of_positive_ones(basis):
     gears = basis.gears
     peaks = []

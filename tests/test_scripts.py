@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -85,6 +86,12 @@ def test_help(name, tmp_path):
         ("tip_relief_design.py", ["--also=-50 N m"], 2, "both signs"),
         ("pin_error_load_sharing.py", ["--samples", "0"], 2, "1 to 1000000"),
         ("pin_error_load_sharing.py", ["--tangential=-1 um"], 2, "negative"),
+        ("harris_map.py", ["--torque", "-100 N m", "--torque", "50 N m"], 2, "both signs"),
+        ("tip_relief_design.py", ["--torque", "-100 N m", "--also", "50 N m"], 2, "both signs"),
+        ("pin_error_load_sharing.py", ["--tolerance", "10 mm"], 2, "allowed: 0 to 300 um"),
+        ("pin_error_load_sharing.py", ["--tolerance", "301 um"], 2, "E-RANGE"),
+        ("pin_error_load_sharing.py", ["--radial", "101 um"], 2, "allowed: 0 to 100 um"),
+        ("pin_error_load_sharing.py", ["--tolerance", "-9 um"], 2, "cannot be negative"),
         ("pin_error_load_sharing.py", ["--position", "2"], 2, "0 to 1"),
         ("pin_error_load_sharing.py", ["--support", "soft"], 2, "soft"),
         ("campbell.py", ["--speeds", "2"], 2, "5 speeds or more"),
@@ -215,6 +222,38 @@ def test_harris_map(quick_case, tmp_path):
     # a relief for 100 N m: less there than at half and at twice the torque, and than without it
     assert curve[1].argmin() == 1 and np.all(np.diff(curve[0]) > 0)
     assert curve[1, 1] < 0.35 * curve[0, 1]
+
+
+def test_harris_map_of_one_negative_torque(quick_case, tmp_path):
+    arguments = ("--relief", "0 um", "--relief", "4 um", "--positions", "8")
+    peaks = []
+    for torques in (("-100 N m", "-100 N m"), ("100 N m",)):
+        words = [word for torque in torques for word in ("--torque", torque)]
+        done = run("harris_map.py", quick_case, *arguments, *words, "-o", tmp_path, folder=tmp_path)
+        assert done.returncode == 0, done.stderr
+        (header,) = (line for line in done.stdout.splitlines() if "relief [um]" in line)
+        assert header.count("N m") == 1 and torques[0] in header
+        peaks.append(table(tmp_path / "harris_map.csv")["sun-planet STE peak to peak [m]"])
+    np.testing.assert_allclose(*peaks, rtol=1e-9)
+
+
+def test_the_optimum_of_a_coarse_map_has_no_way_down(quick_case, tmp_path):
+    """The smallest amount of this map is 2.7 um, on which the simplex collapses; the valley is at 3.0 um."""
+    arguments = ("--points", "3", "--positions", "16", "--largest", "8 um", "--also", "150 N m")
+    done = run("tip_relief_design.py", quick_case, *arguments, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    slopes = re.findall(r"([+-][0-9.]+) um per", done.stdout)
+    assert len(slopes) == 4 and min(map(float, slopes)) >= 0
+    assert "NOT A MINIMUM" not in done.stdout
+    ratio = float(re.search(r"([0-9.]+)% of", done.stdout)[1])
+    assert ratio < 14
+
+
+def test_tip_relief_at_the_end_of_its_range_is_no_minimum(quick_case, tmp_path):
+    arguments = ("--points", "3", "--positions", "8", "--largest", "1 um", "--also", "100 N m")
+    done = run("tip_relief_design.py", quick_case, *arguments, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "NOT A MINIMUM: amount" in done.stdout and "end of the range searched to more" in done.stdout
 
 
 def test_tip_relief_design(quick_case, tmp_path):

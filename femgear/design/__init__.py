@@ -19,13 +19,12 @@ from femgear.design.parameters import (
 from femgear.design.relief import (
     HarrisMap,
     ReliefGrid,
-    ReliefOptimum,
     harris_map,
-    optimise_relief,
     relief_grid,
     relief_starts,
     with_tip_relief,
 )
+from femgear.design.relief_optimum import ReliefOptimum, optimise_relief
 from femgear.design.samples import Sharing, SharingModel, sharing_of_samples
 from femgear.design.sharing import (
     pin_samples,

@@ -80,26 +80,6 @@ class ReliefGrid:
         return self.peak_to_peak / self.unmodified[:, None, None]
 
 
-@dataclass(frozen=True)
-class ReliefOptimum:
-    """The relief with the least transmission error peak to peak at one torque.
-
-    Lengths in metres but for `length`, in lengths of two-pair contact; `evaluations` counts mesh cycles.
-    """
-
-    torque: float
-    amount: float
-    length: float
-    peak_to_peak: float
-    unmodified: float
-    evaluations: int
-
-    @property
-    def ratio(self) -> float:
-        """Peak to peak over that without relief."""
-        return self.peak_to_peak / self.unmodified
-
-
 def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[float, float]:
     """Roll lengths on sun and planet where a tip relief of their mesh starts [m].
 
@@ -287,78 +267,6 @@ def relief_grid(
     ).peak_to_peak[:, 0]
     peaks = found[1:].T.reshape(len(torques), len(amounts), len(lengths))
     return ReliefGrid(amounts, lengths, torques, peaks, found[0])
-
-
-@one_blas_thread()
-def optimise_relief(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
-    grid: ReliefGrid,
-    *,
-    torque: float,
-    deviations: SetDeviations | None = None,
-    power: float = 1.0,
-    positions: int = 32,
-    contact: str = "profile",
-    supports: Supports = RIGID,
-    max_evaluations: int = 60,
-) -> ReliefOptimum:
-    """Best relief at one torque, by Nelder and Mead's simplex from the best point of the grid.
-
-    The peak to peak has kinks where another position becomes the extreme one, so no gradient is used; the
-    search stays within the grid.
-
-    Parameters
-    ----------
-    grid : ReliefGrid
-        Over the same set, with `torque` among its torques.
-    torque : float
-        On the sun [N m].
-    max_evaluations : int
-        Most mesh cycles.
-    planetary_set, bodies, deviations, power, positions, contact, supports
-        As for `relief_grid`.
-
-    Returns
-    -------
-    ReliefOptimum
-    """
-    from scipy.optimize import minimize
-
-    t = int(np.abs(grid.torques - torque).argmin())
-    options = {"torques": [torque], "positions": positions, "contact": contact, "supports": supports}
-
-    def peak(point):
-        amount, length = point[0] * 1e-6, point[1]
-        variant = with_tip_relief(
-            deviations, planetary_set, amount=amount, length=length, power=power, back=torque < 0
-        )
-        found = harris_map(planetary_set, bodies, deviations=[variant], **options)
-        return float(found.peak_to_peak[0, 0, 0]) * 1e6
-
-    a, b = np.unravel_index(grid.peak_to_peak[t].argmin(), grid.peak_to_peak[t].shape)
-    start = np.array([grid.amounts[a] * 1e6, grid.lengths[b]])
-    bounds = [(grid.amounts.min() * 1e6, grid.amounts.max() * 1e6), (grid.lengths.min(), grid.lengths.max())]
-    axes = grid.amounts, grid.lengths
-    step = [0.4 * (high - low) / max(len(axis) - 1, 1) for (low, high), axis in zip(bounds, axes)]
-    # the simplex has to lie within the bounds
-    inwards = [-s if x + s > high else s for x, s, (_, high) in zip(start, step, bounds)]
-    simplex = start + np.vstack([np.zeros(2), np.diag(inwards)])
-    found = minimize(
-        peak,
-        start,
-        method="Nelder-Mead",
-        bounds=bounds,
-        options={"initial_simplex": simplex, "maxfev": max_evaluations, "xatol": 0.01, "fatol": 1e-3},
-    )
-    return ReliefOptimum(
-        torque=float(torque),
-        amount=float(found.x[0]) * 1e-6,
-        length=float(found.x[1]),
-        peak_to_peak=float(found.fun) * 1e-6,
-        unmodified=float(grid.unmodified[t]),
-        evaluations=int(found.nfev),
-    )
 
 
 def loads_back(torques: np.ndarray) -> bool:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 KINDS = ("sun-planet", "planet-ring")
+QUARTER, LINE = 0.25, COLOURS[4]
 
 
 def harris_curves(torques, peak_to_peak, names, *, design: float | None = None) -> Figure:
@@ -29,14 +30,16 @@ def harris_curves(torques, peak_to_peak, names, *, design: float | None = None) 
         Torque to be marked [N m].
     """
     figure, axes = new_figure(columns=2, width=10.0, height=4.6, sharex=True)
+    # one torque is no line
+    marker = {"marker": "o"} if len(torques) == 1 else {}
     for kind, ax in enumerate(axes):
         curves = 1e6 * peak_to_peak[:, kind]
         # a relief of the sun side hardly changes the other meshes
         if len(curves) > 1 and np.ptp(curves, axis=0).max() < 0.01 * curves.max():
-            ax.plot(torques, curves[0], label="all reliefs (within 1 %)", color=BLACK)
+            ax.plot(torques, curves[0], label="all reliefs (within 1 %)", color=BLACK, **marker)
         else:
             for v, name in enumerate(names):
-                ax.plot(torques, curves[v], label=name, **line_style(v))
+                ax.plot(torques, curves[v], label=name, **line_style(v), **marker)
         if design is not None:
             ax.axvline(design, color="0.5", linewidth=1.0, label=f"{design:g} N m")
         ax.set_ylim(bottom=0)
@@ -46,7 +49,7 @@ def harris_curves(torques, peak_to_peak, names, *, design: float | None = None) 
     return figure
 
 
-def relief_contours(amounts, lengths, ratios, torques, *, optimum=None) -> Figure:
+def relief_contours(amounts, lengths, ratios, torques, *, optimum=None, design=None) -> Figure:
     """Transmission error peak to peak over that without relief, over amount and length of the relief.
 
     Parameters
@@ -60,6 +63,8 @@ def relief_contours(amounts, lengths, ratios, torques, *, optimum=None) -> Figur
         Of the input [N m].
     optimum : (float, float), optional
         Amount [m] and length to be marked.
+    design : float, optional
+        Torque [N m] the optimum was found at; under the others it is marked as chosen.
     """
     figure, axes = new_figure(
         columns=len(torques), width=max(3.9 * len(torques), 6.0), height=4.4, sharex=True, sharey=True
@@ -67,17 +72,28 @@ def relief_contours(amounts, lengths, ratios, torques, *, optimum=None) -> Figur
     levels = np.linspace(0.0, 1.5, 13)
     for ax, ratio, torque in zip(axes, ratios, torques):
         filled = ax.contourf(lengths, 1e6 * amounts, ratio, levels=levels, cmap="viridis", extend="max")
-        lines = ax.contour(lengths, 1e6 * amounts, ratio, levels=[0.25], colors=[COLOURS[4]], linewidths=2.0)
-        ax.clabel(lines, fmt="25 %%")
+        if ratio.min() < QUARTER < ratio.max():
+            ax.contour(lengths, 1e6 * amounts, ratio, levels=[QUARTER], colors=[LINE], linewidths=2.0)
+            # a contour has no legend entry of its own
+            ax.plot([], [], color=LINE, linewidth=2.0, label=f"{QUARTER:.0%} of unmodified")
         if optimum is not None:
-            amount, length = optimum
-            ax.plot(length, 1e6 * amount, "o", color=VERMILION, markersize=9, label="optimum", clip_on=False)
+            _mark(ax, optimum, own=design is None or np.isclose(torque, design), design=design)
         label(ax, "length [two-pair contact]", title=f"{torque:g} N m")
     label(axes[0], y="amount at the tips [µm]")
     bar = figure.colorbar(filled, ax=axes)
     bar.set_label("STE peak to peak over unmodified [1]")
     legend_below(figure)
     return figure
+
+
+def _mark(ax, optimum, *, own: bool, design) -> None:
+    """A full circle under the torque of the optimum, an open one under others."""
+    amount, length = optimum
+    name = "optimum" if own else f"chosen for {design:g} N m"
+    name = f"optimum at {design:g} N m" if own and design is not None else name
+    face = VERMILION if own else "white"
+    style = {"color": VERMILION, "markerfacecolor": face, "markersize": 9, "markeredgewidth": 2.0}
+    ax.plot(length, 1e6 * amount, "o", label=name, clip_on=False, **style)
 
 
 def sharing_histogram(factors, names, n_planets: int) -> Figure:
