@@ -143,13 +143,12 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
     from femgear.gears import torques
     from femgear.gears.deviations import common_period
 
-    gears = planetary_set(case)
+    gears, deviations = planetary_set(case), set_deviations(case)
     material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
     sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
     foundation = _ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
     bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
     sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
-    deviations = set_deviations(case)
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
     cycle = walk_either_flank(
         gears,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case import Case, set_deviations
+from femgear.case_floating import check_floating
 from femgear.errors import CaseError, ContactError
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             limit='"ring"',
             remedy="run with --only static, or fix the ring",
         )
+    check_floating(case, gears, dynamic=True)
     if case.operation.torque == 0:
         raise CaseError(
             "without torque no tooth carries load, so there is no mesh stiffness for the dynamic model",

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from femgear.case_flanks import flank_form
+from femgear.case_floating import check_floating
 from femgear.casefile import tomlfile
-from femgear.casefile.deviations import CarrierErrors, GearErrors, ModificationSection
-from femgear.casefile.given import in_terms_of_the_case, notices
+from femgear.casefile.deviations import CarrierErrors, GearErrors
+from femgear.casefile.given import added_material, in_terms_of_the_case, notices
 from femgear.casefile.problems import combine, translate
 from femgear.casefile.profiles import embed_profiles
 from femgear.casefile.published import without_uncomputed
@@ -29,22 +31,11 @@ from femgear.gears import (
 )
 from femgear.gears.deviation_checks import check_deviations
 from femgear.gears.deviations import (
-    FlankForm,
     Ovality,
     Runout,
     SetDeviations,
     no_deviations,
     tooth_displacements,
-)
-from femgear.gears.modifications import (
-    MeasuredProfile,
-    Modification,
-    ProfileCrowning,
-    ProfileSlope,
-    RootRelief,
-    TipRelief,
-    check_form,
-    roll_at,
 )
 
 __all__ = [
@@ -132,14 +123,17 @@ def with_value(case: Case, key: str, value: object) -> Case:
     except CaseError as error:
         error.key, error.file = key, case.name or None
         raise
+    said: tuple[str, ...] = ()
     try:
-        return _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
+        changed = _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
     except CaseError as error:
         if key.startswith("housing") or not (notice := without_uncomputed(data, error)):
             raise
-    text = tomlfile.write(data)
-    changed = _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
-    changed._notices += (notice,)
+        said, text = (notice,), tomlfile.write(data)
+        changed = _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
+    changed._notices += said
+    kept = {k: file for k, file in case.profile_files.items() if not (k.startswith(key) or key.startswith(k))}
+    changed._profile_files = kept
     return changed
 
 
@@ -185,7 +179,8 @@ def planetary_set(case: Case) -> PlanetarySet:
     Raises
     ------
     GeometryError
-        What cannot be made, assembled or run (see `femgear.gears.checks.check_set`), with file and line.
+        What cannot be made, assembled or run (see `femgear.gears.checks.check_set`), and members that float
+        without being held (E-MECHANISM), with file and line.
     """
     ring = case.ring
     cutter = None
@@ -202,6 +197,7 @@ def planetary_set(case: Case) -> PlanetarySet:
             find=tuple(name for name, shift in left_open if shift is None),
         )
         check_set(closed)
+        check_floating(case, closed)
     except GeometryError as error:
         in_terms_of_the_case(error, case)
         raise
@@ -247,8 +243,8 @@ def set_deviations(case: Case) -> SetDeviations:
     Raises
     ------
     GeometryError
-        Modifications that the flanks cannot have (E-MODIFICATION), with file and line, and what
-        `planetary_set` refuses.
+        Modifications that the flanks cannot have (E-MODIFICATION, E-DEVIATION), with file and line, and
+        what `planetary_set` refuses.
     """
     s = planetary_set(case)
     planets = [_planet_errors(case, n) for n in range(1, s.n_planets + 1)]
@@ -258,10 +254,10 @@ def set_deviations(case: Case) -> SetDeviations:
         pins[pin.planet - 1] = pin.radial, pin.tangential
     found = replace(
         no_deviations(s),
-        sun=_form(case, s.sun),
-        planet_sun_side=_form(case, s.planet, "sun side"),
-        planet_ring_side=_form(case, s.planet, "ring side"),
-        ring=_form(case, s.ring),
+        sun=flank_form(case, s.sun),
+        planet_sun_side=flank_form(case, s.planet, "sun side"),
+        planet_ring_side=flank_form(case, s.planet, "ring side"),
+        ring=flank_form(case, s.ring),
         # a tooth that stands further on brings its left flank nearer to the mate, its right flank away
         sun_pitch=-_pitch(case.sun.errors, s.sun),
         planet_pitch=[-displaced for displaced in pitch],
@@ -277,50 +273,12 @@ def set_deviations(case: Case) -> SetDeviations:
         planet_thickness=[_thickness(errors) for errors in planets],
         ring_thickness=_thickness(case.ring.errors),
     )
-    check_deviations(found, s)
+    try:
+        check_deviations(found, s)
+    except GeometryError as error:
+        error.file = case.location(error.key or "")
+        raise
     return found
-
-
-def _form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
-    """Form of a flank of a gear; planets have one on the side of the sun and one on that of the ring."""
-    found = []
-    for i, section in enumerate(getattr(case, gear.name).modifications):
-        if getattr(section, "flank", "both") not in (side, "both"):
-            continue
-        try:
-            found.append(_modification(section, gear))
-            check_form(FlankForm((found[-1],)), gear)
-        except GeometryError as error:
-            error.key = f"{gear.name}.modifications[{i}]"
-            error.file = case.location(error.key)
-            raise
-    return FlankForm(tuple(found))
-
-
-def _modification(section: ModificationSection, gear: Gear) -> Modification:
-    if section.kind == "measured profile":
-        angles, diameters = section.roll_angles or (), section.diameters or ()
-        rolls = [roll_at(gear, roll_angle=a) for a in angles] + [roll_at(gear, diameter=d) for d in diameters]
-        points = sorted(zip(rolls, section.deviations, strict=True))
-        return MeasuredProfile(tuple(r for r, _ in points), tuple(-e for _, e in points))
-    start, end = (
-        roll_at(
-            gear,
-            diameter=getattr(section, f"{name}_diameter"),
-            roll_angle=getattr(section, f"{name}_roll_angle"),
-            length=getattr(section, f"{name}_roll_length"),
-        )
-        for name in ("start", "end")
-    )
-    match section.kind:
-        case "tip relief":
-            return TipRelief(section.amount, start, end, section.exponent)
-        case "root relief":
-            return RootRelief(section.amount, start, end, section.exponent)
-        case "profile slope":
-            return ProfileSlope(section.amount, start, end)
-        case _:
-            return ProfileCrowning(section.amount, start, end)
 
 
 def _planet_errors(case: Case, number: int) -> GearErrors | None:
@@ -372,7 +330,8 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
             file=name,
         )
     lines = text if numbered else ""
-    if embed_profiles(data, name):
+    files = embed_profiles(data, name)
+    if files:
         text = tomlfile.write(data)
         if len(text.encode()) > tomlfile.MAX_BYTES:
             raise CaseError(
@@ -390,5 +349,6 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     problems = cross_check(case)
     if problems:
         raise combine(problems, lines, name)
-    case._source, case._lines, case._name, case._notices = text, lines, name, notices(data)
+    case._source, case._lines, case._name, case._profile_files = text, lines, name, files
+    case._notices = (*notices(data), *added_material(case))
     return case

@@ -37,7 +37,7 @@ def write_figures(
     data : dict of str to Dataset
         Contents of static.nc, stress.nc, modes.nc, dynamics.nc and housing.nc, as far as computed.
     deviations : SetDeviations, optional
-        Charted when they are not zero.
+        Profiles and pitches are charted where there are any.
 
     Returns
     -------
@@ -70,14 +70,23 @@ def write_figures(
             figures[f"housing_signal_{name}"] = plots.housing_signal(housing, speed_index=s, ring_teeth=teeth)
             figures[f"order_spectrum_{name}"] = plots.order_spectrum(housing, speed_index=s, ring_teeth=teeth)
             figures[f"modulation_{name}"] = plots.modulation_polar(housing, speed_index=s, ring_teeth=teeth)
-    if deviations is not None and not deviations.ideal:
-        from femgear.plots.deviations import pitch_chart, profile_chart
-
-        figures["profile_deviations"] = profile_chart(deviations, gears)
-        figures["pitch_deviations"] = pitch_chart(deviations, gears)
+    if deviations is not None:
+        figures |= _deviation_figures(deviations, gears)
     for name, figure in figures.items():
         plots.save_figure(figure, folder / f"{name}.png")
     return [f"{name}.png" for name in figures]
+
+
+def _deviation_figures(deviations: SetDeviations, gears: PlanetarySet) -> dict:
+    """Charts of profiles and pitches; none of a kind that the set does not have."""
+    from femgear.plots import deviations as plots
+
+    figures = {}
+    if plots.has_profiles(deviations, gears):
+        figures["profile_deviations"] = plots.profile_chart(deviations, gears)
+    if plots.has_pitches(deviations):
+        figures["pitch_deviations"] = plots.pitch_chart(deviations, gears)
+    return figures
 
 
 def _stress_figures(stress: xr.Dataset) -> dict:

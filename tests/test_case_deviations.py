@@ -16,6 +16,7 @@ from femgear.gears.modifications import (
     TipRelief,
     form_deviation,
 )
+from femgear.summary import warnings_of
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -272,3 +273,85 @@ def test_all_mistakes_at_once():
         "sun.modifications[0].amount",
         "sun.errors.runout_amplitude",
     ]
+
+
+# --- what no single entry shows -----------------------------------------------------------------------
+
+
+def line_of(extra: str, text: str) -> int:
+    return (TEXT + extra).splitlines().index(text) + 1
+
+
+def test_modifications_of_a_flank_are_limited_in_sum():
+    """20 x 0.28 mm on a module of 1.5 mm: every entry is below 0.2 modules, the tip would lose 5.6 mm."""
+    extra = RELIEF.replace("12 um", "280 um") * 20
+    error = refused(extra, GeometryError)
+    assert (error.code, error.key, error.value) == ("E-DEVIATION", "sun.modifications", "5600 um")
+    assert error.file == f"case.toml:{line_of(extra, '[[sun.modifications]]')}"
+    assert "20 modifications together take off 5600 um" in str(error) and "300 um" in error.limit
+    # what one adds the other may take off, and what stands on different ends of a flank does not add up
+    slope = '\n[[sun.modifications]]\nkind = "profile slope"\namount = "250 um"\n'
+    root = RELIEF.replace("tip relief", "root relief").replace("12 um", "280 um").replace("43.5", "42")
+    tip = RELIEF.replace("12 um", "280 um")
+    for fine in (tip + slope, tip + root):
+        d, gears = set_deviations(case_of(fine)), planetary_set(case_of(fine))
+        roll = np.linspace(gears.sun.form_roll, gears.sun.tip_roll, 5001)
+        assert np.abs(form_deviation(d.sun, gears.sun, roll)).max() <= 300 * UM
+    assert refused(tip + tip, GeometryError).value == "560 um"
+
+
+def test_the_sum_is_that_of_each_flank_of_the_planets():
+    relief = RELIEF.replace("sun", "planet").replace("12 um", "200 um").replace("43.5 mm", "61.5 mm")
+    sides = [relief + f'flank = "{side} side"\n' for side in ("sun", "ring")]
+    assert len(set_deviations(case_of("".join(sides))).planet_sun_side.modifications) == 1
+    error = refused(sides[1] * 2, GeometryError)
+    assert "planet, ring side: 2 modifications" in str(error) and error.key == "planet.modifications"
+
+
+def test_a_relief_that_goes_on_beyond_its_end_is_limited_too():
+    extra = RELIEF.replace("12 um", "250 um") + 'end_diameter = "43.9 mm"\n'
+    error = refused(extra, GeometryError)
+    assert error.code == "E-DEVIATION" and "goes on beyond its end" in str(error)
+
+
+@pytest.mark.parametrize("kind", ["tip relief", "root relief", "profile crowning"])
+def test_negative_amounts_of_reliefs_are_a_warning(kind):
+    start = "" if kind == "profile crowning" else 'start_diameter = "43.5 mm"\n'
+    extra = f'\n[[sun.modifications]]\nkind = "{kind}"\namount = "-12 um"\n{start}'
+    case = case_of(RELIEF + extra)
+    found = [text for text in warnings_of(case, planetary_set(case)) if "W-RELIEF-SIGN" in text]
+    assert len(found) == 1 and "sun.modifications[1].amount" in found[0] and "-12 um" in found[0]
+    assert not with_value(case, "sun.modifications[1].amount", "12 um").notices
+    slope = RELIEF.replace("tip relief", "profile slope").replace("12 um", "-12 um")
+    assert not case_of(slope).notices
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "teeth"),
+    [
+        ("[sun.errors]", "sun.errors.pitch", 27),
+        ("[planet.errors]", "planet.errors.pitch", 40),
+        ("[[planet.individual]]\nplanet = 2", "planet.individual[0].pitch", 40),
+    ],
+)
+def test_single_pitches_are_limited_in_sum(table, key, teeth):
+    """One half of the pitches 0.29 mm too long, the other too short: no entry is above 0.2 modules."""
+    half = teeth // 2
+    values = [290.0] * half + [0.0] * (teeth % 2) + [-290.0] * half
+    extra = f"\n{table}\npitch = {texts(values)}\n"
+    error = refused(extra)
+    assert (error.code, error.key) == ("E-RANGE", key)
+    assert error.file == f"case.toml:{line_of(extra, f'pitch = {texts(values)}')}"
+    # tooth 0 stays: the pitches of teeth 1 to half - 1 add up
+    assert f"{290 * (half - 1)} um at tooth {half - 1}" in str(error) and "300 um" in error.limit
+    assert "metres" not in str(error)
+
+
+def test_single_pitches_up_to_the_limit_are_taken():
+    """The tooth that stands furthest off is that of the separations, projected on the base circle."""
+    values = [0.0, 145.0, 145.0, -145.0, -145.0] + [0.0] * 22
+    d = set_deviations(case_of(f"\n[sun.errors]\npitch = {texts(values)}\n"))
+    assert -d.sun_pitch.min() == pytest.approx(290 * UM * math.cos(math.radians(20)), rel=1e-12)
+    values[1] = 160.0
+    values[3] = -160.0
+    assert "305 um at tooth 2" in str(refused(f"\n[sun.errors]\npitch = {texts(values)}\n"))

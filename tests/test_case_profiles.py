@@ -8,8 +8,9 @@ import pytest
 
 from femgear.case import parse_case, planetary_set, read_case, set_deviations, to_toml, with_value
 from femgear.casefile.profiles import read_profile
-from femgear.errors import CaseError
+from femgear.errors import CaseError, GeometryError
 from femgear.gears.modifications import MeasuredProfile
+from femgear.summary import warnings_of
 
 TEXT = (Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")
 UM = 1e-6
@@ -142,3 +143,46 @@ def test_points_in_the_case_itself():
     (profile,) = set_deviations(case).ring.modifications
     assert np.hypot(profile.roll, planetary_set(case).ring.base_radius) == pytest.approx([0.08, 0.0815])
     assert profile.removed == pytest.approx([-2 * UM, 1 * UM])
+
+
+BESIDE = "roll angle [deg], deviation [um]\n100, 1\n150, -2\n200, 1\n"
+
+
+def test_a_profile_beside_the_flank_is_refused_with_its_file_and_both_ranges(folder):
+    """The flank of the sun spans roll angles of 13 to 36 deg: nothing of the profile would be used."""
+    path = folder(BESIDE)
+    case = read_case(path)
+    gear = planetary_set(case).sun
+    ends = [math.degrees(roll / gear.base_radius) for roll in (gear.form_roll, gear.tip_roll)]
+    with pytest.raises(GeometryError, match=r"data/left\.csv") as info:
+        set_deviations(case)
+    error = info.value
+    line = path.read_text().splitlines().index("[[sun.modifications]]") + 1
+    assert (error.code, error.key) == ("E-MODIFICATION", "sun.modifications[0]")
+    assert error.file == f"{path}:{line}"
+    assert "roll angles 100 to 200 deg" in error.value
+    assert "roll angles {:.4g} to {:.4g} deg".format(*ends) in error.limit
+    # the name stays with the case, as long as the profile does
+    with pytest.raises(GeometryError, match=r"data/left\.csv"):
+        set_deviations(with_value(case, "operation.torque", "50 N m"))
+    with pytest.raises(GeometryError, match="no part of the measured profile lies"):
+        set_deviations(parse_case(to_toml(case)))
+    assert with_value(case, "sun.modifications", None).profile_files == {}
+
+
+def test_a_profile_that_meets_the_flank_is_taken(folder):
+    """Two points on either side of the flank span it; the ring's roll lengths fall towards the tip."""
+    profile, _ = measured(folder("roll angle [deg], deviation [um]\n5, 1\n60, 2\n"))
+    assert len(profile.roll) == 2
+    ring = MEASURED.replace("sun", "ring")
+    with pytest.raises(GeometryError, match="ring: no part of"):
+        set_deviations(read_case(folder(BESIDE, ring)))
+
+
+def test_little_of_the_flank_is_a_warning(folder):
+    """A measured profile is constant beyond its points: most of this flank is not what was measured."""
+    case = read_case(folder("roll angle [deg], deviation [um]\n34, 1\n35, 2\n60, 3\n"))
+    found = [text for text in warnings_of(case, planetary_set(case)) if "W-PROFILE" in text]
+    assert len(found) == 1 and "roll angles 34 to 60 deg" in found[0] and "sun.modifications" in found[0]
+    case = read_case(folder(GOOD))
+    assert not [text for text in warnings_of(case, planetary_set(case)) if "W-PROFILE" in text]

@@ -10,8 +10,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from femgear.gears import Gear, close_set, equal_planet_angles
 from femgear.gears.deviations import FlankForm, no_deviations
 from femgear.gears.modifications import MeasuredProfile, ProfileSlope, TipRelief
+from femgear.pictures import write_figures
 from femgear.plots import png_bytes
-from femgear.plots.deviations import active_rolls, pitch_chart, profile_chart
+from femgear.plots.deviations import active_rolls, has_pitches, has_profiles, pitch_chart, profile_chart
 
 ALPHA = math.radians(20.0)
 UM = 1e-6
@@ -96,3 +97,18 @@ def test_axes_say_their_units_and_nothing_is_drawn_twice(gears, deviations, char
         texts = [text.get_text() for text in figure.legends[0].get_texts()]
         assert len(texts) == len(set(texts))
     assert png_bytes(chart(deviations, gears))[:4] == b"\x89PNG"
+
+
+def test_charts_are_left_out_where_there_is_nothing_of_their_kind(gears, deviations, tmp_path):
+    ideal = no_deviations(gears)
+    pins = replace(ideal, pin_errors=np.full((3, 2), 5 * UM))
+    forms = replace(deviations, sun_pitch=np.zeros(27))
+    pitches = replace(pins, ring_pitch=deviations.sun_pitch[0] + UM * np.arange(108))
+    none = replace(ideal, sun=FlankForm((ProfileSlope(0.0),)))
+    both = ["profile_deviations.png", "pitch_deviations.png"]
+    for d, names in ((pins, []), (none, []), (forms, both[:1]), (pitches, both[1:]), (deviations, both)):
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        folder.mkdir()
+        assert write_figures(folder, gears, {}, deviations=d) == names
+        assert sorted(path.name for path in folder.iterdir()) == sorted(names)
+        assert [has_profiles(d, gears), has_pitches(d)] == [name in names for name in both]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from femgear.contact.root_stress import RootCycle
@@ -84,10 +85,12 @@ def test_figures_are_drawn_with_units(stress):
 
 def test_figures_show_the_numbers(stress):
     history = root_stress_history(stress)
-    for ax, (mesh, gear) in zip(history.axes, ((0, 0), (0, 1), (2, 0), (2, 1)), strict=True):
+    for ax, (mesh, gear) in zip(history.axes, ((1, 0), (1, 1), (3, 0), (3, 1)), strict=True):
         drawn = ax.lines[0].get_ydata().max()
         assert drawn == pytest.approx(1e-6 * float(stress.root_tension[mesh, gear].max()))
         assert f"{drawn:.3g}" in ax.get_title(loc="left")
+    # the second planet carries more
+    assert history.axes[1].get_title(loc="left").startswith("planet 2, sun side")
     profile = root_stress_profile(stress)
     assert [len(ax.lines[0].get_xdata()) for ax in profile.axes] == [14] * 4
     # the critical sections: 30 deg and, on the ring, 60 deg between slopes of 0.1 and 1.5 rad
@@ -181,3 +184,39 @@ def test_new_figures_hide_nothing(whole):
         legend = figure.legends[0].get_window_extent(canvas.renderer)
         assert all(not legend.overlaps(ax.get_tightbbox(canvas.renderer)) for ax in figure.axes)
         assert all("[" in ax.get_ylabel() + ax.get_xlabel() for ax in figure.axes[-2:])
+
+
+def test_the_planet_that_carries_is_shown_and_named(whole):
+    """Planet 1 carries nothing, as when its pin stands back: figures of planet 2, not empty ones."""
+    loaded = np.array([0.0, 1.0, 0.0, 1.0])
+    spans = (
+        "contact_pressure",
+        "pressure_distribution",
+        "load_time_share",
+        "load_cycle_share",
+        "load_cycles",
+    )
+    names = (*spans, "root_tension", "root_compression")
+    case = whole.assign({name: whole[name] * xr.DataArray(loaded, dims="mesh") for name in names})
+    figure = contact_pressure(case)
+    for ax, mesh in zip(figure.axes[:2], ("sun-planet 2", "planet 2-ring"), strict=True):
+        assert ax.get_title(loc="left").startswith(mesh)
+        assert ax.lines[0].get_ydata().max() == pytest.approx(1e-6 * float(whole.pressure_distribution.max()))
+    for ax, mesh in zip(load_spectrum(case).axes, ("sun-planet 2", "planet 2-ring"), strict=True):
+        assert ax.get_title(loc="left").startswith(mesh)
+        assert ax.patches[0].get_data().values.max() == 75.0
+    for figure in (root_stress_history(case), root_stress_profile(case)):
+        assert figure.axes[1].get_title(loc="left").startswith("planet 2")
+    higher = xr.DataArray([1.0, 1.0, 1.0, 1.1], dims="mesh")
+    more = whole.assign(contact_pressure=whole.contact_pressure * higher)
+    assert contact_pressure(more).axes[0].get_title(loc="left").startswith("sun-planet 2")
+    # the first planet never reaches the highest load class
+    often = whole.load_time_share.values.copy()
+    often[[0, 2]] = np.eye(BINS)[4]
+    shown = load_spectrum(whole.assign(load_time_share=(("mesh", "load_bin"), often)))
+    assert shown.axes[0].get_title(loc="left").startswith("sun-planet 2")
+
+
+def test_a_set_without_any_load_shows_the_first_planet(whole):
+    case = whole.assign({name: 0.0 * whole[name] for name in ("contact_pressure", "pressure_distribution")})
+    assert contact_pressure(case).axes[0].get_title(loc="left").startswith("sun-planet 1")

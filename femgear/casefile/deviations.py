@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
@@ -170,6 +170,7 @@ class PinError(_Section):
 
 def check_deviation_sections(case: Case):
     """What no entry shows alone: amounts against the module, numbers of teeth and planets."""
+    most = LARGEST_DEVIATION * case.sun.module
     yield from _check_planets(case)
     for name in ("sun", "planet", "ring"):
         gear = getattr(case, name)
@@ -177,8 +178,7 @@ def check_deviation_sections(case: Case):
         if name == "planet":
             tables += [(f"planet.individual[{i}]", one) for i, one in enumerate(gear.individual)]
         for key, table in tables:
-            yield from _check_pitch(key, table, gear.teeth)
-    most = LARGEST_DEVIATION * case.sun.module
+            yield from _check_pitch(key, table, gear.teeth, most)
     for key, value in _amounts(case):
         if abs(value) > most:
             yield CaseError(
@@ -216,7 +216,7 @@ ROUNDING = 0.05e-6
 """What the sum of the pitch deviations may miss zero by for every tooth [m]: tenths of micrometres."""
 
 
-def _check_pitch(key: str, table: GearErrors, teeth: int):
+def _check_pitch(key: str, table: GearErrors, teeth: int, most: float):
     for name in ("pitch", "cumulative_pitch"):
         values = getattr(table, name)
         if values is not None and len(values) != teeth:
@@ -234,6 +234,24 @@ def _check_pitch(key: str, table: GearErrors, teeth: int):
             key=f"{key}.pitch",
             limit=f"{ROUNDING * teeth * 1e6:.6g} um from rounding",
             remedy="subtract their mean, or give cumulative_pitch",
+        )
+    elif table.pitch:
+        yield from _check_cumulative(f"{key}.pitch", table.pitch, most)
+
+
+def _check_cumulative(key: str, pitch: tuple[float, ...], most: float):
+    """Single pitches, each of them plausible, may still carry a tooth far away."""
+    mean = math.fsum(pitch) / len(pitch)
+    cumulative = list(accumulate(value - mean for value in pitch[1:]))
+    largest = _largest(tuple(cumulative))
+    if abs(largest) > most:
+        yield CaseError(
+            f"the single pitch deviations add up to {largest * 1e6:.6g} um at tooth "
+            f"{cumulative.index(largest) + 1}",
+            code="E-RANGE",
+            key=key,
+            limit=f"cumulative deviations of at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um",
+            remedy="check signs, order and unit of the list; it holds deviations from tooth to tooth",
         )
 
 

@@ -61,6 +61,25 @@ def _shift_left_out(error: GeometryError, case: Case) -> None:
     error.value, error.remedy = given, remedy
 
 
+def added_material(case: Case) -> tuple[str, ...]:
+    """Warnings of reliefs and crownings with a negative amount: most are slips of the sign.
+
+    Parameters
+    ----------
+    case : Case
+    """
+    found = []
+    for gear in ("sun", "planet", "ring"):
+        for i, one in enumerate(getattr(case, gear).modifications):
+            if one.kind in ("tip relief", "root relief", "profile crowning") and one.amount < 0.0:
+                found.append(
+                    f"[W-RELIEF-SIGN] {gear}.modifications[{i}].amount: a {one.kind} of "
+                    f"{one.amount * 1e6:.6g} um adds material; a positive amount takes it off (usual: 0 um "
+                    "or above)"
+                )
+    return tuple(found)
+
+
 def notices(data: dict) -> tuple[str, ...]:
     """Remarks on what was read in a way that deserves to be said.
 

@@ -18,7 +18,7 @@ _COLUMNS = {"roll angle": "roll_angles", "diameter": "diameters", "deviation": "
 _REMEDY = "the first line names two columns: roll angle [deg] or diameter [mm], and deviation [um]"
 
 
-def embed_profiles(data: dict, name: str) -> bool:
+def embed_profiles(data: dict, name: str) -> dict[str, str]:
     """Put the points of every ``file`` of a measured profile in its place.
 
     Parameters
@@ -30,15 +30,15 @@ def embed_profiles(data: dict, name: str) -> bool:
 
     Returns
     -------
-    bool
-        Whether there was any.
+    dict of str to str
+        The files by the key of their modification, such as ``"sun.modifications[0]"``.
 
     Raises
     ------
     CaseError
         As `read_profile`, or a path that leads out of the folder (E-FILE).
     """
-    found = False
+    found = {}
     for gear in ("sun", "planet", "ring"):
         section = data.get(gear)
         tables = section.get("modifications") if isinstance(section, dict) else None
@@ -47,9 +47,10 @@ def embed_profiles(data: dict, name: str) -> bool:
                 continue
             if table.get("kind") != "measured profile" or "deviations" in table:
                 continue
-            key = f"{gear}.modifications[{i}].file"
-            table.update(_points(table.pop("file"), name, key))
-            found = True
+            key = f"{gear}.modifications[{i}]"
+            file = table.pop("file")
+            table.update(_points(file, name, f"{key}.file"))
+            found[key] = tomlfile.printable(file)
     return found
 
 

@@ -256,6 +256,7 @@ class Case(_Section):
     _lines: str = PrivateAttr(default="")
     _name: str = PrivateAttr(default="")
     _notices: tuple[str, ...] = PrivateAttr(default=())
+    _profile_files: dict[str, str] = PrivateAttr(default_factory=dict)
 
     def __eq__(self, other: object) -> bool:
         """Whether the values agree, from whatever text they came."""
@@ -276,6 +277,11 @@ class Case(_Section):
         found = (line_of(self._lines, name) for name in (key, key.partition(".")[2]) if name)
         line = next((number for number in found if number), None)
         return f"{self._name}:{line}" if self._name and line else self._name or None
+
+    @property
+    def profile_files(self) -> dict[str, str]:
+        """Files of measured profiles, by the key of their modification."""
+        return self._profile_files
 
     @property
     def notices(self) -> tuple[str, ...]:

@@ -131,7 +131,26 @@ def force_directions(planetary_set: PlanetarySet, *, back: bool = False) -> tupl
 def moving_members(
     planetary_set: PlanetarySet, supports: Supports, *, both_flanks: bool = False
 ) -> MovingMembers:
-    """The motions that the supports allow, each with its effect on every mesh."""
+    """The motions that the supports allow, each with its effect on every mesh.
+
+    Raises
+    ------
+    ContactError
+        E-MECHANISM: members float that the planets cannot hold.
+    """
+    from femgear.gears.floating import unheld_members
+
+    floating = [name for name in ("sun", "carrier", "ring") if getattr(supports, name) == 0.0]
+    loose = unheld_members(planetary_set, floating, both_flanks=both_flanks)
+    if loose:
+        planets = planetary_set.n_planets
+        raise ContactError(
+            f"{planets} planet{'s' * (planets > 1)} cannot hold a floating {' and '.join(loose)}",
+            code="E-MECHANISM",
+            value="0 N/m",
+            limit="above 0 N/m where the forces of the planets do not balance in every direction",
+            remedy=f"give Supports.{loose[-1]} a stiffness [N/m], or None for a rigid support",
+        )
     sides = [_one_side(planetary_set, supports, back) for back in (False, True)[: 1 + both_flanks]]
     names, _, stiffness = sides[0]
     return MovingMembers(names, np.vstack([approach for _, approach, _ in sides]), stiffness)

@@ -8,12 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.deviations import body_separation, common_period, profile_separation
+from femgear.gears.deviations import (
+    FlankForm,
+    body_separation,
+    common_period,
+    form_deviation,
+    profile_separation,
+)
 from femgear.gears.limits import GeometryWarning
-from femgear.gears.modifications import LARGEST_DEVIATION, check_form
+from femgear.gears.modifications import LARGEST_DEVIATION, MeasuredProfile, check_form, modification_range
 
 if TYPE_CHECKING:
     from femgear.gears.deviations import SetDeviations
+    from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
 
 
@@ -28,25 +35,30 @@ def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> 
     Returns
     -------
     tuple of GeometryWarning
-        W-WEDGING: the deviations may use up the play, so that both flanks carry.
+        W-WEDGING: the deviations may use up the play, so that both flanks carry. W-PROFILE: a measured
+        profile covers less than half of its flank.
 
     Raises
     ------
     GeometryError
         E-DEVIATION (arrays of another length than the teeth or planets, numbers that are not finite or
-        exceed 0.2 modules), E-MODIFICATION (see `modifications.check_form`).
+        exceed 0.2 modules, modifications of a flank that do so together), E-MODIFICATION (see
+        `modifications.check_form`).
     """
     d, s = deviations, planetary_set
     _check_lengths(d, s)
     _check_amounts(d, s.sun.module)
-    for form, gear in (
-        (d.sun, s.sun),
-        (d.planet_sun_side, s.planet),
-        (d.planet_ring_side, s.planet),
-        (d.ring, s.ring),
+    found: list[GeometryWarning] = []
+    for flank, form, gear in (
+        ("sun", d.sun, s.sun),
+        ("planet, sun side", d.planet_sun_side, s.planet),
+        ("planet, ring side", d.planet_ring_side, s.planet),
+        ("ring", d.ring, s.ring),
     ):
         check_form(form, gear)
-    return tuple(_wedging(d, s))
+        _check_sum(flank, form, gear)
+        found += _short_profiles(flank, form, gear)
+    return (*found, *_wedging(d, s))
 
 
 LONGEST_SEARCH = 4096
@@ -94,6 +106,31 @@ def _thickest(d: SetDeviations, s: PlanetarySet, kind: int, *, back: bool) -> fl
     gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
     rolls = [np.linspace(gear.form_roll, gear.tip_roll, 101) for gear in gears]
     return float(profile_separation(d, s, kind, rolls[0][:, None], rolls[1][None, :], back=back).min())
+
+
+LEAST_COVERAGE = 0.5
+"""Part of a flank that a measured profile should cover; beyond its ends it is constant."""
+
+
+def _short_profiles(flank: str, form: FlankForm, gear: Gear):
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    for profile in form.modifications:
+        if not isinstance(profile, MeasuredProfile):
+            continue
+        start, end = profile.roll[0], profile.roll[-1]
+        covered = max(min(end, high) - max(start, low), 0.0) / (high - low)
+        if covered < LEAST_COVERAGE:
+            angles = [math.degrees(roll / gear.base_radius) for roll in (start, end, low, high)]
+            yield GeometryWarning(
+                "W-PROFILE",
+                f"{gear.name}.modifications",
+                "{}: a measured profile over roll angles {:.4g} to {:.4g} deg covers {:.0f} % of the flank, "
+                "{:.4g} to {:.4g} deg; beyond its ends it is constant".format(
+                    flank, *angles[:2], 100 * covered, *angles[2:]
+                ),
+                covered,
+                f"{100 * LEAST_COVERAGE:.0f} % or more",
+            )
 
 
 def _wedging(d: SetDeviations, s: PlanetarySet):
@@ -154,6 +191,38 @@ def _check_amounts(d: SetDeviations, module: float) -> None:
         if not largest <= most:
             limit = f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.1f} um"
             _refuse(f"{name} of {largest * 1e6:.6g} um is not plausible", name, limit)
+
+
+def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
+    """Refuse modifications, each of them plausible, that together are not."""
+    most = LARGEST_DEVIATION * gear.module
+    rolls = [np.linspace(gear.form_roll, gear.tip_roll, 1001)]
+    # laws are monotonic or parabolas between their ends, profiles straight between their points
+    rolls += [
+        m.roll if isinstance(m, MeasuredProfile) else modification_range(m, gear) for m in form.modifications
+    ]
+    roll = np.concatenate(rolls)
+    removed = form_deviation(form, gear, roll)
+    i = int(np.abs(removed).argmax())
+    if abs(removed[i]) <= most * (1.0 + 1e-9):
+        return
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    angle = math.degrees(min(max(roll[i], low), high) / gear.base_radius)
+    found = f"{abs(removed[i]) * 1e6:.6g} um at a roll angle of {angle:.4g} deg"
+    count, verb = len(form.modifications), "take off" if removed[i] > 0 else "add"
+    message = f"{count} modifications together {verb} {found}"
+    remedy = "check the units, and whether a section stands there twice"
+    if count == 1:
+        message = f"the modification goes on beyond its end and reaches {found}"
+        remedy = "let it end nearer to the end of the flank"
+    raise GeometryError(
+        f"{flank}: {message}",
+        code="E-DEVIATION",
+        key=f"{gear.name}.modifications",
+        value=f"{removed[i] * 1e6:.6g} um",
+        limit=f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um, at every place of the flank",
+        remedy=remedy,
+    )
 
 
 def _refuse(message: str, key: str, limit: str):

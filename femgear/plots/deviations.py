@@ -17,6 +17,19 @@ if TYPE_CHECKING:
     from femgear.gears.deviations import SetDeviations
 
 
+def has_profiles(deviations: SetDeviations, planetary_set: PlanetarySet) -> bool:
+    """Whether any loaded flank differs from its involute, so that `profile_chart` shows something."""
+    d, s = deviations, planetary_set
+    forms = ((d.sun, s.sun), (d.planet_sun_side, s.planet), (d.planet_ring_side, s.planet), (d.ring, s.ring))
+    return any(form_deviation(form, gear, _stations(form, gear)).any() for form, gear in forms)
+
+
+def has_pitches(deviations: SetDeviations) -> bool:
+    """Whether any tooth stands off its place, so that `pitch_chart` shows something."""
+    d = deviations
+    return any(p.any() for p in (d.sun_pitch, d.planet_pitch, d.planet_ring_side_pitch, d.ring_pitch))
+
+
 def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
     """Profiles of the four kinds of loaded flanks over the roll angle, positive with more material.
 

@@ -19,7 +19,7 @@ KINDS = ("sun-planet", "planet-ring")
 
 
 def root_stress_history(stress: xr.Dataset) -> Figure:
-    """Root stresses of one tooth of every gear from mesh to mesh, for the meshes of the first planet.
+    """Root stresses of one tooth of every gear from mesh to mesh, on the planet with the largest tension.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
 
 
 def root_stress_profile(stress: xr.Dataset) -> Figure:
-    """Stress along both roots of a tooth when its tension is largest, for the meshes of the first planet.
+    """Stress along both roots of a tooth when its tension is largest, on the planet where that is largest.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
 
 
 def contact_pressure(stress: xr.Dataset) -> Figure:
-    """Contact pressure of one tooth pair over its path, for one mesh of each kind.
+    """Contact pressure of one tooth pair over its path, for both meshes of the planet with the largest.
 
     Parameters
     ----------
@@ -100,8 +100,11 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
     """
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6)
     top = float(stress["contact_pressure"].max()) * 1e-6 or 1.0
+    # at the end of a flank the pressure grows as cells shrink: it only decides where there is no other
+    edge = stress["pressure_distribution"].max(("pair", "cell", "position")).values
+    planet = _worst_planet(stress, stress["contact_pressure"].max("position").values, edge)
     for upper, lower, kind in zip(axes[:2], axes[2:], KINDS):
-        row = _first(stress, kind)
+        row = _mesh_of(stress, kind, planet)
         path, place, pressure = _along_path(row)
         upper.plot(path, pressure.max(axis=0), color=VERMILION, label="largest pressure")
         _nominal(upper, row, "iso_contact_stress", "σ_H0 of ISO 6336-2")
@@ -145,7 +148,7 @@ def _along_path(row):
 
 
 def load_spectrum(stress: xr.Dataset) -> Figure:
-    """Load spectrum of the teeth of one mesh of each kind.
+    """Load spectrum of the teeth in both meshes of the planet with the largest load.
 
     Parameters
     ----------
@@ -159,8 +162,10 @@ def load_spectrum(stress: xr.Dataset) -> Figure:
     """
     figure, axes = new_figure(columns=2, width=9.5, sharex=True, sharey=True)
     edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
+    time = stress["load_time_share"].values
+    planet = _worst_planet(stress, (edges[1:] * (time > 0.0)).max(axis=1), time @ edges[1:])
     for ax, kind in zip(axes, KINDS):
-        row = _first(stress, kind)
+        row = _mesh_of(stress, kind, planet)
         time, cycles = (100 * row[f"load_{name}_share"].values for name in ("time", "cycle"))
         ax.stairs(time, edges, fill=True, color=BLUE, alpha=0.75, label="share of the time under load")
         ax.stairs(
@@ -201,10 +206,25 @@ def planet_bending(stress: xr.Dataset) -> Figure:
     return figure
 
 
-def _first(stress: xr.Dataset, kind: str) -> xr.Dataset:
-    """The first mesh of a kind."""
+def _mesh_of(stress: xr.Dataset, kind: str, planet: int) -> xr.Dataset:
+    """The mesh of a kind on a planet (from 0)."""
     names = [str(name) for name in stress["mesh"].values]
-    return stress.isel(mesh=next(i for i, name in enumerate(names) if family(name) == kind))
+    return stress.isel(mesh=[i for i, name in enumerate(names) if family(name) == kind][planet])
+
+
+def _worst_planet(stress: xr.Dataset, *measures: np.ndarray) -> int:
+    """Planet (from 0) whose meshes have the largest of a measure (mesh,); the next measure decides ties."""
+    kinds = [family(str(name)) for name in stress["mesh"].values]
+    of_planets = [
+        np.max([measure[[kind == wanted for kind in kinds]] for wanted in KINDS], axis=0)
+        for measure in measures
+    ]
+    left = np.arange(len(of_planets[0]))
+    for values in of_planets:
+        known = np.nan_to_num(values[left])
+        # equal planets differ by rounding
+        left = left[known >= known.max() - 1e-6 * np.abs(known).max()]
+    return int(left[0])
 
 
 def _nominal(ax, row: xr.Dataset, name: str, text: str) -> None:
@@ -215,9 +235,15 @@ def _nominal(ax, row: xr.Dataset, name: str, text: str) -> None:
 
 def _four_gears(stress: xr.Dataset):
     """Title, rows and whether it is internal, of sun, planet on both sides, and ring."""
-    for kind, titles in zip(KINDS, (("sun", "planet, sun side"), ("planet, ring side", "ring"))):
+    tension = stress["root_tension"].max([dim for dim in stress["root_tension"].dims if dim != "mesh"])
+    n = _worst_planet(stress, tension.values)
+    sides = (
+        ("sun", f"planet {n + 1}, sun side"),
+        (f"planet {n + 1}, ring side", "ring"),
+    )
+    for kind, titles in zip(KINDS, sides):
         for gear, title in enumerate(titles):
-            yield title, _first(stress, kind).isel(gear=gear), title == "ring"
+            yield title, _mesh_of(stress, kind, n).isel(gear=gear), title == "ring"
 
 
 def _crossing(slope, arc, angle) -> float | None:

@@ -131,3 +131,13 @@ def test_motions_follow_the_rotation_of_the_set(gears):
 def test_bad_supports_are_refused(bad):
     with pytest.raises(ContactError, match="E-SUPPORT"):
         Supports(**bad)
+
+
+@pytest.mark.parametrize("floating", ["sun", "carrier", "ring"])
+def test_a_floating_member_needs_planets_around_it(gears, bodies, floating):
+    """Two planets 178.7 deg apart: their forces cannot balance, said before the contact is searched."""
+    two = replace(gears, planet_angles=(0.0, 67 * 2 * np.pi / 135))
+    with pytest.raises(ContactError, match=f"2 planets cannot hold a floating {floating}") as info:
+        walk(two, bodies, supports=Supports(**{floating: 0.0}))
+    assert info.value.code == "E-MECHANISM" and f"Supports.{floating}" in info.value.remedy
+    assert walk(two, bodies, supports=Supports(**{floating: 1e6})).force.min() > 0.0
