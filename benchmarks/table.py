@@ -13,8 +13,8 @@ process with one BLAS thread. Times are medians. Seconds depend on the machine a
 column *ratio* divides them by the time of a fixed piece of work measured in the same run: factor a Laplacian
 of 160 x 160 points with SciPy's `splu` and solve for 8 right-hand sides ({baseline:.1f} ms here). *Peak* is
 the resident memory of a fresh process at its highest during the stage, *added* how much of it came with the
-stage; both contain the libraries that the stage loads. *Limit* is the time that the project promises. The groups
-on the 18-dof set are those of `benchmarks/planet_train.py`.
+stage; both contain the libraries that the stage loads. *Limit* is the time that the project promises. The
+groups on the 18-dof set are those of `benchmarks/planet_train.py`.
 
 This page is written by `make bench ARGS="--page docs/benchmarks.md"`.
 
