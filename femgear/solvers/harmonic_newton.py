@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.solvers.harmonic_equations import HarmonicBalance, relative_residual
+from femgear.solvers.harmonic_krylov import MANY, LineTangent, linearised
 from femgear.solvers.periodic import PeriodicSolution
 
 # Shortest step of the line search and the decrease that it asks for (Dennis and Schnabel, 1983, 6.3); full
@@ -19,17 +20,18 @@ _FIRST, _LEAST, _LONGEST, _STEPS = 0.1, 1e-5, 0.5, 400
 def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterations: int) -> PeriodicSolution:
     """Newton's method from the unknowns y with backtracking on the size of the residual."""
     receptance = balance.receptance(frequency)[0]
-    forces, error = _residual(balance, receptance, y)
+    evaluate = linearised if balance.size > MANY else _with_matrix
+    error, tangent = evaluate(balance, receptance, y)
     history, trouble, forced = [relative_residual(error, y, balance.scale)], "", 0
     while not history[-1] <= tolerance and len(history) <= max_iterations:
         try:
-            step = -np.linalg.solve(balance.jacobian(forces, receptance), error)
+            step = -_newton_step(balance, receptance, y, error, tangent)
         except np.linalg.LinAlgError:
             trouble = "the Jacobian is singular"
             break
         share = 1.0
         while share >= _SHORTEST:
-            forces, trial = _residual(balance, receptance, y + share * step)
+            trial, tangent = evaluate(balance, receptance, y + share * step)
             if np.linalg.norm(trial) <= (1.0 - _DECREASE * share) * np.linalg.norm(error):
                 break
             share *= 0.5
@@ -38,7 +40,7 @@ def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterati
             if forced > _FORCED:
                 trouble = "no step along Newton's direction lowers the residual"
                 break
-            forces, trial = _residual(balance, receptance, y + step)
+            trial, tangent = evaluate(balance, receptance, y + step)
         y, error = y + share * step, trial
         history.append(relative_residual(error, y, balance.scale))
     converged, steps = bool(history[-1] <= tolerance), len(history) - 1 + bool(trouble)
@@ -146,6 +148,22 @@ def _residual(balance: HarmonicBalance, receptance, y):
     lines = balance.lines(y)
     forces = balance.forces(lines)
     return forces, balance.unknowns(balance.residual(lines, forces, receptance))
+
+
+def _with_matrix(balance: HarmonicBalance, receptance, y):
+    """Residual (n_y,) at the unknowns y, and what its derivative is made of."""
+    forces, error = _residual(balance, receptance, y)
+    return error, forces
+
+
+def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.ndarray:
+    """``dR/dX^-1 error``: by its products where there are many lines, else, or where they fail, directly."""
+    if isinstance(tangent, LineTangent):
+        step = tangent.solve(error)
+        if step is not None:
+            return step
+        tangent = balance.forces(balance.lines(y))
+    return np.linalg.solve(balance.jacobian(tangent, receptance), error)
 
 
 def _message(converged: bool, steps: int, residual: float, trouble: str, tolerance: float) -> str:
