@@ -16,6 +16,7 @@ import numpy as np
 from femgear.analysis_checks import (
     check_dynamic_case,
     check_motions,
+    check_rim_speed,
     highest_frequency,
     max_nodal_diameter,
     static_warnings,
@@ -228,6 +229,8 @@ def solve_dynamics(
 
     Raises
     ------
+    CaseError
+        A carrier that runs around the ring faster than its waves (E-CRITICAL-SPEED).
     ConvergenceError
     """
     from femgear.gears import speeds
@@ -238,6 +241,7 @@ def solve_dynamics(
     all_speeds = tuple(
         speeds(gears, input=case.operation.input, fixed="ring", speed=s) for s in case.operation.speeds
     )
+    check_rim_speed(modes.ring.modes, [s.carrier for s in all_speeds])
     frequency = np.array([s.mesh_frequency for s in all_speeds])
     response = solve_spectral(
         basis,

@@ -13,6 +13,7 @@ from femgear.errors import CaseError, ContactError
 
 if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
+    from femgear.fe.reduction import CyclicModes
     from femgear.gears import PlanetarySet
 
 # the wavelength of shear in steel at 200 kHz is 16 mm: shorter waves are no matter of plane gear bodies
@@ -93,6 +94,40 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             remedy="run with --only static, or leave pitch errors and runouts out",
         )
     highest_frequency(case, gears)
+
+
+def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
+    """Refuse planets that run around the ring as fast as its waves.
+
+    A load that travels around a ring with the angular speed W meets the resonance of a mode of n nodal
+    diameters where ``n W = 2 pi f_n`` (S. C. Huang and W. Soedel, J. Sound Vib. 115, 1987, 253-274). The
+    model sees the ring from the carrier without the inertia terms of that motion: it holds far below.
+
+    Parameters
+    ----------
+    ring_modes : CyclicModes
+    carrier_speeds : sequence of float
+        [rad/s]
+
+    Raises
+    ------
+    CaseError
+        E-CRITICAL-SPEED: a carrier at or above the lowest ``2 pi f_n / n``.
+    """
+    wave = ring_modes.nodal_diameter > 0
+    critical = 2.0 * np.pi * ring_modes.frequency[wave] / ring_modes.nodal_diameter[wave]
+    lowest, fastest = int(np.argmin(critical)), float(np.max(np.abs(carrier_speeds)))
+    if fastest >= critical[lowest]:
+        rpm = 30.0 / np.pi
+        raise CaseError(
+            f"the carrier turns at {fastest * rpm:.6g} rpm, faster than the wave of "
+            f"{ring_modes.nodal_diameter[wave][lowest]} nodal diameters around the ring",
+            code="E-CRITICAL-SPEED",
+            key="operation.speeds",
+            value=f"{fastest * rpm:.6g} rpm of the carrier",
+            limit=f"below {critical[lowest] * rpm:.6g} rpm of the carrier",
+            remedy="leave the highest speeds out, or stiffen the ring or its foundation",
+        )
 
 
 def check_motions(cycle: MeshCycle, module: float) -> None:
