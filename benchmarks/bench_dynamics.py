@@ -65,7 +65,7 @@ def test_harmonic_balance(benchmark, medians, ratio, tolerance):
 
     benchmark.group = SETTLED.format(ratio)
     harmonics, samples = BALANCE[tolerance]
-    options = {"harmonics": harmonics, "samples": samples, "radius": False}
+    options = {"harmonics": harmonics, "samples": samples, "stability": False}
     found = benchmark.pedantic(
         solve_harmonic_balance, args=(problem(ratio), train.OMEGA), kwargs=options, rounds=21, warmup_rounds=2
     )
@@ -127,7 +127,7 @@ def test_growth_over_degrees_of_freedom(benchmark, medians, links):
     begin = perf_counter()
     reduction = reduce_problem(longer)
     spent = perf_counter() - begin
-    options = {"harmonics": 8, "reduction": reduction, "radius": False}
+    options = {"harmonics": 8, "reduction": reduction, "stability": False}
     found = benchmark.pedantic(
         solve_harmonic_balance, args=(longer, train.OMEGA), kwargs=options, rounds=21, warmup_rounds=2
     )
@@ -159,14 +159,14 @@ def test_branch(benchmark):
     from femgear.solvers.continuation import StepOptions
 
     # the default step needs 70 points for this range
-    options = StepOptions(largest=0.014)
+    options = StepOptions(largest=0.0135)
     limits = tuple(2.0 * np.pi * np.array([7800.0, 6200.0]))
 
     def follow():
         return frequency_response_curve(problem(0.05), limits, harmonics=8, options=options)
 
     found = ask(
-        benchmark, "branch, 6.2 to 7.8 kHz, 8 harmonics, with stability", follow,
+        benchmark, "branch, 6.2 to 7.8 kHz, 8 harmonics, with stability and radius", follow,
         lambda b: f"{len(b.parameter)} points, {len(b.folds)} folds, {np.mean(b.stable):.0%} stable",
         rounds=1, limit=20.0,
     )  # fmt: skip
@@ -194,7 +194,7 @@ def test_two_base_frequencies(benchmark):
     set_, orders = train.two_base_train(0.05), side_bands(2, 8, 2)
     found = ask(
         benchmark, "two base frequencies: weight on the turning carrier",
-        lambda: solve_harmonic_balance(set_, [train.OMEGA / 108.0, train.OMEGA], orders=orders, radius=False),
+        lambda: solve_harmonic_balance(set_, [train.OMEGA / 108.0, train.OMEGA], orders=orders, stability=False),
         lambda s: f"{len(s.orders)} lines, {s.iterations} iterations",
     )  # fmt: skip
     assert found.converged

@@ -35,7 +35,7 @@ def test_extended_harmonic_balance(benchmark, medians, problem, name):
     from femgear.solvers.lines import side_bands
 
     orders = side_bands(*LINES[name])
-    options = {"orders": orders, "reduction": drive_reduction(problem), "radius": False}
+    options = {"orders": orders, "reduction": drive_reduction(problem), "stability": False}
     found = benchmark.pedantic(
         solve_harmonic_balance, args=(problem, frequency()), kwargs=options, rounds=5, warmup_rounds=1
     )

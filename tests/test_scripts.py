@@ -20,7 +20,7 @@ SCRIPTS = (
     "pin_error_load_sharing.py",
 )
 # of published sets, without a case file
-SET_SCRIPTS = ("campbell.py", "gravity_wedging.py", "bearing_clearance.py")
+SET_SCRIPTS = ("campbell.py", "gravity_wedging.py", "bearing_clearance.py", "planet_phasing.py")
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 
 
@@ -100,6 +100,10 @@ def test_help(name, tmp_path):
         ("gravity_wedging.py", ["--lowest", "90", "--highest", "30"], 2, "lowest < highest"),
         ("bearing_clearance.py", ["--clearance=-1 um"], 2, "clearances of 0 or more"),
         ("bearing_clearance.py", ["--points", "1"], 2, "two frequencies"),
+        ("planet_phasing.py", ["--points", "1"], 2, "2 frequencies"),
+        ("planet_phasing.py", ["--angle", "0", "--angle", "100"], 2, "100.800000"),
+        ("planet_phasing.py", ["--distance", "50"], 2, "0 to 30"),
+        ("planet_phasing.py", ["--convention", "other"], 2, "--convention"),
     ],
 )
 def test_bad_input_ends_in_a_message(name, arguments, code, message, tmp_path):
@@ -333,3 +337,32 @@ def test_bearing_clearance(tmp_path):
     back = table(tmp_path / "tooth_contact.csv")
     # 0.6, 1.2 and 1.8 times the play: only the last one wedges
     np.testing.assert_array_equal(back["back flanks in contact [1]"] > 0, [False, False, True] * 2)
+
+
+def test_planet_phasing(tmp_path):
+    done = run("planet_phasing.py", "--points", "300", "--distance", "1", "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "30/20/70, 4 planets at 0, 90, 180, 270 deg" in done.stdout
+    for name in ("phases.png", "resultants.png", "mesh_forces.png"):
+        assert is_png(tmp_path / name)
+    with open(tmp_path / "phasing.csv", newline="", encoding="utf-8") as stream:
+        kinds = [row["phasing"] for row in csv.DictReader(stream)]
+    assert kinds == ["counter-phased", "in-phase"] * 3
+    with open(tmp_path / "mesh_forces.csv", newline="", encoding="utf-8") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["set"].startswith("counter-phased")]
+    force = np.array([[float(row[f"harmonic {h} [N]"]) for h in (1, 3)] for row in rows])
+    hertz = np.array([float(row["frequency [Hz]"]) for row in rows])
+    # Kahraman (1994), case C: first and third harmonic peak at the planet mode of 9840 Hz, 5 % damping
+    assert hertz[force.argmax(axis=0)] == pytest.approx([9840, 9840], abs=100)
+
+
+def test_planet_phasing_of_unequal_planets(tmp_path):
+    angles = [word for value in (0, 75.6, 180, 255.6) for word in ("--angle", str(value))]
+    teeth = ("--sun", "29", "--planet", "21", "--ring", "71", "--points", "20", "--harmonics", "2")
+    done = run("planet_phasing.py", *teeth, *angles, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    # two opposite pairs with an odd sun: no torque at odd harmonics, no lateral force at even ones
+    with open(tmp_path / "phasing.csv", newline="", encoding="utf-8") as stream:
+        first, second = csv.DictReader(stream)
+    assert first["torque, thrust"] == second["lateral force, tilting"] == "0.0000"
+    assert float(first["lateral force, tilting"]) > 0.5 and float(second["torque, thrust"]) > 0.01

@@ -16,7 +16,7 @@ from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.series import FourierSeries
 
 # Samples a line and at least, where a contact opens and closes: one base, several bases.
-_CONTACT_SAMPLES = ((128, 1024), (8, 64))
+_CONTACT_SAMPLES = ((128, 2048), (8, 64))
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
     Products of the lines with polynomials of degree p and with Fourier series of n harmonics are exact with
     ``(p + 1) H + 2 n + 1`` samples, H the highest order along the base. Where contact opens and closes, or a
     coefficient jumps, the error falls with the square of the spacing (with the spacing for a jump): 128 H and
-    at least 1024 samples for one base, 8 H and at least 64 along each of several.
+    at least 2048 samples for one base, 8 H and at least 64 along each of several.
     """
     from scipy.fft import next_fast_len
 

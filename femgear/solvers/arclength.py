@@ -17,8 +17,11 @@ from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, correc
 
 # A loop is closed when it meets its start within this (scaled) distance.
 _CLOSED = 1e-6
-# Steps below this part of the largest one may turn in a corner of the curve.
-_CORNER = 1e-3
+# Steps below this part of the largest one may turn in a corner of the curve; of a larger one than that of
+# a tenth of the scales they are no shorter than gaps between curves.
+_CORNER, _CORNER_LARGEST = 1e-3, 0.1
+# Largest options: the chord is compared with the mean of two tangents, and Newton's method must contract.
+_MOST_ANGLE, _MOST_CONTRACTION = 0.5, 0.25
 
 
 @dataclass(frozen=True)
@@ -30,10 +33,11 @@ class StepOptions:
     first, smallest, largest : float
         Step lengths.
     angle : float
-        Angle between successive tangents that is aimed at [rad]; twice as much is refused.
+        Angle between successive tangents that is aimed at [rad], up to 0.5; twice as much is refused.
     contraction : float
         Ratio of the second to the first Newton step, both with the first derivative, aimed at
-        (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 5.1); it sets the next step.
+        (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 5.1), up to 0.25; it sets the next
+        step.
     tolerance : float
         Last Newton step relative to ``1 + |z|``.
     max_iterations : int
@@ -61,6 +65,14 @@ class StepOptions:
             raise CaseError(
                 "a step option is not positive", code="E-STEP", limit="> 0; two iterations or more"
             )
+        for name, bound in (("angle", _MOST_ANGLE), ("contraction", _MOST_CONTRACTION)):
+            value = getattr(self, name)
+            if not value <= bound:
+                raise CaseError(
+                    f"the step option {name} is {value}", code="E-RANGE", key=name, value=value,
+                    limit=f"up to {bound}: beyond, a jump to another curve may look like a step",
+                    remedy="lengthen the steps by largest instead",
+                )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -110,7 +122,7 @@ def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: Step
             new = _landing(curve, point, h, bounds)
             if new is None:
                 new = correct(curve, point.z + h * point.tangent, point.tangent)
-            corner = h <= _CORNER * options.largest
+            corner = h <= _CORNER * min(options.largest, _CORNER_LARGEST)
             aims = {"angle": options.angle, "contraction": options.contraction, "corner": corner}
             effort = strain(point, new, **aims)
             if not corner:

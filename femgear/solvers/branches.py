@@ -16,39 +16,44 @@ from femgear.solvers.bifurcation import Segment
 from femgear.solvers.continuation import Curve, StepOptions, continue_curve, scaled_curve, switch_branch
 from femgear.solvers.corrector import correct
 from femgear.solvers.harmonic_balance import harmonic_balance
-from femgear.solvers.hill import FloquetVerdict, require_period
+from femgear.solvers.hill import require_period
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.routes import FamilyRoute, FrequencyRoute, Route
+from femgear.solvers.verdict import FloquetVerdict
 
 
 @dataclass(frozen=True)
 class Branch:
     """Periodic solutions along a curve.
 
-    ``spectral_radius`` is nan all along unless the curve was asked for with ``radius=True``, and
-    ``verdicts`` is empty without stability.
+    Every solution carries its tail, the spectral radius of its fixed point and its verdict.
 
     Parameters
     ----------
     parameter : (p,) array
         Frequency [rad/s] or whatever was varied, in order along the curve.
     solutions : tuple of PeriodicSolution
-    verdicts : tuple of FloquetVerdict
-        One a solution; empty when stability was not asked for.
     curve : Curve
         The unknowns, limit points and branch points.
     limits : (low, high)
     route : Route
         The equations along the curve.
+    stability : bool
+        Whether verdicts were asked for.
     """
 
     parameter: np.ndarray
     solutions: tuple[PeriodicSolution, ...]
-    verdicts: tuple[FloquetVerdict, ...]
     curve: Curve
     limits: tuple[float, float]
     route: Route = field(repr=False)
+    stability: bool = True
+
+    @property
+    def verdicts(self) -> tuple[FloquetVerdict, ...]:
+        """Verdicts of the solutions; empty when stability was not asked for."""
+        return tuple(solution.verdict for solution in self.solutions) if self.stability else ()
 
     @property
     def frequency(self) -> np.ndarray:
@@ -107,7 +112,7 @@ class Branch:
 
     @property
     def spectral_radius(self) -> np.ndarray:
-        """Spectral radius of the fixed point, (p,); nan unless ``radius=True`` was given."""
+        """Spectral radius of the fixed point, (p,); nan where it was not asked for."""
         return np.array([solution.spectral_radius for solution in self.solutions])
 
     @property
@@ -138,7 +143,7 @@ def frequency_response_curve(
     start_at: float | None = None,
     stability: bool = True,
     tolerance: float = 1e-7,
-    radius: bool = False,
+    radius: bool | None = None,
     samples=None,
     reduction=None,
     scale: float | None = None,
@@ -163,11 +168,12 @@ def frequency_response_curve(
     start_at : float, optional
         Frequency of the start, within the range, when it is not the first one; closed loops need that.
     stability : bool
-        Floquet verdict at every point. With several base frequencies each says "not covered".
+        Floquet verdict and spectral radius of the fixed point at every point. With several base frequencies
+        each verdict says "not covered".
     tolerance : float
         Relative error of the monodromy matrices.
-    radius : bool
-        Spectral radius of the fixed point at every point, which is nan otherwise.
+    radius : bool, optional
+        The radius alone, with or without verdicts; nan without.
     scale : float, optional
         Deflection [m] that counts as much as the whole range of frequencies; by default the larger of the
         static deflection and the start.
@@ -198,6 +204,7 @@ def frequency_response_curve(
         )
     if stability and bases == 1:
         require_period(min(frequency))
+    radius = stability if radius is None else radius
     route = FrequencyRoute(balance, tuple(np.asarray(others, float).tolist()), base, radius)
     return _follow(route, frequency, start, start_at, stability, tolerance, scale, options)
 
@@ -213,7 +220,7 @@ def parameter_curve(
     start_at: float | None = None,
     stability: bool = True,
     tolerance: float = 1e-7,
-    radius: bool = False,
+    radius: bool | None = None,
     samples=None,
     scale: float | None = None,
     options: StepOptions | None = None,
@@ -240,6 +247,7 @@ def parameter_curve(
     begin = parameter[0] if start_at is None else start_at
     balance = harmonic_balance(family(begin), harmonics=harmonics, orders=orders, samples=samples)
     omega = tuple(np.atleast_1d(np.asarray(frequency, float)).tolist())
+    radius = stability if radius is None else radius
     route = FamilyRoute(family, balance, omega, (min(parameter), max(parameter)), samples, radius)
     return _follow(route, parameter, start, start_at, stability, tolerance, scale, options)
 
@@ -267,7 +275,7 @@ def crossing_branches(
 
 
 def branch_maximum(
-    branch: Branch, measure: Callable[[np.ndarray], float]
+    branch: Branch, measure: Callable[[np.ndarray], float], *, tolerance: float = 1e-7
 ) -> tuple[float, float, PeriodicSolution]:
     """Largest value along a branch, found between its points: parameter, value, solution.
 
@@ -276,6 +284,8 @@ def branch_maximum(
     branch : Branch
     measure : callable
         Lines (n_columns, L) -> float.
+    tolerance : float
+        Of the verdict, which the solution has where the branch has them.
     """
     from scipy.optimize import minimize_scalar
 
@@ -304,6 +314,8 @@ def branch_maximum(
         if -found.fun > best[1]:
             u, parameter = curve.physical(segment.at(found.x).z)
             best = (parameter, float(-found.fun), branch.route.solution(u, parameter, 0.0))
+    if branch.stability:
+        best = (*best[:2], branch.route.judged(best[:1], best[2:], tolerance)[0])
     return best
 
 
@@ -335,5 +347,6 @@ def _branch(route: Route, curve: Curve, limits, stability: bool, tolerance: floa
         route.solution(u, float(parameter), float(error), int(count))
         for u, parameter, error, count in zip(curve.points, curve.parameter, curve.error, curve.iterations)
     )
-    verdicts = route.verdicts(curve.parameter, solutions, tolerance) if stability else ()
-    return Branch(curve.parameter, solutions, verdicts, curve, limits, route)
+    if stability:
+        solutions = route.judged(curve.parameter, solutions, tolerance)
+    return Branch(curve.parameter, solutions, curve, limits, route, stability)

@@ -15,6 +15,9 @@ from femgear.errors import CaseError
 from femgear.solvers.series import FourierSeries, StepSeries, constant, series_of
 from femgear.system import MeshExcitation
 
+# Phases a harmonic at which the sign of a stiffness is looked at, and rounding of its size.
+_PHASES, _ROUNDING = 32, 1e-12
+
 
 class Element(Protocol):
     """What a solver asks of an element.
@@ -66,6 +69,7 @@ class GearMeshes:
     smoothing : float
         Length [m] over which contact sets in, see `positive_part`.
     separates : bool
+        Whether the flanks part. Teeth that do cannot pull: their stiffness must not be negative anywhere.
     """
 
     columns: np.ndarray
@@ -95,6 +99,8 @@ class GearMeshes:
                     f"{len(getattr(self, name).mean)} series of the mesh {name} for {len(columns)} meshes",
                     code="E-SHAPE",
                 )
+        if self.separates:
+            _check_pressing(self.stiffness)
 
     @property
     def reference(self) -> np.ndarray:
@@ -329,6 +335,30 @@ class PiecewiseSprings:
         rest, _ = positive_part(-self.breaks, self.smoothing)
         force = self.slopes[0] * x + (part - rest) @ change
         return force[..., None], (self.slopes[0] + slope @ change)[..., None, None]
+
+
+def _check_pressing(stiffness) -> None:
+    """Refuse a stiffness of parting teeth that is negative somewhere in its period."""
+    if isinstance(stiffness, StepSeries):
+        values, turn = stiffness.values, stiffness.breaks
+    elif isinstance(stiffness, FourierSeries):
+        count = stiffness.amplitudes.shape[1]
+        turn = np.arange(_PHASES * count) / (_PHASES * count)
+        wave = np.exp(2j * np.pi * turn[:, None] * np.arange(count))
+        values = (stiffness.amplitudes @ wave.T).real
+    else:
+        return  # values on a grid, of a series that has been checked
+    lowest = values.min(axis=1)
+    mesh = int(np.argmin(lowest))
+    if not lowest[mesh] >= -_ROUNDING * np.abs(values[mesh]).max():
+        instant = float(turn[np.argmin(values[mesh])])
+        raise CaseError(
+            f"the stiffness of mesh {mesh + 1} is {lowest[mesh]:.4g} N/m at {instant:.4g} of its period, and "
+            "its teeth part", code="E-STIFFNESS", key="stiffness", value=float(lowest[mesh]),
+            limit="0 N/m or more at every instant",
+            remedy="lower the fluctuation or keep other harmonics of k(t), or take separates=False for a "
+            "line that may pull",
+        )  # fmt: skip
 
 
 def _columns(columns, width: int) -> np.ndarray:

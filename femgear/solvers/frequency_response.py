@@ -193,8 +193,8 @@ def mesh_error_response(
     mesh_frequency : (F,) array
         [Hz]
     error : (n_meshes, H) complex array
-        Amplitude of every harmonic at every mesh [m], with its phase: for equal meshes that follow each other
-        by the phase ``gamma_j`` (a fraction of the mesh period) ``e_h exp(-2 pi i h gamma_j)``.
+        Amplitude of every harmonic at every mesh [m], with its phase: for equal meshes
+        ``e(tau + phi_j)`` of the phases ``phi_j`` (fractions of the mesh period) ``e_h exp(2 pi i h phi_j)``.
     mesh_stiffness : (n_meshes,) array
         [N/m]
     harmonics : (H,) int array, optional

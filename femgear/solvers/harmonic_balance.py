@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.solvers.harmonic_equations import HarmonicBalance, harmonic_balance
+from femgear.solvers.harmonic_equations import HarmonicBalance, harmonic_balance, reduced
 from femgear.solvers.harmonic_newton import embed, newton
+from femgear.solvers.hill import judged
+from femgear.solvers.lines import coincidence_note
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
-from femgear.solvers.receptance import Reduction, reduce_problem, respond, source_columns
+from femgear.solvers.receptance import Reduction, respond, source_columns
 
 __all__ = [
     "HarmonicBalance",
@@ -19,6 +21,7 @@ __all__ = [
     "displacements",
     "harmonic_balance",
     "solve_harmonic_balance",
+    "with_radius",
 ]
 
 
@@ -33,7 +36,8 @@ def solve_harmonic_balance(
     reduction: Reduction | None = None,
     tolerance: float = 1e-10,
     max_iterations: int = 50,
-    radius: bool = True,
+    stability: bool = True,
+    radius: bool | None = None,
 ) -> PeriodicSolution:
     """Periodic or quasi-periodic solution at given base frequencies, by Newton's method with line search.
 
@@ -50,9 +54,12 @@ def solve_harmonic_balance(
     tolerance : float
         Largest residual relative to the largest deflection.
     max_iterations : int
-    radius : bool
-        Whether the solution tells the spectral radius of the fixed point; it takes all eigenvalues of one
-        matrix of the size of the unknowns.
+    stability : bool
+        Floquet verdict and spectral radius of the fixed point. With several base frequencies or the frequency
+        zero the verdict says "not covered". Loops that need neither are quicker without.
+    radius : bool, optional
+        The radius alone, with or without the verdict; it takes all eigenvalues of one matrix of the size of
+        the unknowns.
 
     Returns
     -------
@@ -62,13 +69,40 @@ def solve_harmonic_balance(
     Raises
     ------
     CaseError
-        Input that cannot be used.
+        Input that cannot be used, two equal base frequencies (E-FREQUENCY). Where other lines have one
+        frequency, the message names them.
     ConvergenceError
         An undamped resonance of the system with reference springs at a line.
     """
     balance = harmonic_balance(
         problem, harmonics=harmonics, orders=orders, samples=samples, reduction=reduction
     )
+    frequency = _checked_frequency(balance, frequency)
+    if not 0.0 < tolerance < 1.0 or max_iterations < 1:
+        raise CaseError(
+            f"tolerance {tolerance} and {max_iterations} iterations", code="E-TOLERANCE",
+            limit="between 0 and 1, at least one iteration",
+        )  # fmt: skip
+    found = newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
+    if start is None and not found.converged:
+        found = embed(balance, frequency, found, tolerance, max_iterations)
+    if note := coincidence_note(balance.orders, frequency):
+        found = replace(found, message=found.message + note)
+    if stability if radius is None else radius:
+        found = with_radius(balance, found)
+    return judged(problem, [found])[0] if stability else found
+
+
+def with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSolution:
+    """The solution with the spectral radius of its fixed point; lines that are not finite have none."""
+    if not np.all(np.isfinite(found.deflection)):
+        return found
+    value = balance.spectral_radius(balance.unknowns(found.deflection), found.frequency)
+    return replace(found, spectral_radius=value)
+
+
+def _checked_frequency(balance: HarmonicBalance, frequency) -> np.ndarray:
+    """Base frequencies (n_bases,), finite and not negative."""
     frequency = np.atleast_1d(np.asarray(frequency, float))
     if frequency.shape != balance.orders.shape[1:]:
         raise CaseError(
@@ -78,18 +112,16 @@ def solve_harmonic_balance(
         raise CaseError(
             f"base frequencies {frequency.tolist()} rad/s", code="E-FREQUENCY", limit="finite, not negative"
         )
-    if not 0.0 < tolerance < 1.0 or max_iterations < 1:
+    near = np.abs(frequency[:, None] - frequency) <= 1e-9 * frequency.max(initial=0.0)
+    equal = near & (frequency > 0.0)
+    if np.any(same := np.triu(equal, 1)):
+        one, other = np.eye(len(frequency), dtype=int)[np.argwhere(same)[0]].tolist()
         raise CaseError(
-            f"tolerance {tolerance} and {max_iterations} iterations", code="E-TOLERANCE",
-            limit="between 0 and 1, at least one iteration",
+            f"base frequencies {frequency.tolist()} rad/s: the lines {one} and {other} are one",
+            code="E-FREQUENCY", key="frequency", limit="no two base frequencies equal to 1e-9",
+            remedy="take one base frequency and add up the orders of elements and forces",
         )  # fmt: skip
-    found = newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
-    if start is None and not found.converged:
-        found = embed(balance, frequency, found, tolerance, max_iterations)
-    if radius and np.all(np.isfinite(found.deflection)):
-        value = balance.spectral_radius(balance.unknowns(found.deflection), frequency)
-        found = replace(found, spectral_radius=value)
-    return found
+    return frequency
 
 
 def adapt_harmonics(
@@ -100,6 +132,8 @@ def adapt_harmonics(
     harmonics: int = 4,
     max_harmonics: int = 64,
     start=None,
+    stability: bool = True,
+    radius: bool | None = None,
     **options,
 ) -> PeriodicSolution:
     """Double the harmonics, each time from the solution before, until the tail is below a given share.
@@ -110,6 +144,8 @@ def adapt_harmonics(
         As for `solve_harmonic_balance`.
     tail : float
         Wanted share of the amplitude in the upper half of the lines.
+    stability, radius : bool
+        Of the last solution only; see `solve_harmonic_balance`.
     harmonics, max_harmonics : int
         First and largest number, three or more: the upper half must hold odd and even harmonics.
 
@@ -124,7 +160,8 @@ def adapt_harmonics(
             limit="a tail between 0 and 1, at least three harmonics",
         )  # fmt: skip
     if options.get("reduction") is None:
-        options["reduction"] = reduce_problem(problem)
+        options["reduction"] = reduced(problem)
+    options["stability"] = False
     while True:
         found = solve_harmonic_balance(problem, frequency, harmonics=harmonics, start=start, **options)
         if found.tail <= tail or harmonics == max_harmonics or not found.converged:
@@ -133,7 +170,11 @@ def adapt_harmonics(
     note = f" {harmonics} harmonics: the upper half of the lines holds {found.tail:.2g} of the amplitude."
     if found.converged and found.tail > tail:
         note += f" Wanted {tail:.2g}: allow more harmonics."
-    return replace(found, message=found.message + note)
+    found = replace(found, message=found.message + note)
+    if stability if radius is None else radius:
+        known = {name: options.get(name) for name in ("samples", "reduction")}
+        found = with_radius(harmonic_balance(problem, orders=found.orders, **known), found)
+    return judged(problem, [found])[0] if stability else found
 
 
 def displacements(
@@ -158,7 +199,7 @@ def displacements(
     (n_outputs, L) complex array
         Rigid motions without support have no mean position: theirs is zero.
     """
-    reduction = reduce_problem(problem) if reduction is None else reduction
+    reduction = reduced(problem) if reduction is None else reduction
     outputs = np.eye(len(problem.system.M)) if outputs is None else np.atleast_2d(np.asarray(outputs, float))
     forcing = reduction.reference[:, None] * solution.deflection - solution.force
     table = np.concatenate([forcing, source_columns(problem, solution.orders)])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.aft import (
     PhaseGrid,
     coupled_pairs,
@@ -27,8 +27,10 @@ from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.receptance import Reduction, reduce_problem, source_columns
 
-# Unknowns up to which all eigenvalues are computed for the spectral radius.
-_ALL_EIGENVALUES = 600
+# Unknowns up to which matrices of their size are cheaper than products with them.
+MANY = 600
+# Stiffness of a column, relative to the largest one, that counts as none.
+_NO_STIFFNESS = 1e-9
 
 
 @dataclass(frozen=True)
@@ -152,10 +154,20 @@ class HarmonicBalance:
         """Spectral radius of the fixed point ``X <- T_load S - T (F - reference X)`` at the unknowns y.
 
         Largest modulus of the eigenvalues of ``T d(F - reference X)/dX``, the Jacobian of the residual less
-        one. Beyond 600 unknowns by Arnoldi's method (ARPACK), by all eigenvalues where that fails.
+        one; all are computed up to 600 unknowns. Beyond, Arnoldi's method finds it to 1 %.
         """
-        receptance, _ = self.receptance(frequency)
-        matrix = self.jacobian(self.forces(self.lines(y)), receptance)
+        if self.size > MANY:
+            # lazily: the module builds on this one
+            from femgear.solvers.harmonic_krylov import krylov_radius, linearised
+
+            tangent = linearised(self, self.receptance(frequency)[0], np.asarray(y, float))[1]
+            found = krylov_radius(tangent)
+            if found is not None:
+                return found
+        return self._radius(self.forces(self.lines(y)), self.receptance(frequency)[0])
+
+    def _radius(self, forces: LineForces, receptance) -> float:
+        matrix = self.jacobian(forces, receptance)
         matrix[np.diag_indices(self.size)] -= 1.0
         return largest_modulus(matrix)
 
@@ -167,14 +179,24 @@ class HarmonicBalance:
         mean[:, 0] = static[:, 0]
         return self.unknowns(-self._respond(value, self.forces(mean).lines))
 
-    def solution(self, y, frequency, **what_happened) -> PeriodicSolution:
-        """The unknowns as a solution; keywords are the fields of `PeriodicSolution` that say how it came."""
+    def solution(self, y, frequency, *, radius: bool = False, **what_happened) -> PeriodicSolution:
+        """The unknowns as a solution; keywords are the fields of `PeriodicSolution` that say how it came.
+
+        With ``radius`` the spectral radius of the fixed point is among them.
+        """
         frequency = np.atleast_1d(np.asarray(frequency, float))
         lines = self.lines(y)
         forces = self.forces(lines)
+        if radius or "residual" not in what_happened:
+            receptance = self.receptance(frequency)[0]
         if "residual" not in what_happened:
-            error = self.unknowns(self.residual(lines, forces, self.receptance(frequency)[0]))
+            error = self.unknowns(self.residual(lines, forces, receptance))
             what_happened["residual"] = relative_residual(error, y, self.scale)
+        if radius:
+            many = self.size > MANY
+            what_happened["spectral_radius"] = (
+                self.spectral_radius(y, frequency) if many else self._radius(forces, receptance)
+            )
         told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
         force = forces.lines + self.reduction.reference[:, None] * lines
         return PeriodicSolution(
@@ -214,11 +236,14 @@ def harmonic_balance(
     CaseError
         Lines that cannot be used, a harmonic force without line, too few samples.
     ConvergenceError
-        A rigid motion that strains a column, see `reduce_problem`.
+        A rigid motion that strains a column, see `reduced`.
     """
     if (harmonics is None) == (orders is None):
         raise CaseError("give the number of harmonics or the lines", code="E-LINES", limit="one of the two")
-    orders = harmonic_lines(harmonics, problem.bases) if orders is None else checked_lines(orders)
+    if orders is None:
+        _check_harmonics(problem, harmonics)
+        orders = harmonic_lines(harmonics, problem.bases)
+    orders = checked_lines(orders)
     bases = orders.shape[1]
     if bases < problem.bases:
         raise CaseError(
@@ -229,7 +254,7 @@ def harmonic_balance(
         samples = (samples,) * bases if np.ndim(samples) == 0 else tuple(samples)
         if len(samples) != bases or any(int(count) != count for count in samples):
             raise CaseError(f"samples {samples} for {bases} base frequencies", code="E-SAMPLES")
-    reduction = reduce_problem(problem) if reduction is None else reduction
+    reduction = reduced(problem) if reduction is None else reduction
     columns, loads = len(reduction.reference), 1 + 2 * len(problem.forces)
     if reduction.static.shape != (columns, columns + loads) or columns != problem.system.W.shape[1]:
         raise CaseError("the reduction belongs to another problem", code="E-SHAPE", key="reduction")
@@ -238,6 +263,54 @@ def harmonic_balance(
     elements = tuple(on_grid(element, grid.theta) for element in problem.elements)
     scale = _typical_deflection(problem, reduction, source)
     return HarmonicBalance(problem, orders, reduction, grid, elements, coupled_pairs(elements), source, scale)
+
+
+def reduced(problem: NonlinearSystem) -> Reduction:
+    """`reduce_problem` at the elements' own reference; a refusal names the element without stiffness there.
+
+    Raises
+    ------
+    ConvergenceError
+        A motion without stiffness strains an element (E-RIGID-MODE).
+    """
+    try:
+        return reduce_problem(problem)
+    except ConvergenceError as error:
+        total = np.abs(problem.reference)
+        column = int(np.argmin(total))
+        if error.code != "E-RIGID-MODE" or total[column] > _NO_STIFFNESS * total.max():
+            raise
+        raise ConvergenceError(
+            f"{_element_name(problem, column)} has no linear stiffness, and nothing else holds the motion "
+            "that strains it", code="E-RIGID-MODE", limit="a stiffness at rest, or a reference in its place",
+            remedy="where it stiffens with the deflection pass reduction=reduce_problem(problem, "
+            "reference=stiffness of every column at the expected amplitude [N/m]); else give it a stiffness",
+        ) from error  # fmt: skip
+
+
+def _element_name(problem: NonlinearSystem, column: int) -> str:
+    """Kind and number of the first element on a column: "bearing 1"."""
+    kinds = {"GearMeshes": "mesh", "RadialBearings": "bearing", "PolynomialSprings": "spring"}
+    count: dict[str, int] = {}
+    for element in problem.elements:
+        kind = kinds.get(type(element).__name__, "spring")
+        here = np.flatnonzero(np.any(element.columns == column, axis=1))
+        if len(here):
+            return f"{kind} {count.get(kind, 0) + int(here[0]) + 1}"
+        count[kind] = count.get(kind, 0) + len(element.columns)
+    return f"column {column + 1} of W, on which no element acts,"
+
+
+def _check_harmonics(problem: NonlinearSystem, harmonics: int) -> None:
+    """Refuse fewer harmonics than the harmonic forces name."""
+    for number, force in enumerate(problem.forces):
+        wanted = int(np.abs(force.orders).sum())
+        if wanted > harmonics >= 0:
+            raise CaseError(
+                f"{harmonics} harmonics, but harmonic force {number + 1} has orders {tuple(force.orders)}",
+                code="E-HARMONICS", key="harmonics", value=harmonics, limit=f"{wanted} or more",
+                remedy="raise the number of harmonics",
+            )  # fmt: skip
 
 
 def _typical_deflection(problem, reduction, source) -> float:
@@ -255,7 +328,7 @@ def _typical_deflection(problem, reduction, source) -> float:
 def largest_modulus(matrix: np.ndarray) -> float:
     """Largest modulus of the eigenvalues of a real matrix (n, n)."""
     n = len(matrix)
-    if n <= _ALL_EIGENVALUES:
+    if n <= MANY:
         return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
     from scipy.sparse import linalg
 

@@ -14,8 +14,6 @@ import numpy as np
 from femgear.solvers.aft import forces_on_grid
 from femgear.solvers.harmonic_equations import HarmonicBalance, LineForces
 
-# Unknowns from which products with the derivative are cheaper than the matrix itself.
-MANY = 600
 # Relative accuracy of a Newton step, and products after which the matrix is taken instead.
 _ACCURACY, _PRODUCTS = 1e-3, 60
 # No derivatives are kept with the forces.

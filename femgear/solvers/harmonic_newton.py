@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.solvers.harmonic_equations import HarmonicBalance, relative_residual
-from femgear.solvers.harmonic_krylov import MANY, LineTangent, linearised
+from femgear.solvers.harmonic_equations import MANY, HarmonicBalance, relative_residual
+from femgear.solvers.harmonic_krylov import LineTangent, linearised
 from femgear.solvers.periodic import PeriodicSolution
 
 # Shortest step of the line search and the decrease that it asks for (Dennis and Schnabel, 1983, 6.3); full

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.floquet import monodromy
 from femgear.solvers.nonlinear import NonlinearSystem, element_forces
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.tangent_jumps import tangent_jumps
 from femgear.solvers.variational import Frame, frame_of, passage
+from femgear.solvers.verdict import FloquetVerdict, loss_of, open_verdict, verdict_of
 
-# Multipliers beyond the unit circle by less than this are taken as on it.
-_CIRCLE = 1e-6
-# A multiplier is real when its imaginary part is smaller than this share of it.
-_REAL = 1e-7
+__all__ = [
+    "FloquetVerdict",
+    "floquet_verdict",
+    "floquet_verdicts",
+    "hill_exponents",
+    "judged",
+    "loss_of",
+    "require_period",
+    "tangents_of",
+    "verdict_of",
+]
+
 # States treated together, and instants of a piece at which tangents are compared.
 _BATCH = 32
 _INSIDE = 7
@@ -25,38 +34,6 @@ _INSIDE = 7
 # stiffness matrices at these steps that are held at once.
 _MOST_STEPS = 20_000
 _MOST_ENTRIES = 4_000_000
-
-
-@dataclass(frozen=True)
-class FloquetVerdict:
-    """Whether a periodic solution is stable.
-
-    Parameters
-    ----------
-    multipliers : (m,) complex array
-        Of one period of the base frequency, largest modulus first; empty where there is no verdict.
-    exponents : (m,) complex array
-        ``log(multiplier) / period`` [1/s].
-    stable : bool or None
-        None where the method does not cover the solution, its period is too long for the fastest mode, or
-        the error leaves the question open.
-    loss : str
-        ``""`` when stable; how the largest multiplier leaves the unit circle: ``"fold"`` (through +1: limit
-        point, pitchfork, transcritical), ``"flip"`` (through -1) or ``"Neimark-Sacker"`` (complex pair).
-    method : str
-        ``"exact exponentials"``, ``"splitting"``, ``"Hill"`` or ``""``.
-    message : str
-    error : float
-        Estimated relative error of the monodromy matrix; of Hill's method it is not known (nan).
-    """
-
-    multipliers: np.ndarray
-    exponents: np.ndarray
-    stable: bool | None
-    loss: str
-    method: str
-    message: str
-    error: float = 0.0
 
 
 def floquet_verdict(
@@ -132,6 +109,20 @@ def floquet_verdicts(
     return tuple(out)
 
 
+def judged(
+    problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], **options
+) -> tuple[PeriodicSolution, ...]:
+    """The solutions with their verdicts; options as for :func:`floquet_verdicts`.
+
+    Where the modes kept do not carry the motion the verdict says "not determined".
+    """
+    try:
+        verdicts = floquet_verdicts(problem, solutions, **options)
+    except ConvergenceError as error:
+        verdicts = (open_verdict(f"not determined: {error.message}"),) * len(solutions)
+    return tuple(replace(solution, verdict=verdict) for solution, verdict in zip(solutions, verdicts))
+
+
 def _not_covered(solution: PeriodicSolution) -> FloquetVerdict | None:
     if solution.orders.shape[1] > 1:
         reason = "not covered: a solution with several base frequencies is not periodic"
@@ -141,7 +132,7 @@ def _not_covered(solution: PeriodicSolution) -> FloquetVerdict | None:
         reason = "not covered: the frequency zero has no period"
     else:
         return None
-    return _open(reason)
+    return open_verdict(reason)
 
 
 def _too_long(frame: Frame, solution: PeriodicSolution) -> FloquetVerdict | None:
@@ -149,7 +140,7 @@ def _too_long(frame: Frame, solution: PeriodicSolution) -> FloquetVerdict | None
         steps = float(frame.steps(2.0 * np.pi / np.abs(solution.frequency[0])))
     if steps <= _MOST_STEPS:
         return None
-    return _open(
+    return open_verdict(
         f"not determined: {steps:.3g} steps in a period at {solution.frequency[0]:.3g} rad/s, "
         f"at most {_MOST_STEPS}: raise the frequency or keep fewer modes"
     )
@@ -176,10 +167,6 @@ def require_period(frequency) -> None:
             remedy="give a positive frequency, or solve without stability: solve_harmonic_balance, "
             "stability=False of a curve",
         )  # fmt: skip
-
-
-def _open(reason: str) -> FloquetVerdict:
-    return FloquetVerdict(np.zeros(0, complex), np.zeros(0, complex), None, "", "", reason, np.nan)
 
 
 def tangents_of(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution]):
@@ -246,45 +233,6 @@ def _exact_verdict(frame: Frame, period: float, inner, pieces) -> FloquetVerdict
     matrices = frame.state_matrices(frame.kappa(pieces)) * both / both[:, None]
     multipliers = np.linalg.eigvals(monodromy(matrices, durations))
     return verdict_of(multipliers, period, "exact exponentials", 0.0, np.inf)
-
-
-def verdict_of(multipliers, period: float, method: str, error: float, tolerance: float) -> FloquetVerdict:
-    """Verdict on the multipliers of one period.
-
-    Parameters
-    ----------
-    multipliers : (m,) complex array
-    period : float
-        [s].
-    method : str
-    error, tolerance : float
-        Estimated and allowed relative error of the monodromy matrix.
-    """
-    multipliers = np.asarray(multipliers, complex)
-    size = np.abs(multipliers)
-    # of a complex pair the one with positive imaginary part first, whatever rounding does to the moduli
-    rounded = np.round(size / max(size.max(initial=0.0), 1e-300), 9)
-    multipliers = multipliers[np.lexsort((-multipliers.imag, -rounded))]
-    largest = float(np.abs(multipliers[0])) if len(multipliers) else 0.0
-    with np.errstate(divide="ignore"):
-        exponents = np.log(multipliers) / period
-    stable: bool | None = largest <= 1.0 + _CIRCLE
-    message = f"largest multiplier {largest:.6g}"
-    if error > tolerance and abs(largest - 1.0) <= max(10.0 * error, _CIRCLE):
-        stable = None
-        message += f", undecided: error of the monodromy matrix {error:.1e}, aimed at {tolerance:.1e}"
-    loss = "" if stable is not False else loss_of(multipliers[0])
-    outside = int(np.sum(np.abs(multipliers) > 1.0 + _CIRCLE))
-    if loss:
-        message += f" ({loss}); {outside} outside the unit circle"
-    return FloquetVerdict(multipliers, exponents, stable, loss, method, message, error)
-
-
-def loss_of(multiplier: complex) -> str:
-    """How a multiplier outside the unit circle left it: "fold", "flip" or "Neimark-Sacker"."""
-    if abs(multiplier.imag) > _REAL * abs(multiplier):
-        return "Neimark-Sacker"
-    return "fold" if multiplier.real > 0.0 else "flip"
 
 
 def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int | None) -> FloquetVerdict:

@@ -6,6 +6,11 @@ import numpy as np
 
 from femgear.errors import CaseError
 
+# Fluctuation, relative to the mean, below which there is none.
+_ROUNDING = 1e-12
+# Difference of two line frequencies, relative to the highest one, below which they are one.
+_COINCIDE = 1e-9
+
 
 def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
     """Mean and all combinations with ``sum_b |orders_b| <= harmonics``, no line twice.
@@ -107,15 +112,48 @@ def checked_lines(orders) -> np.ndarray:
     return array
 
 
-def line_tail(amplitudes: np.ndarray, orders: np.ndarray) -> float:
+def line_tail(amplitudes: np.ndarray, orders: np.ndarray, *, rounding: float = _ROUNDING) -> float:
     """Share of the fluctuating amplitude in the upper half of the lines (root of the energy ratio).
 
     A line is in the upper half when ``sum_b |orders_b| / max |orders_b|`` is above half its largest value.
-    With a single line the share is one: nothing is known about the truncation.
+    With a single line the share is one: nothing is known about the truncation. A fluctuation below
+    ``rounding`` of the mean is none, and its share is zero.
     """
     top = np.maximum(np.abs(orders).max(axis=0), 1)
     size = (np.abs(orders) / top).sum(axis=1)
     energy = np.sum(np.abs(amplitudes) ** 2, axis=0)
-    energy[0] = 0.0
+    still, energy[0] = rounding**2 * energy[0], 0.0
     total = energy.sum()
-    return float(np.sqrt(energy[size > 0.5 * size.max()].sum() / total)) if total > 0.0 else 0.0
+    return float(np.sqrt(energy[size > 0.5 * size.max()].sum() / total)) if total > still else 0.0
+
+
+def coinciding_lines(orders: np.ndarray, frequency) -> tuple[int, int] | None:
+    """The first two lines whose frequencies agree to 1e-9 of the highest line, or none.
+
+    Parameters
+    ----------
+    orders : (L, n_bases) int array
+    frequency : (n_bases,) array
+        [rad/s]; with a single base frequency no two lines coincide.
+    """
+    if orders.shape[1] < 2:
+        return None
+    size = np.abs(orders @ np.asarray(frequency, float))
+    along = np.argsort(size, kind="stable")
+    near = np.flatnonzero(np.diff(size[along]) <= _COINCIDE * size.max())
+    if not len(near):
+        return None
+    one, other = sorted(along[near[0] : near[0] + 2].tolist())
+    return one, other
+
+
+def coincidence_note(orders: np.ndarray, frequency) -> str:
+    """What to know of a solution in which two lines have one frequency; empty where none have."""
+    found = coinciding_lines(orders, frequency)
+    if found is None:
+        return ""
+    one, other = (orders[line].tolist() for line in found)
+    return (
+        f" Lines {one} and {other} have one frequency: only their sum is an amplitude, and its split, as of "
+        "phases that are independent, converges slowly; take one base frequency and multiply the orders."
+    )

@@ -95,6 +95,26 @@ class NonlinearSystem:
         return max([len(o) for o in orders if any(o)], default=1)
 
 
+def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
+    """Base frequencies as an array (n_bases,), finite and no more than elements and forces name.
+
+    Raises
+    ------
+    CaseError
+        Not a list of finite numbers, or one too long (E-FREQUENCY).
+    """
+    frequency = np.atleast_1d(np.asarray(frequency, float))
+    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
+        raise CaseError("base frequencies must be finite numbers", code="E-FREQUENCY", key="frequency")
+    if len(frequency) > problem.bases:
+        raise CaseError(
+            f"{len(frequency)} base frequencies, elements and forces name {problem.bases}",
+            code="E-FREQUENCY", key="frequency", value=frequency.tolist(), limit=f"{problem.bases} or fewer",
+            remedy="leave out those that drive nothing, or give elements and forces one order a frequency",
+        )  # fmt: skip
+    return frequency
+
+
 def _check_system(system: MechanicalSystem) -> None:
     """Refuse matrices of wrong shapes, numbers that are not finite, wrong symmetries, W without columns."""
     n = len(system.M)

@@ -6,6 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from femgear.solvers.verdict import FloquetVerdict, open_verdict
+
+
+def _not_asked() -> FloquetVerdict:
+    return open_verdict("not asked for")
+
 
 @dataclass(frozen=True)
 class PeriodicSolution:
@@ -28,14 +34,19 @@ class PeriodicSolution:
     factorisations : int
         Matrices factorised on the way.
     tail : float
-        Share of the amplitude in the upper half of the lines: a measure of truncation.
+        Share of the fluctuating amplitude in the upper half of the lines: a measure of truncation; zero
+        where nothing fluctuates.
     message : str
         What happened and, where it did not converge, what to do.
     history : tuple of float
         Relative residual at every iteration.
     spectral_radius : float
         Of the fixed point ``X <- T_load S - T (F - reference X)`` at the solution: below one the plain
-        iteration converges. It says nothing on stability. NaN where it was not asked for.
+        iteration converges. It says nothing on stability. NaN where it was not asked for or where there is
+        no such iteration; the message says why.
+    verdict : FloquetVerdict
+        Whether disturbances grow; its message says "not asked for", "not covered" or "not determined" where
+        ``stable`` is None.
     """
 
     frequency: np.ndarray
@@ -50,6 +61,7 @@ class PeriodicSolution:
     message: str
     history: tuple[float, ...] = field(default=())
     spectral_radius: float = np.nan
+    verdict: FloquetVerdict = field(default_factory=_not_asked)
 
     def __post_init__(self):
         for name, kind in (
@@ -61,6 +73,11 @@ class PeriodicSolution:
             array = np.array(getattr(self, name), kind)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether no disturbance grows; None where the verdict is open."""
+        return self.verdict.stable
 
     @property
     def line_frequency(self) -> np.ndarray:

@@ -1,29 +1,32 @@
-"""A periodic solution with all that is known about it: truncation, fixed point, stability."""
+"""A periodic solution with its period checked first, and its verdict at hand."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.hill import FloquetVerdict, floquet_verdict, require_period
+from femgear.solvers.hill import judged, require_period
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
+from femgear.solvers.verdict import FloquetVerdict
 
 
 @dataclass(frozen=True)
 class PeriodicResponse:
-    """A periodic solution and its Floquet verdict.
+    """A periodic solution and short names of what it says about itself.
 
     Parameters
     ----------
     solution : PeriodicSolution
-    verdict : FloquetVerdict
-        Its ``stable`` is None where the solution did not converge, has several base frequencies or too long
-        a period for its fastest mode.
     """
 
     solution: PeriodicSolution
-    verdict: FloquetVerdict
+
+    @property
+    def verdict(self) -> FloquetVerdict:
+        """Its ``stable`` is None where the solution did not converge, has several base frequencies or too
+        long a period for its fastest mode."""
+        return self.solution.verdict
 
     @property
     def tail(self) -> float:
@@ -49,7 +52,7 @@ def periodic_response(
     stability_tolerance: float = 1e-7,
     **options,
 ) -> PeriodicResponse:
-    """Periodic solution by harmonic balance, with tail, spectral radius of the fixed point and stability.
+    """`solve_harmonic_balance` with a choice of the method of the verdict; refuses the frequency zero.
 
     Parameters
     ----------
@@ -69,6 +72,6 @@ def periodic_response(
         An undamped resonance of the system with reference springs at a line.
     """
     require_period(frequency)
-    solution = solve_harmonic_balance(problem, frequency, **options)
-    verdict = floquet_verdict(problem, solution, method=method, tolerance=stability_tolerance)
-    return PeriodicResponse(solution, verdict)
+    options = {"radius": True, **options}
+    solution = solve_harmonic_balance(problem, frequency, stability=False, **options)
+    return PeriodicResponse(judged(problem, [solution], method=method, tolerance=stability_tolerance)[0])

@@ -9,7 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from femgear.solvers.harmonic_balance import HarmonicBalance, harmonic_balance, solve_harmonic_balance
-from femgear.solvers.hill import FloquetVerdict, floquet_verdicts
+from femgear.solvers.hill import judged
+from femgear.solvers.lines import coincidence_note
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
 
@@ -33,7 +34,7 @@ class Route(Protocol):
 
     def solution(self, y, parameter: float, error: float, iterations: int = 0) -> PeriodicSolution: ...
 
-    def verdicts(self, parameters, solutions, tolerance: float) -> tuple[FloquetVerdict, ...]: ...
+    def judged(self, parameters, solutions, tolerance: float) -> tuple[PeriodicSolution, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class FrequencyRoute:
         balance = self.balance
         return solve_harmonic_balance(
             balance.problem, self.frequency(parameter), orders=balance.orders, start=start,
-            samples=balance.grid.samples, reduction=balance.reduction, radius=False,
+            samples=balance.grid.samples, reduction=balance.reduction, stability=False,
         )  # fmt: skip
 
     def unknowns(self, lines) -> np.ndarray:
@@ -81,9 +82,9 @@ class FrequencyRoute:
         """Solution at a corrected point."""
         return _told(self.balance, y, self.frequency(parameter), error, iterations, self.radius)
 
-    def verdicts(self, parameters, solutions, tolerance: float) -> tuple[FloquetVerdict, ...]:
-        """Floquet verdict of every solution."""
-        return floquet_verdicts(self.balance.problem, solutions, tolerance=tolerance)
+    def judged(self, parameters, solutions, tolerance: float) -> tuple[PeriodicSolution, ...]:
+        """The solutions with their Floquet verdicts."""
+        return judged(self.balance.problem, solutions, tolerance=tolerance)
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ class FamilyRoute:
         """Solution near the start."""
         return solve_harmonic_balance(
             self.family(parameter), self.omega, orders=self.balance.orders, start=start,
-            samples=self.samples, radius=False,
+            samples=self.samples, stability=False,
         )  # fmt: skip
 
     def unknowns(self, lines) -> np.ndarray:
@@ -150,10 +151,10 @@ class FamilyRoute:
         """Solution at a corrected point."""
         return _told(self.balance_at(parameter), y, np.array(self.omega), error, iterations, self.radius)
 
-    def verdicts(self, parameters, solutions, tolerance: float) -> tuple[FloquetVerdict, ...]:
-        """Floquet verdict of every solution, each of its own system."""
+    def judged(self, parameters, solutions, tolerance: float) -> tuple[PeriodicSolution, ...]:
+        """The solutions with their Floquet verdicts, each of its own system."""
         return tuple(
-            floquet_verdicts(self.family(float(parameter)), [solution], tolerance=tolerance)[0]
+            judged(self.family(float(parameter)), [solution], tolerance=tolerance)[0]
             for parameter, solution in zip(parameters, solutions)
         )
 
@@ -161,11 +162,11 @@ class FamilyRoute:
 def _told(
     balance: HarmonicBalance, y, frequency, error: float, iterations: int, radius: bool
 ) -> PeriodicSolution:
-    told = {"spectral_radius": balance.spectral_radius(y, frequency)} if radius else {}
     message = f"Point of a branch; last Newton step {error:.1e} of the scaled unknowns."
+    message += coincidence_note(balance.orders, frequency)
     return balance.solution(
-        y, frequency, converged=True, iterations=iterations, factorisations=iterations, message=message,
-        **told,
+        y, frequency, radius=radius, converged=True, iterations=iterations, factorisations=iterations,
+        message=message,
     )  # fmt: skip
 
 

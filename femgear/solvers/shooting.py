@@ -17,10 +17,13 @@ from femgear.errors import CaseError
 from femgear.solvers.adaptive import Flow, flow, trajectory
 from femgear.solvers.harmonics import harmonics_of
 from femgear.solvers.initial_state import checked_start, motion_scale
-from femgear.solvers.nonlinear import NonlinearSystem, element_forces
+from femgear.solvers.lines import line_tail
+from femgear.solvers.motion_verdict import radius_of_lines, verdict_of_monodromy
+from femgear.solvers.nonlinear import NonlinearSystem, checked_bases, element_forces
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.strobe import common_period
 from femgear.solvers.transient import sampled, solve_transient
+from femgear.solvers.verdict import FloquetVerdict, open_verdict
 
 # Directions that the map changes by less than this share of the strongest one are left as they are.
 _SINGULAR = 1e-11
@@ -28,8 +31,6 @@ _SINGULAR = 1e-11
 _ROUNDING = 100.0
 # Steps of the integrator in one segment, more of which a motion of interest does not need.
 _MOST_STEPS = 50_000
-# Multipliers outside the unit circle by less than this are on it.
-_CIRCLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,9 @@ class ShootingSolution:
     Parameters
     ----------
     solution : PeriodicSolution
-        Lines of the deflections and forces; ``residual`` is the relative distance of start and end.
+        Lines of the deflections and forces; ``residual`` is the relative distance of start and end, the
+        spectral radius of the fixed point is that of the lines. Where the system has no such fixed point
+        (nothing holds it at its reference stiffness) the radius is nan and the message says so.
     period : float
         [s].
     displacement, velocity : (n,) arrays
@@ -47,7 +50,7 @@ class ShootingSolution:
     monodromy : (2n, 2n) array
         Derivatives of (q, v / rate) after the period by those at its start.
     multipliers : (2n,) complex array
-        Its eigenvalues, the largest modulus first.
+        Its eigenvalues, the largest modulus first; those of free motions are among them.
     time : (n_samples,) array
         Equidistant instants of one period.
     motion : (n_samples, n) array
@@ -64,11 +67,14 @@ class ShootingSolution:
     motion: np.ndarray
 
     @property
+    def verdict(self) -> FloquetVerdict:
+        """That of the solution, from the monodromy matrix here."""
+        return self.solution.verdict
+
+    @property
     def stable(self) -> bool | None:
         """No multiplier lies outside the unit circle by more than 1e-6; None for a motion not converged."""
-        if not self.solution.converged:
-            return None
-        return bool(np.abs(self.multipliers).max() <= 1.0 + _CIRCLE)
+        return self.solution.stable
 
 
 def solve_shooting(
@@ -85,6 +91,7 @@ def solve_shooting(
     integration: float = 1e-11,
     tolerance: float = 1e-9,
     max_iterations: int = 30,
+    radius: bool = True,
 ) -> ShootingSolution:
     """Forced periodic motion by Newton iterations on its start.
 
@@ -111,6 +118,8 @@ def solve_shooting(
     tolerance : float
         Of the distance between start and end, relative to the size of the motion.
     max_iterations : int
+    radius : bool
+        Whether the spectral radius of the fixed point is computed; the verdict always is.
 
     Returns
     -------
@@ -123,9 +132,10 @@ def solve_shooting(
     Raises
     ------
     CaseError
-        Frequencies without the common period, numbers out of range, a start that does not fit (E-START).
+        Frequencies without the common period or more of them than the problem has (E-FREQUENCY), numbers
+        out of range, a start that does not fit (E-START).
     """
-    frequency = np.atleast_1d(np.asarray(frequency, float))
+    frequency = checked_bases(problem, frequency)
     period = common_period(frequency, periods)
     if segments < 1 or harmonics < 1 or samples < 4 * harmonics:
         raise CaseError(
@@ -152,9 +162,10 @@ def solve_shooting(
         unknowns = _improved(moving, unknowns, update, np.abs(defect).max(), period, options)
     whole = np.linalg.multi_dot(maps[::-1]) if segments > 1 else maps[0]
     lines = 2.0 * np.pi / period, harmonics, samples
-    return _result(
+    found = _result(
         problem, moving, unknowns[0], whole, lines, options, history, tolerance, factorisations, stuck
     )
+    return _told(problem, found, moving.frequency, integration, radius)
 
 
 def solve_free_vibration(
@@ -170,6 +181,7 @@ def solve_free_vibration(
     integration: float = 1e-12,
     tolerance: float = 1e-10,
     max_iterations: int = 30,
+    radius: bool = True,
 ) -> ShootingSolution:
     """Periodic motion of a system that nothing drives: its period is unknown too.
 
@@ -185,7 +197,7 @@ def solve_free_vibration(
     conservative : bool
         The displacement of ``fixed`` is kept as the amplitude. A limit cycle, which has its own amplitude,
         needs ``False``.
-    harmonics, samples, events, integration, tolerance, max_iterations
+    harmonics, samples, events, integration, tolerance, max_iterations, radius
         As for `solve_shooting`.
 
     Raises
@@ -225,7 +237,9 @@ def solve_free_vibration(
         update = np.linalg.lstsq(matrix, -defect, rcond=_SINGULAR)[0]
         y, period = _closer(moving, y, period, free, update, np.abs(defect).max(), options)
     lines = 2.0 * np.pi / period, harmonics, samples
-    return _result(problem, moving, y, maps[0], lines, options, history, tolerance, len(history) - 1)
+    found = _result(problem, moving, y, maps[0], lines, options, history, tolerance, len(history) - 1)
+    # the phase is free, and so is the amplitude of a conservative system
+    return _told(problem, found, moving.frequency, integration, radius, trivial=2 if conservative else 1)
 
 
 def _options(moving: Flow, start, integration, events) -> dict:
@@ -332,7 +346,7 @@ def _derivative(moving: Flow, y, time):
 def _result(
     problem, moving, y, monodromy, lines, options, history, tolerance, factorisations, stuck=False
 ):  # fmt: skip
-    """Lines of the motion from ``y`` on, with the verdict."""
+    """Lines of the motion from ``y`` on."""
     omega, harmonics, samples = lines
     period, plain = 2.0 * np.pi / omega, replace(moving, variational=False)
     times = period * np.arange(samples) / samples
@@ -340,8 +354,6 @@ def _result(
     q, v, x = (part.T for part in plain.split(found.T))
     force = element_forces(problem, x, times[:, None] * moving.frequency)[0]
     deflection, forces = harmonics_of(x.T, harmonics), harmonics_of(force.T, harmonics)
-    size = np.abs(deflection[:, 1:]).sum()
-    upper = np.abs(deflection[:, harmonics // 2 + 1 :]).sum()
     converged = history[-1] <= tolerance
     message = "the motion returns to its start" if converged else (
         f"after {len(history) - 1} iterations start and end differ by {history[-1]:.2g} of the motion: "
@@ -352,13 +364,33 @@ def _result(
             f"no start returns: a period changes the motion by {history[-1]:.2g} of it where "
             "monodromy - 1 is singular; give some damping, balance free loads or move the frequency"
         )
+    orders = np.arange(harmonics + 1)[:, None]
     solution = PeriodicSolution(
-        frequency=[omega], orders=np.arange(harmonics + 1)[:, None], deflection=deflection, force=forces,
+        frequency=[omega], orders=orders, deflection=deflection, force=forces,
         converged=converged, residual=history[-1], iterations=len(history) - 1,
-        factorisations=factorisations, tail=float(upper / size) if size else 0.0, message=message,
+        factorisations=factorisations, message=message,
+        tail=line_tail(deflection, orders, rounding=10.0 * tolerance),
         history=tuple(history),
     )  # fmt: skip
     values = np.linalg.eigvals(monodromy)
     return ShootingSolution(
         solution, period, q[0], v[0], monodromy, values[np.argsort(-np.abs(values))], times, q
     )
+
+
+def _told(
+    problem, found: ShootingSolution, frequency, integration: float, radius: bool, *, trivial: int = 0
+) -> ShootingSolution:
+    """The motion with its verdict and the spectral radius of the fixed point at its lines."""
+    solution = found.solution
+    told = {"verdict": open_verdict("not covered: the solution did not converge")}
+    if solution.converged:
+        told["verdict"] = verdict_of_monodromy(
+            problem, found.monodromy, found.period, error=integration, trivial=trivial
+        )
+    if radius:
+        omega = float(solution.frequency[0])
+        turns = np.rint(frequency / omega).astype(int)
+        value, note = radius_of_lines(problem, turns, omega, solution.deflection)
+        told |= {"spectral_radius": value, "message": solution.message + note}
+    return replace(found, solution=replace(solution, **told))

@@ -15,6 +15,8 @@ from femgear.system import MeshExcitation, Modes, Response
 # Share of the energy in the upper half of the harmonics above which the message warns. Halving or doubling
 # the harmonics of planetary sets shows a truncation error of the size of this share: 0.1 % of the amplitude.
 _TAIL_ENERGY = 1e-3
+# Fluctuation, relative to the mean, below which there is none.
+_STILL = 1e-12
 # Speeds treated together: their receptances and matrices stay in the cache.
 _BATCH = 40
 
@@ -228,10 +230,14 @@ def _fixed_point(problem: HarmonicProblem, tolerance: float, max_iterations: int
 
 
 def _tail(deflection: np.ndarray) -> np.ndarray:
-    """Share of the fluctuating amplitude in the harmonics above H/2 (root of the energy ratio), per speed."""
-    energy = np.sum(np.abs(deflection[..., 1:]) ** 2, axis=1)
-    upper = energy[:, (deflection.shape[-1] - 1) // 2 :].sum(axis=1)
-    return np.sqrt(upper / np.maximum(energy.sum(axis=1), np.finfo(float).tiny))
+    """Share of the fluctuating amplitude in the harmonics above H/2 (root of the energy ratio), per speed.
+
+    Zero where the fluctuation is rounding of the mean.
+    """
+    energy = np.sum(np.abs(deflection) ** 2, axis=1)
+    upper, total = energy[:, 1 + (deflection.shape[-1] - 1) // 2 :].sum(axis=1), energy[:, 1:].sum(axis=1)
+    still = total <= _STILL**2 * energy[:, 0]
+    return np.where(still, 0.0, np.sqrt(upper / np.where(still, 1.0, total)))
 
 
 def _message(frequency, converged, direct, radius, tail, force) -> str:

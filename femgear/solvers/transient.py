@@ -8,6 +8,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers import adaptive
+from femgear.solvers.drift import drift_note
 from femgear.solvers.elements import GearMeshes, PiecewiseSprings
 from femgear.solvers.initial_state import checked_start, motion_scale
 from femgear.solvers.marching import march_times
@@ -20,7 +21,7 @@ from femgear.solvers.newmark import (
     rule_scheme,
     stability_limit,
 )
-from femgear.solvers.nonlinear import NonlinearSystem, element_forces
+from femgear.solvers.nonlinear import NonlinearSystem, checked_bases, element_forces
 from femgear.solvers.tabulated import tabulated_law
 
 # Steps in the shortest natural period when no step is given: average acceleration errs by 0.2 % of it.
@@ -48,7 +49,8 @@ class TransientResponse:
         ``W^T q`` [m] and the forces of the elements [N].
     method : str
     converged : bool
-        Every step converged, and none errs by more than the whole motion (``error`` up to 1).
+        Every step converged, and none errs by more than the whole motion (``error`` up to 1). A free system
+        whose load is not balanced converges too: the message says that its mean drifts.
     residual : float
         Largest violation of the column equations relative to the deflections; zero for explicit methods.
     error : float
@@ -137,15 +139,13 @@ def solve_transient(
     ------
     CaseError
         A step beyond the stability limit, instants that do not ascend, unknown methods, a start that
-        does not fit (E-START).
+        does not fit (E-START), more base frequencies than the problem has (E-FREQUENCY).
     ConvergenceError
         A mass matrix that is not positive definite, an adaptive integrator that gives up.
     """
     times = _checked_times(times)
     q, v = checked_start(problem, start)
-    frequency = np.atleast_1d(np.asarray(frequency, float))
-    if not np.all(np.isfinite(frequency)) or frequency.ndim != 1:
-        raise CaseError("base frequencies must be finite numbers", code="E-FREQUENCY", key="frequency")
+    frequency = checked_bases(problem, frequency)
     if method in adaptive.METHODS:
         options = {"tolerance": tolerance or 1e-9, "events": events, "scale": scale}
         return _adaptive(problem, frequency, times, q, v, method, options)
@@ -271,6 +271,7 @@ def _stepped(problem, scheme, frequency, times, start, number, method, options) 
     force = element_forces(problem, x, theta)[0]
     relative = error / size if size else 0.0
     converged, message = _verdict(steps, number, begin + steps * step, relative, step)
+    message += drift_note(problem) if converged else ""
     return TransientResponse(
         times, q, v, x, force, method, converged, residual, relative, steps, iterations,
         scheme.factorisations, message,
@@ -342,7 +343,7 @@ def _adaptive(problem, frequency, times, q, v, method, options) -> TransientResp
     force = element_forces(problem, x, times[:, None] * frequency)[0]
     return TransientResponse(
         times, q, v, x, force, method, True, 0.0, options["tolerance"], steps, 0, 1,
-        f"{method} with a relative tolerance of {options['tolerance']:.3g}",
+        f"{method} with a relative tolerance of {options['tolerance']:.3g}" + drift_note(problem),
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from femgear.models.planar_problem import phased_series, planar_meshes, planar_p
 from femgear.solvers.elements import GearMeshes
 from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.harmonics import harmonics_of
-from femgear.solvers.hill import FloquetVerdict, floquet_verdict
+from femgear.solvers.hill import FloquetVerdict
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.series import FourierSeries
@@ -104,7 +104,7 @@ def motion(
 ) -> Motion:
     """Balance and verdict beside a motion found by shooting."""
     found = solve_harmonic_balance(problem, frequency, harmonics=harmonics, samples=samples, start=start)
-    return Motion(problem, frequency, samples, found, shooting, floquet_verdict(problem, found))
+    return Motion(problem, frequency, samples, found, shooting, found.verdict)
 
 
 @cache

@@ -11,6 +11,7 @@ from femgear.validation import (
     dynamics,
     elasticity,
     geometry,
+    helical,
     housing,
     integration,
     members,
@@ -156,6 +157,12 @@ THEMES = (
             planar.balance,
             planar.wind_turbine,
         ),
+    ),
+    Theme(
+        "helical",
+        "Helical planetary set",
+        "Forces act at the base circles, as in the paper, where nothing else is said.",
+        (helical.table_4, helical.rigid, helical.leakage, helical.response),
     ),
     Theme(
         "wind turbine sets",

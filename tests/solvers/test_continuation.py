@@ -154,6 +154,53 @@ def test_curves_on_close_sheets_in_two_unknowns(gap, largest):
     np.testing.assert_allclose(found.points, right, atol=1e-9)
 
 
+NEAR = {
+    2.331e-05: (
+        (-1.7957, 0.1023, 0.2172, -0.4162),
+        (1.34, 4.8189, 2.2051, 5.3404),
+        (1.653, 3.3059, 5.7854, 9.0913),
+        (5.369, 0.005876),
+    ),
+    8.134e-05: (
+        (-0.017, -0.1127, -0.095, -0.1623),
+        (4.8036, 2.8172, 0.1337, 2.1858),
+        (2.9171, 5.8342, 10.2098, 16.044),
+        (4.86, 0.01776),
+    ),
+}
+
+
+@pytest.mark.parametrize("aims", [{}, {"angle": 0.5, "contraction": 0.25}])
+@pytest.mark.parametrize("gap", NEAR)
+def test_long_largest_steps_leave_short_ones_checked(gap, aims):
+    """Two of 240 random families ``u = sum a sin(w p + phase) + k gap`` that need far shorter steps."""
+    a, phase, w, (largest, first) = (np.array(part) for part in NEAR[gap])
+
+    def middle(p):
+        return np.sum(a * np.sin(w * p + phase))
+
+    def curves(u, p):
+        d = np.pi * (u[0] - middle(p)) / gap
+        slope = np.cos(d) * np.pi / gap
+        return (
+            np.array([np.sin(d)]),
+            np.array([[slope]]),
+            np.array([-slope * np.sum(a * w * np.cos(w * p + phase))]),
+        )
+
+    options = StepOptions(first=first, largest=largest, max_points=80, **aims)
+    found = continue_curve(curves, [middle(0.0)], 0.0, limits=(0.0, 1.0), options=options)
+    away = found.points[:, 0] - [middle(p) for p in found.parameter]
+    assert len(found.parameter) == 80 and np.abs(away).max() < 1e-6 * gap
+
+
+@pytest.mark.parametrize(("name", "value"), [("angle", 1.5), ("contraction", 0.5), ("angle", np.nan)])
+def test_options_that_the_acceptance_test_cannot_stand_are_refused(name, value):
+    with pytest.raises(CaseError, match="E-RANGE") as caught:
+        StepOptions(**{name: value})
+    assert caught.value.key == name and caught.value.remedy
+
+
 def test_detour_between_two_points_is_not_passed_over():
     """A rise much narrower than the step; the prediction beyond it is exactly on another curve."""
     height = np.tanh(8.0)

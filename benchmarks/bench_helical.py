@@ -1,0 +1,91 @@
+"""Forced response of the helical set to phased transmission errors: sum of modes beside direct solution."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+GROUP = "Helical set of 42 dof: 2000 frequencies, 8 phasing cases, 4 harmonics"
+LIMIT = 2.0
+"""Seconds that the sum of modes may take, mesh forces and all loads of pins and bearings included."""
+HERTZ = np.linspace(10.0, 15e3, 2000)
+
+
+@cache
+def inputs():
+    """System, modes, rows of the loads and errors (8, 8, 4): four tooth sums, two lags of the planets."""
+    from femgear.gears.phasing import MeshPhasing
+    from femgear.models.helical import helical_system
+    from femgear.models.helical_modes import helical_modes, helical_springs
+    from femgear.models.helical_response import phased_errors, spring_loads
+    from femgear.validation.helical import kahraman_set
+
+    data = kahraman_set()
+    cases = [
+        MeshPhasing(z, 100 - z, (0, 25, 50, 75), lag=lag) for z in (28, 29, 30, 31) for lag in (0.0, 0.5)
+    ]
+    error = np.array([phased_errors(np.full(4, 1e-6), case.phases) for case in cases])
+    _, rows = spring_loads(helical_springs(data))
+    return helical_system(data), helical_modes(data, damping_ratio=0.05), rows, error
+
+
+@pytest.fixture(scope="module")
+def medians():
+    return {}
+
+
+@pytest.mark.benchmark(group=GROUP)
+@pytest.mark.parametrize("loads", [False, True])
+def test_sum_of_modes(benchmark, medians, loads):
+    from femgear.models.helical_response import modal_error_response
+
+    system, modes, rows, error = inputs()
+    options = {"outputs": rows if loads else None}
+    found = benchmark.pedantic(
+        modal_error_response, args=(system, modes, HERTZ, error), kwargs=options, rounds=5, warmup_rounds=1
+    )
+    assert found.force.shape == (8, 2000, 4, 8) and found.output.shape[-1] == (len(rows) if loads else 0)
+    text = f"sum of {len(modes.frequency)} modes (femgear), mesh forces" + f" and {len(rows)} loads" * loads
+    benchmark.extra_info.update(title=text, limit=LIMIT)
+    if benchmark.stats is not None:
+        medians[loads] = benchmark.stats.stats.median
+        assert medians[loads] < LIMIT
+
+
+@pytest.mark.benchmark(group=GROUP)
+def test_direct(benchmark, medians):
+    """One receptance from all meshes serves the eight cases."""
+    from femgear.models.helical_response import modal_error_response
+    from femgear.solvers.frequency_response import direct_response
+
+    system, modes, _, error = inputs()
+    k = modes.mesh_stiffness
+
+    def solve():
+        hertz = np.outer(HERTZ, np.arange(1, 5)).ravel()
+        transfer = direct_response(
+            system, hertz, system.W * k, system.W.T, mesh_stiffness=k, damping_ratio=0.05
+        ).reshape(len(HERTZ), 4, len(k), len(k))
+        deflection = np.einsum("fhoj,cjh->cfho", transfer, error, optimize=True)
+        return k * (deflection - error.transpose(0, 2, 1)[:, None])
+
+    force = benchmark.pedantic(solve, rounds=3, warmup_rounds=1)
+    other = modal_error_response(system, modes, HERTZ, error).force
+    away = np.abs(force - other).max() / np.abs(force).max()
+    assert away < 1e-10
+    note = f"forces differ by {away:.0e} of the largest"
+    if benchmark.stats is not None and False in medians:
+        note += f"; {benchmark.stats.stats.median / medians[False]:.0f} times the sum of modes"
+    benchmark.extra_info.update(title="dense solution at every frequency, mesh forces", note=note)
+
+
+@pytest.mark.benchmark(group="Modes of the helical set of 42 dof")
+def test_modes(benchmark):
+    from femgear.models.helical_modes import helical_modes
+    from femgear.validation.helical import kahraman_set
+
+    data = kahraman_set()
+    found = benchmark.pedantic(helical_modes, args=(data,), rounds=9, warmup_rounds=1)
+    kinds = {kind: found.kind.count(kind) for kind in sorted(set(found.kind))}
+    note = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+    benchmark.extra_info.update(title="matrices, modes and their kinds (femgear)", note=note)

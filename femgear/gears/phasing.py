@@ -1,0 +1,283 @@
+"""Mesh phases of planets and what they make of the harmonics of the mesh frequency.
+
+Planets stand at assembly positions, whole multiples m_n of ``2 pi / Z`` from the first, ``Z = z_s + z_r``, so
+that every phase is a ratio of whole numbers and every sum over the planets is exact.
+
+Two conventions for the phases gamma_j, in mesh periods; the force or error of mesh j in harmonic h has the
+factor ``exp(2 pi i h gamma_j)``:
+
+* ``"rotation"``: those of teeth that turn. A planet ahead of the first in the sense of the sun meets the same
+  sun tooth later, a ring tooth earlier: ``-z_s psi_n / 2 pi`` and ``+z_r psi_n / 2 pi`` (R. G. Parker and
+  J. Lin, J. Mech. Des. 126, 2004, 365-370). At assembly positions both are equal but for the lag of a planet.
+* ``"printed"``: ``+z_s psi_n / 2 pi`` and ``+z_r psi_n / 2 pi``, Eq. (6) of A. Kahraman, J. Mech. Des. 116,
+  1994, 713-720. What sun meshes excite then travels round the other way than what ring meshes excite.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import GeometryError
+from femgear.gears.checks import ASSEMBLY_TOLERANCE, feasible_angles
+from femgear.gears.limits import TEETH_RANGE
+from femgear.gears.set_limits import check_angles
+
+if TYPE_CHECKING:
+    from femgear.gears.planetary import PlanetarySet
+
+CONVENTIONS = ("rotation", "printed")
+KINDS = ("in-phase", "counter-phased", "sequentially phased", "unequally phased")
+
+
+@dataclass(frozen=True)
+class MeshPhasing:
+    """Phases of the 2N meshes of a set.
+
+    Parameters
+    ----------
+    sun_teeth, ring_teeth : int
+    positions : tuple of int
+        m_n, assembly positions of the planets counted from the first.
+    rotation : {1, -1}
+        Sense of the sun against the carrier, 1 counter-clockwise.
+    flank : {1, -1}
+        Loaded flanks, 1 for those of a sun that drives counter-clockwise.
+    convention : {"rotation", "printed"}
+    lag : float
+        Mesh periods from pitch-point contact of a planet with the sun to that with the ring, for a sun that
+        drives counter-clockwise; `standard_lag` for unshifted teeth.
+
+    Raises
+    ------
+    GeometryError
+        Numbers that describe no set (E-PHASING).
+    """
+
+    sun_teeth: int
+    ring_teeth: int
+    positions: tuple[int, ...]
+    rotation: int = 1
+    flank: int = 1
+    convention: str = "rotation"
+    lag: float = 0.0
+
+    def __post_init__(self):
+        _check(self)
+        object.__setattr__(self, "positions", tuple(int(m) for m in self.positions))
+
+    @property
+    def n_planets(self) -> int:
+        return len(self.positions)
+
+    @property
+    def teeth_sum(self) -> int:
+        """Z, the number of assembly positions in one turn."""
+        return self.sun_teeth + self.ring_teeth
+
+    @property
+    def planet_angles(self) -> np.ndarray:
+        """psi_n - psi_1 [rad], (N,)."""
+        return 2.0 * math.pi * np.array(self.positions) / self.teeth_sum
+
+    @property
+    def equally_spaced(self) -> bool:
+        return all(m * self.n_planets == n * self.teeth_sum for n, m in enumerate(self.positions))
+
+    @property
+    def turns(self) -> tuple[int, int]:
+        """Mesh periods by which the phases of sun and ring meshes grow over one turn of psi."""
+        sun = self.sun_teeth if self.convention == "printed" else -self.sun_teeth
+        return self.rotation * sun, self.rotation * self.ring_teeth
+
+    @property
+    def ring_lag(self) -> float:
+        """Periods by which the ring mesh of a planet comes after its sun mesh; the sense and the flank count.
+
+        Turning back runs through the same contacts in the opposite order; the other flanks are the drive
+        flanks of the mirror image, which turns the other way.
+        """
+        return self.rotation * self.flank * self.lag
+
+    @property
+    def phases(self) -> np.ndarray:
+        """gamma_j in [0, 1), (2N,), sun meshes first; zero for "sun-planet 1".
+
+        With the convention "rotation" those of `PlanetarySet.mesh_phases`.
+        """
+        steps = np.mod(np.outer(self.turns, self.positions), self.teeth_sum)
+        phase = steps / self.teeth_sum - np.array([[0.0], [self.ring_lag]])
+        phase = np.mod(phase.ravel(), 1.0)
+        return np.where(phase > 1.0 - 1e-12, 0.0, phase)
+
+
+def mesh_phasing(
+    sun_teeth: int,
+    ring_teeth: int,
+    planet_angles: Sequence[float],
+    *,
+    rotation: int = 1,
+    flank: int = 1,
+    convention: str = "rotation",
+    lag: float = 0.0,
+) -> MeshPhasing:
+    """Phases of planets at given angles.
+
+    Parameters
+    ----------
+    sun_teeth, ring_teeth : int
+    planet_angles : (N,) sequence of float
+        psi_n [rad], ascending within one turn.
+    rotation, flank, convention, lag
+        See `MeshPhasing`.
+
+    Raises
+    ------
+    GeometryError
+        Angles at which the planets do not assemble (E-ASSEMBLY, with the nearest that do), no angles
+        (E-PLANETS, E-ANGLES), or other numbers that describe no set (E-PHASING).
+    """
+    angles = tuple(float(a) for a in planet_angles)
+    check_angles(angles)
+    MeshPhasing(sun_teeth, ring_teeth, (0,), rotation, flank, convention, lag)
+    total = sun_teeth + ring_teeth
+    places = (np.array(angles) - angles[0]) * total / (2.0 * math.pi)
+    missed = float(np.abs(places - np.round(places)).max())
+    if missed > ASSEMBLY_TOLERANCE:
+        listing = ", ".join(f"{math.degrees(a):.6f}" for a in feasible_angles(total, angles)[:24])
+        raise GeometryError(
+            f"{len(angles)} planets between {sun_teeth} and {ring_teeth} teeth miss an assembly position by "
+            f"{missed:.4f} teeth; their phases do not belong to teeth that mesh",
+            code="E-ASSEMBLY",
+            key="set.planet_angles",
+            value=f"{total / len(angles):.6g} teeth a planet",
+            limit=f"multiples of {360.0 / total:.6f} deg from the first planet",
+            remedy=f"nearest planet_angles that assemble: {listing} deg",
+        )
+    positions = tuple(int(p) for p in np.round(places))
+    return MeshPhasing(sun_teeth, ring_teeth, positions, rotation, flank, convention, lag)
+
+
+def phasing_of_set(
+    planetary_set: PlanetarySet, *, rotation: int = 1, flank: int = 1, convention: str = "rotation"
+) -> MeshPhasing:
+    """Phases of a geared set, the lag of its planets from the real thickness of their teeth.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    rotation, flank, convention
+        See `MeshPhasing`.
+    """
+    s = planetary_set
+    phases = s.mesh_phases
+    lag = float(np.mod(phases[0] - phases[s.n_planets], 1.0))
+    return mesh_phasing(
+        s.sun.teeth, s.ring.teeth, s.planet_angles,
+        rotation=rotation, flank=flank, convention=convention, lag=lag,
+    )  # fmt: skip
+
+
+def standard_lag(planet_teeth: int) -> float:
+    """Lag of a planet whose teeth are half a pitch thick, in [0, 1).
+
+    Its working flanks are ``z_p / 2 - 1 / 2`` pitches apart: an odd planet touches sun and ring at their
+    pitch points at the same time, an even one half a period apart (Parker and Lin, 2004).
+    """
+    return 0.5 * ((planet_teeth - 1) % 2)
+
+
+def phase_factors(phasing: MeshPhasing, harmonics) -> np.ndarray:
+    """``exp(2 pi i h gamma_j)``, (H, 2N), for whole harmonics h."""
+    return np.exp(2j * np.pi * np.outer(check_harmonics(harmonics), phasing.phases))
+
+
+def planet_sums(turns, positions, teeth_sum, harmonics, orders) -> np.ndarray:
+    """Means over the planets of ``exp(2 pi i h gamma_n) exp(i q psi_n)``, for one set or many.
+
+    Order q = 0 adds up torques and thrusts, q = +-1 lateral forces and tilting moments (the two senses of
+    their whirl), any q the motion ``exp(i q psi_n)`` of the planets. With equal spacing the mean is 1 where
+    ``h turns + q`` is a multiple of N and 0 elsewhere (R. G. Parker, J. Sound Vib. 236, 2000, 561-573).
+
+    Parameters
+    ----------
+    turns : (...) int array
+        Periods by which the phase grows over one turn, see `MeshPhasing.turns`.
+    positions : (..., N) int array
+    teeth_sum : (...) int array
+    harmonics : (H,) int array
+    orders : (Q,) int array
+
+    Returns
+    -------
+    (..., H, Q) complex array
+    """
+    turns, positions, teeth_sum = (np.asarray(a, np.int64) for a in (turns, positions, teeth_sum))
+    rank = np.multiply.outer(turns, np.asarray(harmonics))[..., :, None] + np.asarray(orders)
+    total = teeth_sum[..., None, None, None]
+    # whole numbers first: a sum that vanishes does so to rounding at any harmonic
+    steps = np.mod(rank[..., None] * positions[..., None, None, :], total)
+    return np.exp(2j * np.pi * (steps / total)).mean(axis=-1)
+
+
+def phase_kinds(turns, positions, teeth_sum, harmonics) -> np.ndarray:
+    """Phasing of every harmonic, (..., H) indices of `KINDS`; arguments as in `planet_sums`.
+
+    In-phase: all planets alike. Counter-phased: each planet half a period from its neighbours. Sequentially
+    phased: the same other step from every planet to the next. Unequally phased: anything else.
+    """
+    turns, positions, teeth_sum = (np.asarray(a, np.int64) for a in (turns, positions, teeth_sum))
+    following = np.concatenate([positions[..., 1:], positions[..., :1] + teeth_sum[..., None]], axis=-1)
+    total = teeth_sum[..., None, None]
+    rank = np.multiply.outer(turns, np.asarray(harmonics))[..., None]
+    steps = np.mod(rank * (following - positions)[..., None, :], total)
+    alike = np.all(steps == steps[..., :1], axis=-1)
+    half = np.all(2 * steps == total, axis=-1)
+    return np.select([np.all(steps == 0, axis=-1), half, alike], [0, 1, 2], 3)
+
+
+def cyclic_harmonic(phasing: MeshPhasing, harmonics) -> np.ndarray:
+    """``k = mod(h z_s, N)`` of equally spaced planets, (H,) int; -1 for unequal spacing.
+
+    The rule of Parker (2000): k = 0 rotational, k = 1 or N - 1 translational, other k planet modes only.
+    """
+    harmonics = check_harmonics(harmonics)
+    if not phasing.equally_spaced:
+        return np.full(len(harmonics), -1)
+    return np.mod(harmonics * phasing.sun_teeth, phasing.n_planets)
+
+
+def check_harmonics(harmonics) -> np.ndarray:
+    """Harmonics as whole numbers from 1, (H,); refuses others (E-HARMONICS)."""
+    found = np.atleast_1d(np.asarray(harmonics))
+    if found.ndim != 1 or not len(found) or found.dtype.kind not in "iu" or found.min() < 1:
+        raise GeometryError(
+            f"harmonics {harmonics!r} of the mesh frequency", code="E-HARMONICS",
+            limit="whole numbers from 1", remedy="for instance range(1, 7)",
+        )  # fmt: skip
+    return found.astype(np.int64)
+
+
+def _check(phasing: MeshPhasing) -> None:
+    p, problem = phasing, None
+    whole = (*p.positions, p.sun_teeth, p.ring_teeth, p.rotation, p.flank)
+    if not all(isinstance(v, int | np.integer) and not isinstance(v, bool) for v in whole):
+        problem = "teeth, positions, rotation and flank must be whole numbers"
+    elif not all(TEETH_RANGE[0] <= z <= TEETH_RANGE[1] for z in (p.sun_teeth, p.ring_teeth)):
+        problem = (
+            f"{p.sun_teeth} sun and {p.ring_teeth} ring teeth, allowed {TEETH_RANGE[0]} to {TEETH_RANGE[1]}"
+        )
+    elif not p.positions or p.positions[0] != 0 or np.any(np.diff([*p.positions, p.teeth_sum]) <= 0):
+        problem = f"positions {p.positions}, which must ascend from 0 to less than {p.teeth_sum}"
+    elif p.rotation not in (1, -1) or p.flank not in (1, -1):
+        problem = f"rotation {p.rotation} and flank {p.flank}, allowed 1 or -1"
+    elif p.convention not in CONVENTIONS:
+        problem = f"the convention {p.convention!r}, allowed {' or '.join(CONVENTIONS)}"
+    elif not math.isfinite(p.lag):
+        problem = f"a lag of {p.lag} periods"
+    if problem:
+        raise GeometryError(f"mesh phases of {problem}", code="E-PHASING", remedy="see MeshPhasing")

@@ -1,0 +1,90 @@
+"""Refusals of data that no helical planetary set can have."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import CaseError
+
+if TYPE_CHECKING:
+    from femgear.models.helical_data import HelicalBody, HelicalSet, HelicalSupport
+
+CONTACT_POINTS = ("pitch_point", "base_circles")
+DIRECTIONS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}
+
+
+def check_body(name: str, body: HelicalBody) -> None:
+    """Refuse a mass, inertia or support (E-HELICAL)."""
+    for entry, unit in (("mass", "kg"), ("inertia", "kg m^2"), ("diametral_inertia", "kg m^2")):
+        value = getattr(body, entry)
+        if not (math.isfinite(value) and value > 0.0):
+            _refuse(f"{name}.{entry}", value, unit, "finite and above 0")
+    _check_support(f"{name}.support", body.support)
+    if name == "planet" and np.any(body.support.stiffness):
+        _refuse("planet.support", "a planet", "", "none", remedy="give planet_bearing of the set")
+
+
+def check_set(data: HelicalSet) -> None:
+    """Refuse radii, angles, stiffnesses, slices and contact points (E-HELICAL)."""
+    for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
+        value = getattr(data, name)
+        if not (math.isfinite(value) and value > 0.0):
+            _refuse(name, value, "m", "finite and above 0")
+    if data.ring_radius <= data.planet_radius:
+        _refuse("ring_radius", data.ring_radius, "m", f"above the {data.planet_radius} m of the planets")
+    for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
+        value = getattr(data, name)
+        if not 0.0 < value < 0.5 * math.pi:
+            _refuse(name, value, "rad", "between 0 and pi/2", remedy="give radians")
+    if not abs(data.base_helix_angle) < 0.5 * math.pi:
+        allowed = "between -pi/2 and pi/2"
+        _refuse("base_helix_angle", data.base_helix_angle, "rad", allowed, remedy="give radians")
+    for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
+        values = getattr(data, name)
+        if values.shape != (data.n_planets,):
+            _refuse(name, f"{values.size} values", "", f"one number, or {data.n_planets}")
+        wrong = ~np.isfinite(values) | (values < 0.0)
+        if np.any(wrong):
+            _refuse(name, values[wrong][0], "N/m", "finite, 0 or more")
+    _check_support("planet_bearing", data.planet_bearing, count=data.n_planets)
+    _check_angles(data.planet_angles)
+    _check_contact(data)
+
+
+def _check_support(key: str, support: HelicalSupport, *, count: int | None = None) -> None:
+    allowed = "one number" if count is None else f"one number, or {count}"
+    for entry, unit in DIRECTIONS.items():
+        values = np.asarray(getattr(support, entry), float)
+        if values.ndim and values.shape != (count,):
+            _refuse(f"{key}.{entry}", f"{values.size} values", "", allowed)
+        if not np.all(values >= 0.0):
+            _refuse(f"{key}.{entry}", values.min(), unit, "0 or more, or infinite")
+
+
+def _check_contact(data: HelicalSet) -> None:
+    if data.contact_points not in CONTACT_POINTS:
+        _refuse("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
+    if isinstance(data.slices, bool) or int(data.slices) != data.slices or data.slices < 1:
+        _refuse("slices", data.slices, "", "a whole number of 1 or more")
+    if not (math.isfinite(data.face_width) and data.face_width >= 0.0):
+        _refuse("face_width", data.face_width, "m", "finite, 0 or more")
+    if data.slices > 1 and not data.face_width:
+        _refuse("face_width", data.face_width, "m", "above 0 for several slices")
+
+
+def _check_angles(angles: np.ndarray) -> None:
+    allowed = "one or more, finite, ascending, within one turn"
+    if not angles.size or angles.ndim != 1 or not np.all(np.isfinite(angles)):
+        _refuse("planet_angles", angles.tolist(), "rad", allowed)
+    if np.any(np.diff(angles) < 1e-9) or np.ptp(angles) > 2.0 * math.pi - 1e-9:
+        _refuse("planet_angles", angles.tolist(), "rad", allowed, remedy="give radians, in ascending order")
+
+
+def _refuse(key: str, value, unit: str, limit: str, *, remedy: str | None = None):
+    raise CaseError(
+        f"{key.replace('_', ' ').replace('.', ': ')} of {value} {unit}".rstrip(),
+        code="E-HELICAL", key=key, value=value, limit=limit, remedy=remedy,
+    )  # fmt: skip

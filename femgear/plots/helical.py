@@ -1,0 +1,227 @@
+"""Figures of the helical planetary set: mode shapes from the front and from the side, mesh-force spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.models.helical_modes import helical_motions
+from femgear.models.kinds import phasing
+from femgear.models.planar_data import CENTRAL
+from femgear.plots.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    DASHES,
+    GREEN,
+    SIZE,
+    VERMILION,
+    label,
+    legend_below,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from femgear.models.helical import HelicalSet
+    from femgear.models.helical_response import ErrorResponse
+    from femgear.system import Modes
+
+_CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
+_BODIES = {"carrier": GREEN, "ring": BLACK, "sun": VERMILION, "planets": BLUE}
+_SHOWN = 12
+_SPLIT = 4
+# half heights of the views over the ring's radius, and the largest magnification of small motions
+_FRONT, _SIDE, _MOST = 1.25, 0.4, 1e4
+# widths of lines that lie on each other in the side view
+_WIDTHS = {"carrier": 1.6, "ring": 4.5, "sun": 3.2, "planets": 1.6}
+
+
+def helical_mode_shapes(
+    data: HelicalSet, modes: Modes, *, shown: Sequence[int] | None = None, scale: float = 0.16
+) -> Figure:
+    """Bodies at rest (grey) and displaced, each mode from the front and below it from the side.
+
+    From the front: circles of base radii, for the carrier the circle of planet centres, with a spoke that
+    turns. From the side, seen along y: every body as the line of its diameter along x, which tilts about y
+    and moves along z; these small motions are drawn larger by the factor in the title.
+
+    Parameters
+    ----------
+    data : HelicalSet
+    modes : Modes
+        Of `femgear.models.helical_modes.helical_modes`.
+    shown : sequence of int, optional
+        Mode numbers from 0; the first twelve that are no rigid-body motions when omitted.
+    scale : float
+        Largest displacement of each view as a share of the ring's radius.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    CaseError
+        No mode to show, or one that the modes do not have (E-MODES).
+    """
+    if shown is None:
+        shown = np.flatnonzero(modes.frequency > 0.0)[:_SHOWN]
+    shown = [int(mode) for mode in shown]
+    if not shown or min(shown) < 0 or max(shown) >= len(modes.frequency):
+        raise CaseError(f"modes {shown} to draw", code="E-MODES", limit=f"0 to {len(modes.frequency) - 1}")
+    motions, names = _motions(data, modes.shape), phasing(helical_motions(data, modes.shape))
+    columns = min(_SPLIT, len(shown))
+    rows = -(-len(shown) // columns)
+    figure, axes = new_figure(rows=2 * rows, columns=columns, width=2.7 * columns, height=4.3 * rows + 0.6)
+    axes[0].get_gridspec().set_height_ratios([_FRONT, _SIDE] * rows)
+    for ax in axes:
+        ax.set_axis_off()
+        ax.set_aspect("equal")
+    for place, mode in enumerate(shown):
+        row, column = divmod(place, columns)
+        front, side = (axes[(2 * row + i) * columns + column] for i in (0, 1))
+        _draw_mode(front, side, data, motions[:, :, mode], scale)
+        text = f"mode {mode + 1}: {modes.frequency[mode]:.6g} Hz\n{modes.kind[mode]}\n{names[mode]}"
+        front.set_title(text, fontsize=SIZE - 2)
+    legend_below(figure, columns=5)
+    return figure
+
+
+def _draw_mode(front, side, data: HelicalSet, moved: np.ndarray, scale: float) -> None:
+    """Both views of one mode, each at its own magnification."""
+    sizes = [np.abs(moved[:, axis]).max() for axis in ([0, 1, 5], [2, 3, 4])]
+    # a view without motion shows none
+    views = [scale * data.ring_radius / max(size, max(sizes) / _MOST) for size in sizes]
+    _draw_front(front, data, views[0] * moved)
+    _draw_side(side, data, views[1] * moved)
+    times = views[1] / views[0]
+    times = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
+    side.set_title(f"from the side, × {times}", fontsize=SIZE - 3, color="0.4")
+
+
+def _motions(data: HelicalSet, shape) -> np.ndarray:
+    """x, y, z, tilts and rotation (N + 3, 6, m) of all bodies in the axes of the set."""
+    found = helical_motions(data, shape)
+    plane, space, planets = found.central[:3], found.central[3:], found.planets
+    central = np.stack(
+        [*plane.swapaxes(0, 1)[:2], space[:, 2], space[:, 0], space[:, 1], plane[:, 2]], axis=1
+    )
+    cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
+    turned = planets.copy()
+    for first in (0, 3):
+        one, two = planets[:, first], planets[:, first + 1]
+        turned[:, first], turned[:, first + 1] = cosine * one - sine * two, sine * one + cosine * two
+    return np.concatenate([central, turned])
+
+
+def _bodies(data: HelicalSet):
+    """Legend text, colour, centre and radius of every body, in the order of the coordinates."""
+    radii = (data.centre_distance, data.ring_radius, data.sun_radius)
+    for name, radius in zip(CENTRAL, radii):
+        yield name, _BODIES[name], 0j, radius
+    for centre in data.centre_distance * np.exp(1j * data.planet_angles):
+        yield "planets", _BODIES["planets"], centre, data.planet_radius
+
+
+def _draw_front(ax, data: HelicalSet, moved: np.ndarray) -> None:
+    for (name, colour, centre, radius), (x, y, _, _, _, u) in zip(_bodies(data), moved):
+        spoke = radius * np.exp(1j * (np.angle(centre) if centre else 0.0))
+        style = {"linestyle": "--"} if name == "carrier" else {}
+        for at, turn, look in (
+            (centre, 0.0, {"color": "0.82", "linewidth": 1.0, "label": "at rest"}),
+            (centre + x + 1j * y, u / radius, {"color": colour, "linewidth": 1.5, "label": name} | style),
+        ):
+            ax.plot(*_xy(at + radius * _CIRCLE), **look)
+            ax.plot(*_xy(np.array([at, at + spoke * np.exp(1j * turn)])), **look)
+    _limits(ax, data, _FRONT)
+
+
+def _draw_side(ax, data: HelicalSet, moved: np.ndarray) -> None:
+    ax.axhline(0.0, color="0.82", linewidth=1.0)
+    for (name, colour, centre, radius), (_, _, z, _, tilt, _) in zip(_bodies(data), moved):
+        ends = np.array([-radius, radius])
+        style = {"linestyle": "--"} if name == "carrier" else {}
+        # a turn by phi about y lowers points at positive x
+        height = z - tilt / radius * ends
+        ax.plot(centre.real + ends, height, color=colour, linewidth=_WIDTHS[name], **style)
+    _limits(ax, data, _SIDE)
+
+
+def _limits(ax, data: HelicalSet, high: float) -> None:
+    ax.set_xlim(-1.25 * data.ring_radius, 1.25 * data.ring_radius)
+    ax.set_ylim(-high * data.ring_radius, high * data.ring_radius)
+
+
+def _xy(points):
+    return points.real, points.imag
+
+
+def mesh_force_spectra(
+    response: ErrorResponse,
+    titles: Sequence[str],
+    *,
+    meshes: Sequence[tuple[str, int]] = (("sun-planet 1", 0),),
+    marks: Sequence[tuple[str, Sequence[float]]] = (),
+) -> Figure:
+    """Amplitude of dynamic mesh forces over the frequency of every harmonic, one panel a case.
+
+    Parameters
+    ----------
+    response : ErrorResponse
+        Of as many cases as there are titles.
+    titles : sequence of str
+    meshes : sequence of (text, column)
+        Columns of ``W`` to draw, up to four.
+    marks : sequence of (text, frequencies)
+        Natural frequencies [Hz] by kind, drawn as ticks along the lower edge.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    CaseError
+        Another number of titles than of cases (E-SHAPE).
+    """
+    if len(titles) != len(response.force):
+        raise CaseError(
+            f"{len(titles)} titles for {len(response.force)} cases", code="E-SHAPE", limit="one a case"
+        )  # fmt: skip
+    columns = 2 if len(titles) > 1 else 1
+    rows = -(-len(titles) // columns)
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=5.2 * columns, height=2.2 * rows + 1.0, sharex=True, sharey=True
+    )  # fmt: skip
+    for ax, title, force in zip(axes, titles, response.force):
+        _draw_spectra(ax, response, force, meshes, marks)
+        label(ax, title=title)
+    for ax in axes[len(titles) :]:
+        ax.set_axis_off()
+    axes[0].set_xlim(0.0, response.mesh_frequency.max())
+    for ax in axes[max(len(titles) - columns, 0) : len(titles)]:
+        label(ax, "frequency of the harmonic [Hz]")
+    for ax in axes[: len(titles) : columns]:
+        label(ax, y="mesh force [N]")
+    legend_below(figure, columns=2 * columns if len(meshes) == 1 else columns + 1)
+    return figure
+
+
+def _draw_spectra(ax, response: ErrorResponse, force: np.ndarray, meshes, marks) -> None:
+    """Amplitudes of one case (F, H, n_columns), and the marks inside the axis."""
+    for i, h in enumerate(response.harmonics):
+        for dash, (text, column) in zip(DASHES, meshes):
+            hertz, size = h * response.mesh_frequency, np.abs(force[:, i, column])
+            name = f"harmonic {h}" + (f", {text}" if len(meshes) > 1 else "")
+            colour = COLOURS[i % len(COLOURS)]
+            ax.plot(hertz, size, color=colour, linestyle=dash, linewidth=1.3, label=name)
+    for marker, (text, found) in zip("|xo^", marks):
+        found = [hertz for hertz in found if 0.0 <= hertz <= response.mesh_frequency.max()]
+        ax.plot(found, np.full(len(found), 0.03), marker, color=BLACK, markersize=6, label=text,
+                linestyle="none", transform=ax.get_xaxis_transform(), clip_on=False)  # fmt: skip
+    ax.set_yscale("log")

@@ -1,0 +1,88 @@
+"""Verdict on a periodic solution: its Floquet multipliers, whether it is stable, how it is lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Multipliers beyond the unit circle by less than this are taken as on it.
+_CIRCLE = 1e-6
+# A multiplier is real when its imaginary part is smaller than this share of it.
+_REAL = 1e-7
+
+
+@dataclass(frozen=True)
+class FloquetVerdict:
+    """Whether a periodic solution is stable.
+
+    Parameters
+    ----------
+    multipliers : (m,) complex array
+        Of one period of the base frequency, largest modulus first; empty where there is no verdict.
+    exponents : (m,) complex array
+        ``log(multiplier) / period`` [1/s].
+    stable : bool or None
+        None where the method does not cover the solution, its period is too long for the fastest mode, or
+        the error leaves the question open.
+    loss : str
+        ``""`` when stable; how the largest multiplier leaves the unit circle: ``"fold"`` (through +1: limit
+        point, pitchfork, transcritical), ``"flip"`` (through -1) or ``"Neimark-Sacker"`` (complex pair).
+    method : str
+        ``"exact exponentials"``, ``"splitting"``, ``"Hill"`` or ``""``.
+    message : str
+    error : float
+        Estimated relative error of the monodromy matrix; of Hill's method it is not known (nan).
+    """
+
+    multipliers: np.ndarray
+    exponents: np.ndarray
+    stable: bool | None
+    loss: str
+    method: str
+    message: str
+    error: float = 0.0
+
+
+def open_verdict(reason: str) -> FloquetVerdict:
+    """No verdict, for the reason given."""
+    return FloquetVerdict(np.zeros(0, complex), np.zeros(0, complex), None, "", "", reason, np.nan)
+
+
+def verdict_of(multipliers, period: float, method: str, error: float, tolerance: float) -> FloquetVerdict:
+    """Verdict on the multipliers of one period.
+
+    Parameters
+    ----------
+    multipliers : (m,) complex array
+    period : float
+        [s].
+    method : str
+    error, tolerance : float
+        Estimated and allowed relative error of the monodromy matrix.
+    """
+    multipliers = np.asarray(multipliers, complex)
+    size = np.abs(multipliers)
+    # of a complex pair the one with positive imaginary part first, whatever rounding does to the moduli
+    rounded = np.round(size / max(size.max(initial=0.0), 1e-300), 9)
+    multipliers = multipliers[np.lexsort((-multipliers.imag, -rounded))]
+    largest = float(np.abs(multipliers[0])) if len(multipliers) else 0.0
+    with np.errstate(divide="ignore"):
+        exponents = np.log(multipliers) / period
+    stable: bool | None = largest <= 1.0 + _CIRCLE
+    message = f"largest multiplier {largest:.6g}"
+    if error > tolerance and abs(largest - 1.0) <= max(10.0 * error, _CIRCLE):
+        stable = None
+        message += f", undecided: error of the monodromy matrix {error:.1e}, aimed at {tolerance:.1e}"
+    loss = "" if stable is not False else loss_of(multipliers[0])
+    outside = int(np.sum(np.abs(multipliers) > 1.0 + _CIRCLE))
+    if loss:
+        message += f" ({loss}); {outside} outside the unit circle"
+    return FloquetVerdict(multipliers, exponents, stable, loss, method, message, error)
+
+
+def loss_of(multiplier: complex) -> str:
+    """How a multiplier outside the unit circle left it: "fold", "flip" or "Neimark-Sacker"."""
+    if abs(multiplier.imag) > _REAL * abs(multiplier):
+        return "Neimark-Sacker"
+    return "fold" if multiplier.real > 0.0 else "flip"

@@ -1,0 +1,203 @@
+#!/usr/bin/env python3
+"""Mesh phasing of a planetary set, neighbouring tooth numbers, and spectra of a published helical train."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter
+from script_tools import print_table, ready_folder, run_script, say_files, write_csv
+
+from femgear.errors import CaseError
+
+# four equal planets near the published 30/20/70
+TYPES = {"in-phase": (28, 22, 72), "counter-phased": (30, 20, 70), "sequentially phased": (29, 21, 71)}
+
+
+def main(
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/planet_phasing"),
+    sun: int = 30,
+    planet: int = 20,
+    ring: int = 70,
+    planets: int = 4,
+    angle: Annotated[tuple[float, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
+    convention: Literal["rotation", "printed"] = "rotation",
+    harmonics: int = 6,
+    distance: int = 3,
+    tolerance: float = 0.03,
+    points: int = 2000,
+) -> None:
+    """Phasing of every harmonic, tooth numbers near the given ones, and figures after Kahraman (1994).
+
+    Parameters
+    ----------
+    output
+        Folder of the results.
+    sun, planet, ring
+        Teeth.
+    planets
+        Number of planets without --angle; they stand at the assembly positions nearest to equal spacing.
+    angle
+        Planet angles [deg] instead, ascending, once for every planet.
+    convention
+        Phases of turning teeth, or as printed in Eq. (6) of the paper.
+    harmonics
+        Harmonics of the mesh frequency.
+    distance
+        Largest change of each tooth number.
+    tolerance
+        Largest relative change of the ratio.
+    points
+        Frequencies of the mesh-force spectra, 2 or more.
+    """
+    from femgear.gears import equal_planet_angles
+    from femgear.gears.checks import feasible_angles
+    from femgear.gears.phasing import mesh_phasing, standard_lag
+    from femgear.gears.phasing_tables import phasing_table
+    from femgear.gears.tooth_choice import neighbouring_teeth
+    from femgear.plots import save_figure
+    from femgear.plots.phasing import mesh_force_spectra, phase_diagram, resultant_chart
+
+    if points < 2 or harmonics < 1:
+        raise CaseError(
+            f"{points} frequencies, {harmonics} harmonics", code="E-RANGE", limit="2 frequencies, 1 harmonic"
+        )
+    planets = len(angle) or planets
+    choices = neighbouring_teeth(sun, planet, ring, planets, distance=distance, ratio_tolerance=tolerance)
+    psi = tuple(np.radians(angle)) or feasible_angles(sun + ring, equal_planet_angles(planets))
+    phasing = mesh_phasing(sun, ring, psi, convention=convention, lag=standard_lag(planet))
+    table = phasing_table(phasing, range(1, harmonics + 1))
+    folder = ready_folder(output)
+    header, rows = _phasing_rows(table)
+    print_table(
+        f"{sun}/{planet}/{ring}, {len(psi)} planets at {_degrees(psi)} deg, {convention}", header, rows
+    )
+    write_csv(folder / "phasing.csv", header, rows)
+    header, rows = _choice_rows(choices)
+    title = (
+        f"Tooth numbers near {sun}/{planet}/{ring} for {planets} planets; what is left in harmonics 1 to 4"
+    )
+    print_table(title, header[:8], [row[:8] for row in rows[:15]])
+    write_csv(folder / "neighbours.csv", header, rows)
+    save_figure(phase_diagram(phasing, harmonics=range(1, min(harmonics, 4) + 1)), folder / "phases.png")
+    save_figure(resultant_chart(_types(convention, harmonics)), folder / "resultants.png")
+    frequency, forces, modes = _spectra(points)
+    meshes = ("sun-planet 1", "sun-planet 2")
+    save_figure(mesh_force_spectra(frequency, forces, modes=modes, meshes=meshes), folder / "mesh_forces.png")
+    write_csv(folder / "mesh_forces.csv", *_force_rows(frequency, forces, meshes))
+    names = ("phasing.csv", "neighbours.csv", "mesh_forces.csv", "phases.png", "resultants.png")
+    say_files(folder, [*names, "mesh_forces.png"])
+
+
+def _phasing_rows(table):
+    header = (
+        "harmonic",
+        "phasing",
+        "k = mod(h z_s, N)",
+        "torque, thrust",
+        "lateral force, tilting",
+        "excites modes",
+    )
+    rows = [
+        (
+            int(h),
+            kind,
+            "-" if k < 0 else int(k),
+            f"{size[:, 0].max():.4f}",
+            f"{size[:, 1].max():.4f}",
+            " + ".join(modes),
+        )
+        for h, kind, k, size, modes in zip(
+            table.harmonics, table.kind, table.cyclic, table.members, table.excited
+        )
+    ]
+    return header, [tuple(str(value) for value in row) for row in rows]
+
+
+def _choice_rows(choices):
+    header = (
+        "teeth", "ratio", "change [%]", "spacing", "torque left [%]", "lateral left [%]", "hunting",
+        "room [modules]", "z_r - z_s - 2 z_p", "phasing",
+    )  # fmt: skip
+    short, rows = np.array(["in", "counter", "sequential", "unequal"]), []
+    for i, teeth in enumerate(choices.teeth.tolist()):
+        off = f"{np.degrees(choices.spacing_error[i]):.2f} deg off"
+        kinds = dict.fromkeys(short[choices.kind[i]])
+        left = [", ".join(f"{100 * value:.0f}" for value in values) for values in choices.sums[i].T]
+        rows.append((
+            "/".join(map(str, teeth)),
+            f"{choices.ratio[i]:.4f}",
+            f"{100 * choices.ratio_change[i]:.2f}",
+            "equal" if choices.equally_spaced[i] else off,
+            *left,
+            "yes" if choices.hunting[i] else "no",
+            f"{choices.room[i]:.2f}",
+            str(choices.closure[i]),
+            ", ".join(kinds if len(kinds) == 1 else short[choices.kind[i]]),
+        ))  # fmt: skip
+    return header, rows
+
+
+def _types(convention, harmonics):
+    """Tables of the three types of four equal planets, and of two pairs that stand unequally."""
+    from femgear.gears.phasing import MeshPhasing
+    from femgear.gears.phasing_tables import phasing_table
+
+    sets = {f"{name}: {'/'.join(map(str, z))}": (z, (0, 25, 50, 75)) for name, z in TYPES.items()}
+    sets["unequal pairs: 30/21/72"] = ((30, 21, 72), (0, 21, 51, 72))
+    return {
+        title: phasing_table(MeshPhasing(z[0], z[2], places, convention=convention), range(1, harmonics + 1))
+        for title, (z, places) in sets.items()
+    }
+
+
+def _spectra(points):
+    """Forces of two sun meshes of the published helical train, four harmonics of 1 um, 5 % damping."""
+    from femgear.gears.phasing import MeshPhasing, phase_factors, standard_lag
+    from femgear.models.helical import helical_system
+    from femgear.models.helical_modes import helical_modes
+    from femgear.models.helical_response import modal_error_response
+    from femgear.validation.helical import kahraman_set
+
+    data, frequency = kahraman_set(), np.linspace(100.0, 15e3, points)
+    system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)
+    last = "sequentially phased"
+    sets = [(f"{name}: {'/'.join(map(str, z))}", z, "rotation") for name, z in TYPES.items()]
+    sets.append((f"{last}: {'/'.join(map(str, TYPES[last]))}, phases as printed", TYPES[last], "printed"))
+    phasings = [
+        MeshPhasing(z[0], z[2], (0, 25, 50, 75), convention=convention, lag=standard_lag(z[1]))
+        for _, z, convention in sets
+    ]
+    found = []
+    for h in (1, 2, 3, 4):
+        error = 1e-6 * np.array([phase_factors(one, [h]).T for one in phasings])
+        one = modal_error_response(system, modes, frequency / h, error, harmonics=[h])
+        found.append(np.abs(one.force[:, :, 0, :2]))
+    forces = {title: np.array([force[c] for force in found]) for c, (title, *_) in enumerate(sets)}
+    kinds, inside = np.array(modes.kind), (modes.frequency > 0.0) & (modes.frequency < frequency[-1])
+    names = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}
+    marks = {short: modes.frequency[inside & (kinds == kind)] for short, kind in names.items()}
+    return frequency, forces, marks
+
+
+def _force_rows(frequency, forces, meshes):
+    header = ("set", "mesh", "frequency [Hz]", *(f"harmonic {h} [N]" for h in (1, 2, 3, 4)))
+    rows = (
+        (title, mesh, float(f), *map(float, values))
+        for title, force in forces.items()
+        for j, mesh in enumerate(meshes)
+        for f, values in zip(frequency, force[:, :, j].T)
+    )
+    return header, rows
+
+
+def _degrees(psi) -> str:
+    return ", ".join(f"{a:.6g}" for a in np.degrees(psi))
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(main))

@@ -1,0 +1,153 @@
+"""Forced response to phased transmission errors against the direct solution, symmetry and equilibrium."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.gears.phasing import MeshPhasing, mesh_phasing, phase_factors
+from femgear.models.helical import free_motions, helical_system
+from femgear.models.helical_data import body_masses
+from femgear.models.helical_modes import helical_modes, helical_motions, helical_springs
+from femgear.models.helical_response import modal_error_response, phased_errors, spring_loads
+from femgear.models.kinds import phase_shares
+from femgear.solvers.frequency_response import mesh_error_response
+from femgear.validation.helical import cases, kahraman_set
+
+HERTZ = np.linspace(60.0, 15e3, 150)
+AMPLITUDES = np.array([1.0, 0.5j, -0.25, 0.1 + 0.1j]) * 1e-6
+
+
+def direct(data, error, outputs=None, hertz=HERTZ):
+    return mesh_error_response(
+        helical_system(data), hertz, error, mesh_stiffness=data.column_stiffness, outputs=outputs,
+        damping_ratio=0.05,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("changes", [
+    {},
+    {"contact_points": "pitch_point", "slices": 3, "face_width": 0.03},
+    {"planet_angles": [0.0, 1.3, 3.0, 4.9]},
+    {"planet_angles": 2 * np.pi * np.arange(5) / 5},
+])  # fmt: skip
+def test_sum_of_modes_is_the_direct_solution(changes):
+    data = kahraman_set(**changes)
+    system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)
+    rng = np.random.default_rng(1)
+    phases = rng.uniform(size=(2, len(data.column_stiffness)))
+    error = np.array([phased_errors(AMPLITUDES, p) for p in phases])
+    _, rows = spring_loads(helical_springs(data))
+    found = modal_error_response(system, modes, HERTZ, error, outputs=rows)
+    for case in range(2):
+        expected = direct(data, error[case], rows)
+        for name in ("deflection", "force", "output"):
+            ours, theirs = getattr(found, name)[case], getattr(expected, name)
+            assert np.abs(ours - theirs).max() < 1e-10 * np.abs(theirs).max()
+
+
+def test_modes_left_out_leave_their_static_part():
+    data = kahraman_set()
+    system, error = helical_system(data), phased_errors(AMPLITUDES, cases()["29/21/71"].phases)
+    _, rows = spring_loads(helical_springs(data))
+    whole, cut = (
+        modal_error_response(system, modes, [50.0, 100.0], error, outputs=rows)
+        for modes in (
+            helical_modes(data, damping_ratio=0.05),
+            helical_modes(data, damping_ratio=0.05, max_frequency=20e3),
+        )
+    )
+    for name in ("force", "output"):
+        ours, theirs = getattr(cut, name)[0], getattr(whole, name)[0]
+        away = np.abs(ours - theirs).max(axis=(1, 2)) / np.abs(theirs).max()
+        # what is left is damping and inertia of the modes above: small at low frequency
+        assert away[1] < 1e-2 and away[0] < 0.6 * away[1]
+
+
+@pytest.mark.parametrize("teeth", list(cases()))
+@pytest.mark.parametrize("planets", [3, 4, 5])
+def test_each_harmonic_moves_the_planets_in_its_own_phasing(teeth, planets):
+    """Cyclic harmonic mod(h z_s, N) of the planets' motion, from the direct solution, without modes."""
+    sun = int(teeth.split("/")[0])
+    ring = planets * 25 - sun
+    data = kahraman_set(planet_angles=2 * np.pi * np.arange(planets) / planets)
+    case = MeshPhasing(sun, ring, tuple(25 * n for n in range(planets)), lag=0.3)
+    error = phased_errors(AMPLITUDES, case.phases)
+    n = len(helical_system(data).M)
+    found = direct(data, error, np.eye(n), hertz=np.array([400.0, 1300.0, 2500.0]))
+    for h in range(4):
+        motions = helical_motions(data, found.output[:, h].T)
+        share = phase_shares(motions, signed=True)
+        own = (-(h + 1) * sun) % planets
+        others = np.delete(share, own, axis=0)
+        # shares of energy: squares of the leakage
+        assert share[own] == pytest.approx(1.0) and others.max() < 1e-18
+        central = np.abs(motions.central).max(axis=(1, 2)) if own not in (0, 1, planets - 1) else [0.0]
+        assert np.max(central) < 1e-9 * np.abs(motions.planets).max()
+
+
+@pytest.mark.parametrize("teeth", ["29/21/71", "31/19/69"])
+def test_printed_phases_pair_opposite_planets_and_turning_teeth_make_all_equal(teeth):
+    data = kahraman_set()
+    for convention, alike in (("rotation", True), ("printed", False)):
+        case = cases(convention=convention)[teeth]
+        size = np.abs(direct(data, phased_errors(np.full(3, 1e-6), case.phases)).force[:, [0, 2]])
+        for meshes in (size[..., :4], size[..., 4:]):
+            assert np.abs(meshes[..., [0, 1]] - meshes[..., [2, 3]]).max() < 1e-10 * size.max()
+            assert (np.ptp(meshes, axis=-1).max() < 1e-10 * size.max()) == alike
+
+
+def test_counter_phased_harmonics_peak_at_the_counter_phased_mode():
+    """30/20/70: harmonics 1 and 3 peak near 9840 Hz, harmonics 2 and 4 at in-phase modes."""
+    data = kahraman_set()
+    system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)
+    error = phased_errors(np.full(4, 1e-6), cases()["30/20/70"].phases)
+    for h, expected in ((1, 9840.2), (2, 12032.9), (3, 9840.2), (4, 12032.9)):
+        hertz = np.arange(9e3, 14e3, 10.0)
+        response = modal_error_response(system, modes, hertz / h, error)
+        peak = hertz[np.abs(response.force[0, :, h - 1, 0]).argmax()]
+        assert peak == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("uneven", [False, True])
+def test_loads_of_springs_move_the_masses(uneven):
+    """Newton on every body: spring loads along their directions against -omega^2 m q, undamped."""
+    angles = 0.5 * np.pi * np.arange(4) + 0.2 * np.array([0, 1, 0, -1]) * uneven
+    data = kahraman_set(planet_angles=angles)
+    system, modes = helical_system(data), helical_modes(data)
+    springs = {k: v for k, v in helical_springs(data).items() if k.startswith(("bearing", "support"))}
+    names, rows = spring_loads(springs)
+    hertz, error = np.array([333.3]), phased_errors(AMPLITUDES, [0, 0.3, 0.1, 0.7, 0.2, 0.9, 0.4, 0.6])
+    motion = np.eye(len(system.M))
+    found = modal_error_response(system, modes, hertz, error, outputs=np.vstack([rows, motion]))
+    columns = np.hstack([c for c, _ in springs.values()])
+    assert len(names) == columns.shape[1] and "bearing of planet 1, radial 2" in names
+    for h in range(4):
+        out = found.output[0, 0, h]
+        load, q = out[: len(rows)], out[len(rows) :]
+        inertia = -((2 * np.pi * 333.3 * (h + 1)) ** 2) * body_masses(data).ravel() * q
+        rest = inertia + columns @ load + system.W @ found.force[0, 0, h]
+        assert np.abs(rest).max() < 1e-8 * np.abs(system.W @ found.force[0, 0, h]).max()
+    assert free_motions(data).shape == (42, 42)
+
+
+def test_phase_factors_are_those_of_the_teeth():
+    angles = 2 * np.pi * np.array([0, 17, 49, 80]) / 100
+    case = mesh_phasing(30, 70, angles, lag=0.5)
+    expected = phase_factors(case, np.arange(1, 5)).T
+    assert phased_errors(np.ones(4), case.phases) == pytest.approx(expected, abs=1e-12)
+
+
+def test_what_does_not_fit_is_refused():
+    data = kahraman_set()
+    system, modes = helical_system(data), helical_modes(data)
+    error = phased_errors(AMPLITUDES, np.zeros(8))
+    with pytest.raises(CaseError, match="E-SHAPE"):
+        modal_error_response(system, modes, [100.0], error[:7])
+    with pytest.raises(CaseError, match="E-FREQUENCY"):
+        modal_error_response(system, modes, [-1.0], error)
+    with pytest.raises(ConvergenceError, match="E-RESONANCE"):
+        modal_error_response(system, modes, modes.frequency[5:6], error)
+    still = modal_error_response(system, replace(modes), [0.0], error)
+    assert np.all(np.isfinite(still.force))
