@@ -16,6 +16,7 @@ from femgear.validation import (
     integration,
     members,
     modulation,
+    moving_force,
     nonlinear,
     nonlinear_tones,
     nrel,
@@ -30,6 +31,8 @@ from femgear.validation import (
     standard,
     static,
     stress,
+    support_stiffness,
+    torque_rotation,
     two_body,
     vibration,
 )
@@ -143,6 +146,31 @@ THEMES = (
         "Vibration of the ring",
         "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress.",
         (ring.plain_annulus, ring.toothed_ring),
+    ),
+    Theme(
+        "two routes",
+        "Two routes to the mesh stiffness",
+        "Sun-planet and planet-ring of 27/40/108, each alone, 100/3 N m at the sun.",
+        (torque_rotation.same_depth, torque_rotation.some_positions),
+        (
+            torque_rotation.all_positions,
+            torque_rotation.planet_and_ring,
+            torque_rotation.other_treatments,
+        ),
+    ),
+    Theme(
+        "support",
+        "Support stiffness",
+        "K = F/X, one face coupled to a centre node.",
+        (support_stiffness.annuli,),
+        (support_stiffness.shafts,),
+    ),
+    Theme(
+        "moving",
+        "A ring under moving mesh forces",
+        "Errors relative to the motion; processor times are those of one run.",
+        (),
+        (moving_force.table,),
     ),
     Theme(
         "lumped set",

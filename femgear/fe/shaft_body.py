@@ -1,0 +1,226 @@
+"""Support stiffness K = F/X of a stepped shaft as a body of revolution: one end face held, the other rigid.
+
+Under a lateral force on the centre node the displacements are ``U cos t``, ``V sin t``, ``W cos t`` around
+the axis, so that the three-dimensional body is solved on its half section (O. C. Zienkiewicz, R. L. Taylor,
+The Finite Element Method, vol. 2, "Semi-analytical finite element processes").
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from femgear.errors import GeometryError
+
+ACROSS = 4  # element edges across the thinnest wall
+
+
+@dataclass(frozen=True)
+class ShaftStep:
+    """One part of a stepped shaft.
+
+    Parameters
+    ----------
+    length : float
+        [m]
+    outer_diameter, inner_diameter : float
+        [m]; a bore of zero is a solid shaft.
+
+    Raises
+    ------
+    GeometryError
+        Numbers that no shaft has (E-SHAFT).
+    """
+
+    length: float
+    outer_diameter: float
+    inner_diameter: float = 0.0
+
+    def __post_init__(self):
+        numbers = (self.length, self.outer_diameter, self.inner_diameter)
+        if not (
+            np.isfinite(numbers).all() and self.length > 0 and 0 <= self.inner_diameter < self.outer_diameter
+        ):
+            raise GeometryError(
+                f"a part of a shaft {numbers}",
+                code="E-SHAFT",
+                limit="length > 0, 0 <= inner < outer diameter",
+            )
+
+    @property
+    def area(self) -> float:
+        """[m^2]"""
+        return 0.25 * math.pi * (self.outer_diameter**2 - self.inner_diameter**2)
+
+    @property
+    def second_moment(self) -> float:
+        """About a diameter [m^4]."""
+        return math.pi / 64 * (self.outer_diameter**4 - self.inner_diameter**4)
+
+    def shear_coefficient(self, poisson_ratio: float) -> float:
+        """Of G. R. Cowper, J. Appl. Mech. 33 (1966) 335-340, round and hollow round section."""
+        nu, m2 = poisson_ratio, (self.inner_diameter / self.outer_diameter) ** 2
+        both = (1 + m2) ** 2
+        return 6 * (1 + nu) * both / ((7 + 6 * nu) * both + (20 + 12 * nu) * m2)
+
+
+def timoshenko_flexibility(steps: Sequence[ShaftStep], material) -> np.ndarray:
+    """Deflection and tilt of the free end of a stepped cantilever per unit force and moment, (2, 2).
+
+    Unit-load integrals of ``M^2/(E I) + Q^2/(kappa G A)`` (S. Timoshenko, Strength of Materials, part I),
+    from the held end to the free one.
+    """
+    far = sum(step.length for step in steps)
+    result = np.zeros((2, 2))
+    for step in steps:
+        near = far - step.length
+        bending = material.youngs_modulus * step.second_moment
+        shear = step.shear_coefficient(material.poisson_ratio) * material.shear_modulus * step.area
+        cross = (far**2 - near**2) / (2 * bending)
+        result += [
+            [(far**3 - near**3) / (3 * bending) + step.length / shear, cross],
+            [cross, step.length / bending],
+        ]
+        far = near
+    return result
+
+
+def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1.0) -> np.ndarray:
+    """As `timoshenko_flexibility`, of the solid body, its end face rigidly coupled to the centre node.
+
+    Parameters
+    ----------
+    steps : sequence of ShaftStep
+        From the held end to the coupled one.
+    material : Material
+    refine : float
+        Divides the element size.
+
+    Returns
+    -------
+    (2, 2) array
+        Displacement [m] and tilt [rad] of the centre node per unit force [N] and moment [N m].
+
+    Raises
+    ------
+    GeometryError
+        No parts, or neighbours that do not touch (E-SHAFT).
+    GridError
+    """
+    from scipy.sparse.linalg import splu
+
+    from femgear.fe.meshing import mesh_outline
+
+    grid = mesh_outline(_half_section(steps, refine))
+    K, size = _stiffness(grid, material), 3 * grid.n_nodes
+    face, held = (np.unique(grid.boundaries[name]) for name in ("coupled", "held"))
+    shapes = _free_shapes(grid, face, held)
+    prescribed = np.zeros((size, 2))
+    prescribed[3 * face, 0], prescribed[3 * face + 1, 0] = 1.0, -1.0
+    # a tilt that goes with a positive deflection lowers the side towards which the shaft bends
+    prescribed[3 * face + 2, 1] = -grid.points[face, 0]
+    matrix = (shapes.T @ K @ shapes).tocsc()
+    solved = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(
+        shapes.T @ (K @ prescribed)
+    )
+    u = prescribed - shapes @ solved
+    return np.linalg.inv(u.T @ (K @ u))
+
+
+def shaft_support_stiffness(steps: Sequence[ShaftStep], material, *, refine: float = 1.0) -> float:
+    """Radial stiffness K = F/X of the centre node of the coupled end face, which may tilt [N/m].
+
+    Arguments and errors as for `shaft_flexibility`.
+    """
+    return float(1.0 / shaft_flexibility(steps, material, refine=refine)[0, 0])
+
+
+def _half_section(steps, refine):
+    """Outline in the half plane (r, z) with the end faces ``held`` (z = 0) and ``coupled``."""
+    from femgear.fe.outline import Outline
+
+    if not steps:
+        raise GeometryError("a shaft without parts", code="E-SHAFT", limit="one part or more")
+    for one, other in pairwise(steps):
+        if not max(one.inner_diameter, other.inner_diameter) < min(one.outer_diameter, other.outer_diameter):
+            raise GeometryError("two neighbouring parts of a shaft do not touch", code="E-SHAFT")
+    wall = min(0.5 * (step.outer_diameter - step.inner_diameter) for step in steps)
+    size = wall / (ACROSS * refine)
+    z = np.concatenate([[0.0], np.cumsum([step.length for step in steps])])
+    outer, inner = [], []
+    for k, step in enumerate(steps):
+        outer += [(0.5 * step.outer_diameter, z[k]), (0.5 * step.outer_diameter, z[k + 1])]
+        inner += [(0.5 * step.inner_diameter, z[k]), (0.5 * step.inner_diameter, z[k + 1])]
+    chains = [("held", [inner[0], outer[0]]), ("outside", outer), ("coupled", [outer[-1], inner[-1]])]
+    chains.append(("inside", inner[::-1]))
+    return Outline(tuple((name, _divided(corners, size)) for name, corners in chains))
+
+
+def _divided(corners, size):
+    """Points (2k + 1, 2) along a polygon line, edges of about a size; corners that coincide count once."""
+    points = [np.array(corners[0])]
+    for corner in map(np.array, corners[1:]):
+        length = float(np.hypot(*(corner - points[-1])))
+        if length > 1e-12:
+            start, count = points[-1], 2 * max(1, math.ceil(length / size))
+            points += [start + (corner - start) * i / count for i in range(1, count)] + [corner]
+    return np.array(points)
+
+
+def _stiffness(grid, material):
+    """Stiffness (3n, 3n) of the first harmonic around the axis, coordinates (U, V, W) node by node."""
+    from scipy.sparse import block_array, csc_array
+    from skfem import BilinearForm
+
+    from femgear.fe.elasticity import basis, node_of_dof
+
+    scalar = basis(grid, order=5)
+    nodes = node_of_dof(grid, scalar)
+    lam, mu = material.lame("plane strain")
+    d = np.array([[lam + 2 * mu if i == j else lam for j in range(3)] for i in range(3)])
+    elastic = np.block([[d, np.zeros((3, 3))], [np.zeros((3, 3)), mu * np.eye(3)]])
+
+    def strains(component, u, r):
+        """Strains rr, tt, zz, rt, rz, tz of one component without their cosines and sines."""
+        zero = 0.0 * u
+        return (
+            (u.grad[0], u / r, zero, -u / r, u.grad[1], zero),
+            (zero, u / r, zero, u.grad[0] - u / r, zero, u.grad[1]),
+            (zero, zero, u.grad[1], zero, u.grad[0], -u / r),
+        )[component]
+
+    def block(i, j):
+        def form(u, v, w):
+            r = w.x[0]
+            left, right = strains(i, v, r), strains(j, u, r)
+            terms = [elastic[a, b] * left[a] * right[b] for a, b in zip(*np.nonzero(elastic), strict=True)]
+            return np.pi * r * sum(terms)
+
+        return BilinearForm(form).assemble(scalar)
+
+    blocks = block_array([[block(i, j) for j in range(3)] for i in range(3)]).tocoo()
+    n = grid.n_nodes
+    row, column = (3 * nodes[index % n] + index // n for index in (blocks.row, blocks.col))
+    K = csc_array((blocks.data, (row, column)), shape=(3 * n, 3 * n))
+    return 0.5 * (K + K.T)
+
+
+def _free_shapes(grid, face, held):
+    """Displacements (3n, m) of the coordinates that are not prescribed; on the axis V = -U and W = 0."""
+    from scipy.sparse import csc_array
+
+    n, r = grid.n_nodes, grid.points[:, 0]
+    taken = np.zeros(n, bool)
+    taken[face] = taken[held] = True
+    axis = np.flatnonzero((r <= 1e-9 * r.max()) & ~taken)
+    off = np.flatnonzero((r > 1e-9 * r.max()) & ~taken)
+    dofs = (3 * off[:, None] + np.arange(3)).ravel()
+    rows = np.concatenate([dofs, 3 * axis, 3 * axis + 1])
+    own = len(dofs) + np.arange(len(axis))
+    columns = np.concatenate([np.arange(len(dofs)), own, own])
+    values = np.concatenate([np.ones(len(dofs) + len(axis)), -np.ones(len(axis))])
+    return csc_array((values, (rows, columns)), shape=(3 * n, len(dofs) + len(axis)))

@@ -1,0 +1,207 @@
+"""Two routes to the mesh stiffness: torque and rotation of whole gears against the flank compliance.
+
+The compliance route takes the bodies from one tooth sector by cyclic symmetry, joins them to a half plane at
+a depth and solves for pressure cells. The torque-rotation route (`femgear.contact.torque_rotation`) joins all
+sectors of both gears, resolves the contact with elements and turns one gear against the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.bodies import RING_STATE, make_bodies, make_sectors
+from femgear.contact.flanks import flank_load_columns, flank_stations, joining_depth
+from femgear.contact.solve import solve_contact, tangent_stiffness
+from femgear.contact.torque_rotation import GearPair, TorqueRotation, torque_rotation
+from femgear.fe.elasticity import Material
+from femgear.threads import one_blas_thread
+from femgear.validation.planetary import reference_set
+from femgear.validation.rows import Row, at_most, information, within
+
+STEEL = Material(206e9, 0.3, 7850.0)
+POSITIONS = 64  # in one mesh period
+SUN_TORQUE = 100.0 / 3.0  # N m, of one of three planets
+SUN_PLANET, PLANET_RING = 0, 3
+# twelve edges on a Hertzian half width, everything else somewhat coarser than the compliance route has it
+DIVISION = {"edges": 12, "refine": 0.6}
+SOURCE = "torque and rotation of whole gears, contact resolved by elements"
+
+
+@dataclass(frozen=True)
+class PairStiffness:
+    """Stiffness of one mesh alone by the compliance route.
+
+    Parameters
+    ----------
+    fraction : (P,) array
+        Path coordinate of one tooth pair in base pitches.
+    secant, tangent : (P,) arrays
+        [N/m]
+    """
+
+    fraction: np.ndarray
+    secant: np.ndarray
+    tangent: np.ndarray
+
+
+@cache
+@one_blas_thread()
+def _bodies():
+    """Flank compliances of the reference set, and the sectors they come from."""
+    sectors = make_sectors(reference_set(), STEEL)
+    return make_bodies(sectors, STEEL), sectors
+
+
+@one_blas_thread()
+def by_compliance(mesh: int, positions) -> PairStiffness:
+    """One mesh of the reference set alone, the other gears of the set taken away.
+
+    Parameters
+    ----------
+    mesh : int
+        `SUN_PLANET` or `PLANET_RING`.
+    positions : sequence of int
+        Of 64 in one mesh period.
+    """
+    s, (bodies, _) = reference_set(), _bodies()
+    force = SUN_TORQUE / s.sun.base_radius
+    setup = mesh_windows(
+        s, bodies, share=force, positions=POSITIONS, cells=36, nearest=20e-6, contact="profile"
+    )
+    only = np.zeros_like(setup.near)
+    only[mesh] = setup.near[mesh]
+    setup, secant, tangent = replace(setup, near=only), [], []
+    for position in positions:
+        problem = assemble_contact(setup, bodies, position)
+        state = solve_contact(problem.H, problem.gap, np.ones((len(problem.gap), 1)), [force])
+        secant.append(force / state.motions[0])
+        tangent.append(tangent_stiffness(problem.H, state.active, np.zeros(len(problem.gap), int), 1)[0])
+    return PairStiffness(
+        setup.zeta[mesh, list(positions), 0] / s.sun.base_pitch, np.array(secant), np.array(tangent)
+    )
+
+
+@cache
+def by_rotation(mesh: int, positions: tuple[int, ...], rim: str = "held", even: int = 0) -> TorqueRotation:
+    """The same mesh by torque and rotation.
+
+    Parameters
+    ----------
+    mesh, positions
+        As for `by_compliance`.
+    rim : {"held", "sliding"}
+        Of the gear that is turned.
+    even : int
+        Elements along flanks that are divided evenly, without finer ones at the contact; 0 resolves it.
+    """
+    s, fraction = reference_set(), by_compliance(mesh, positions).fraction
+    if mesh == SUN_PLANET:
+        angle = s.working_pressure_angle_sun_planet
+        pair, torque = GearPair(s.sun, s.planet, s.centre_distance, angle, STEEL), SUN_TORQUE
+    else:
+        angle = s.working_pressure_angle_planet_ring
+        pair = GearPair(s.planet, s.ring, s.centre_distance, angle, STEEL, state_2=RING_STATE)
+        torque = SUN_TORQUE * s.planet.teeth / s.sun.teeth
+    # `refine` divides the elements of the flank as well
+    coarse = {"edges": None, "flank_elements": round(even / DIVISION["refine"])}
+    options = DIVISION | coarse if even else DIVISION
+    return torque_rotation(pair, torque, fraction, rim=rim, **options)
+
+
+def _compared(mesh: int, positions: tuple[int, ...], name: str, shown) -> tuple[Row, ...]:
+    """Largest differences over all positions, and the numbers at some of them."""
+    ours, other, rows = by_compliance(mesh, positions), by_rotation(mesh, positions), []
+    note = f"{other.unknowns.max()} degrees of freedom of both whole gears"
+    for kind in ("secant", "tangent"):
+        mine, theirs = getattr(ours, kind), getattr(other, kind)
+        difference = np.abs(mine / theirs - 1.0)
+        place = f"{name}, {len(positions)} positions: {kind} stiffness, "
+        rows.append(at_most("pair", SOURCE, place + "largest difference", 0.01, difference.max(), note=note))
+        rows.append(information("pair", SOURCE, place + "mean difference", None, difference.mean()))
+        for k in shown:
+            where = f"{name}, position {positions[k]}/{POSITIONS}: {kind} stiffness [N/um]"
+            rows.append(within("pair", SOURCE, where, 1e-6 * theirs[k], 1e-6 * mine[k], 0.01))
+    return tuple(rows)
+
+
+def some_positions() -> tuple[Row, ...]:
+    """Sun and planet with two tooth pairs and with one."""
+    return _compared(SUN_PLANET, (0, 16), "sun-planet", (0, 1))
+
+
+def all_positions() -> tuple[Row, ...]:
+    """Sun and planet over one mesh cycle, a tip corner that begins to carry included."""
+    return _compared(SUN_PLANET, tuple(range(0, POSITIONS, 4)), "sun-planet", (6, 7, 11))
+
+
+def planet_and_ring() -> tuple[Row, ...]:
+    """Planet and ring, up to three tooth pairs."""
+    return _compared(PLANET_RING, (0, 16, 34, 48), "planet-ring", (2,))
+
+
+def other_treatments() -> tuple[Row, ...]:
+    """What a contact that is not resolved, and a torque spread over an elastic rim, change."""
+    positions, rows = (0, 16, 32), []
+    ours = by_compliance(SUN_PLANET, positions)
+    for even in (24, 96):
+        other = by_rotation(SUN_PLANET, positions, even=even)
+        ratio = other.secant / ours.secant - 1.0
+        size = reference_set().sun
+        length = (size.tip_roll**2 - size.form_roll**2) / (2 * size.base_radius) / even
+        note = f"flank elements of {1e6 * length:.0f} um; half width of the contact 60 um"
+        name = f"no local treatment, {even} even elements on a flank: secant stiffness of sun-planet, "
+        rows.append(
+            information("pair", "difference to the compliance route", name + "largest", None,
+                        ratio[np.abs(ratio).argmax()], note=note)
+        )  # fmt: skip
+        rows.append(
+            information("pair", "difference to the compliance route", name + "mean", None, ratio.mean())
+        )
+    sliding = by_rotation(SUN_PLANET, positions, rim="sliding").secant / ours.secant - 1.0
+    name = "torque as tangential forces on the bore of the sun: secant stiffness of sun-planet, mean"
+    note = "the bore of the compliance route turns as a rigid circle"
+    rows.append(
+        information("pair", "difference to the compliance route", name, None, sliding.mean(), note=note)
+    )
+    return tuple(rows)
+
+
+@one_blas_thread()
+def depth_compliance() -> float:
+    """Largest relative difference of the displacements under the flanks, sectors joined or transformed.
+
+    Loads on the flank nodes of one tooth of the sun, displacements at the joining depths of this tooth and of
+    both neighbours.
+    """
+    from femgear.fe.compliance import condense_sector, directional, interpolation, tooth_compliance
+    from femgear.fe.substructure import chain, closed_compliance, condensed_sector
+
+    sector = _bodies()[1].sun
+    gear, grid, K = sector.gear, sector.grid, sector.stiffness
+    stations = flank_stations(grid, gear)
+    depth = joining_depth(gear, np.hypot(*stations.points.T), None)[:, None]
+    seen = directional(interpolation(grid, stations.points + depth * stations.normals), stations.normals)
+    loads, n = flank_load_columns(grid, stations), len(stations.roll)
+    options = {"count": gear.teeth, "thickness": gear.face_width}
+    loaded = condensed_sector(grid, K, np.hstack([loads, seen]), **options)
+    plain = condensed_sector(grid, K, np.zeros((2 * grid.n_nodes, 0)), **options)
+    whole = closed_compliance([loaded, loaded, chain(plain, gear.teeth - 2)])
+    schur = condense_sector(grid, K, count=gear.teeth, held="rim", loads=loads, observations=seen)
+    cyclic = tooth_compliance(schur)
+    own, next_tooth = whole[n : 2 * n, :n], whole[3 * n : 4 * n, :n]
+    size = np.abs(cyclic[0, :n, :n]).max()
+    return float(
+        max(np.abs(own - cyclic[0, :n, :n]).max(), np.abs(next_tooth - cyclic[1, :n, :n]).max()) / size
+    )
+
+
+def same_depth() -> tuple[Row, ...]:
+    """The other way to give both routes one local treatment: displacements at one depth."""
+    name = "sun, loads on flank nodes, displacements at the joining depth of two teeth, relative"
+    note = "with the same half plane above this depth both routes are one problem"
+    source = "27 sectors joined one by one"
+    return (at_most("pair", source, name, 1e-9, depth_compliance(), note=note),)
