@@ -20,7 +20,13 @@ SCRIPTS = (
     "pin_error_load_sharing.py",
 )
 # of published sets, without a case file
-SET_SCRIPTS = ("campbell.py", "gravity_wedging.py", "bearing_clearance.py", "planet_phasing.py")
+SET_SCRIPTS = (
+    "campbell.py",
+    "gravity_wedging.py",
+    "bearing_clearance.py",
+    "planet_phasing.py",
+    "multistage.py",
+)
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 
 
@@ -100,6 +106,8 @@ def test_help(name, tmp_path):
         ("gravity_wedging.py", ["--lowest", "90", "--highest", "30"], 2, "lowest < highest"),
         ("bearing_clearance.py", ["--clearance=-1 um"], 2, "clearances of 0 or more"),
         ("bearing_clearance.py", ["--points", "1"], 2, "two frequencies"),
+        ("multistage.py", ["--points", "1"], 2, "2 speeds"),
+        ("multistage.py", ["--damping", "2"], 2, "0 < damping < 1"),
         ("planet_phasing.py", ["--points", "1"], 2, "2 frequencies"),
         ("planet_phasing.py", ["--angle", "0", "--angle", "100"], 2, "100.800000"),
         ("planet_phasing.py", ["--distance", "50"], 2, "0 to 30"),
@@ -311,7 +319,8 @@ def test_campbell(tmp_path):
 
 def test_gravity_wedging(tmp_path):
     arguments = ("--backlash", "482 um", "--harmonics", "3", "--no-stability", "--highest", "70")
-    done = run("gravity_wedging.py", *arguments, "-o", tmp_path, folder=tmp_path)
+    sweep = ("--sweep", "2", "--steps", "200")
+    done = run("gravity_wedging.py", *arguments, *sweep, "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     names = ("gravity_wedging", "carrier_orbit", "planet_bearings", "tooth_contact")
     assert all(is_png(tmp_path / f"{name}.png") for name in names)
@@ -320,6 +329,9 @@ def test_gravity_wedging(tmp_path):
     # the branch turns back twice between its ends
     assert hertz[0] == 25.0 and hertz[-1] == 70.0 and np.sum(np.diff(np.sign(np.diff(hertz))) != 0) == 2
     assert {row["stable"] for row in rows} == {"not computed"}
+    for row in text_table(tmp_path / "sweeps.csv"):
+        sizes = [float(row[f"{way}, carrier x r.m.s. [m]"]) for way in ("integration", "harmonic balance")]
+        assert row["settled"] == "yes" and sizes[0] == pytest.approx(sizes[1], rel=1e-3)
 
 
 def test_bearing_clearance(tmp_path):
@@ -366,3 +378,9 @@ def test_planet_phasing_of_unequal_planets(tmp_path):
         first, second = csv.DictReader(stream)
     assert first["torque, thrust"] == second["lateral force, tilting"] == "0.0000"
     assert float(first["lateral force, tilting"]) > 0.5 and float(second["torque, thrust"]) > 0.01
+
+
+def test_multistage_writes_its_tables_and_figures(tmp_path):
+    done = run("multistage.py", "--points", "40", "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".png"}

@@ -234,7 +234,7 @@ def _degree(element: Element) -> int | None:
         return element.coefficients.shape[1]
     if isinstance(element, GearMeshes) and not element.separates:
         return 1
-    return None
+    return getattr(element, "degree", None)
 
 
 def _series_content(element: Element, bases: int) -> np.ndarray | None:

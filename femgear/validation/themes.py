@@ -17,6 +17,7 @@ from femgear.validation import (
     members,
     modulation,
     moving_force,
+    multistage,
     nonlinear,
     nonlinear_tones,
     nrel,
@@ -191,6 +192,18 @@ THEMES = (
         "Helical planetary set",
         "Forces act at the base circles, as in the paper, where nothing else is said.",
         (helical.table_4, helical.rigid, helical.leakage, helical.response),
+    ),
+    Theme(
+        "multistage",
+        "Planetary stages in series",
+        "",
+        (
+            multistage.ratios,
+            multistage.uncoupled,
+            multistage.structure,
+            multistage.soft_shaft,
+            multistage.response,
+        ),
     ),
     Theme(
         "wind turbine sets",
