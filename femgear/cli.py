@@ -134,7 +134,7 @@ def run(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    only: Literal["static", "stress", "modes", "dynamics", "housing"] | None = None,
+    only: Literal["static", "stress", "modes", "dynamics", "housing", "branch", "response"] | None = None,
     pictures: bool = True,
     force: bool = False,
 ) -> int:
@@ -147,19 +147,21 @@ def run(
     output
         Folder of the results.
     only
-        Compute this stage and what it needs, no further; "stress" whatever static.stresses says.
+        Compute this stage and what it needs, no further; "stress" whatever static.stresses says, "branch" and
+        "response" of planar cases.
     pictures
         Draw figures, fields and report.
     force
         Replace the results that the folder holds, once the new ones are complete.
     """
-    from femgear.case import planetary_set, read_case
+    from femgear.case import read_case
     from femgear.run import run_case
+    from femgear.run_stages import check_case
     from femgear.storage import open_results, run_folder
     from femgear.summary import describe_results
 
     data = read_case(case)
-    planetary_set(data)  # refuse before the folder is touched
+    check_case(data, only)  # refuse before the folder is touched
     with run_folder(output, force=force) as folder, _Progress() as progress:
         run_case(data, folder, only=only, pictures=pictures, progress=progress)
     results = open_results(output)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.analysis import DynamicsResult, ModesResult, Progress, StaticResult
+    from femgear.analysis import DynamicsResult, Progress, StaticResult
     from femgear.case import Case
     from femgear.gears import PlanetarySet
     from femgear.gears.deviations import SetDeviations
@@ -35,7 +36,7 @@ def write_figures(
     folder : path
     gears : PlanetarySet
     data : dict of str to Dataset
-        Contents of static.nc, stress.nc, modes.nc, dynamics.nc and housing.nc, as far as computed.
+        Contents of the stages' files by stage, as far as computed; see `FIGURES`.
     deviations : SetDeviations, optional
         Profiles and pitches are charted where there are any.
 
@@ -47,34 +48,81 @@ def write_figures(
     from femgear import plots
 
     figures = {}
-    if (static := data.get("static")) is not None:
-        figures["static_transmission_error"] = plots.static_transmission_error(static)
-        figures["mesh_stiffness"] = plots.mesh_stiffness(static, face_width=gears.sun.face_width)
-        figures["load_sharing"] = plots.load_sharing(static)
-        figures["tooth_loads"] = plots.tooth_loads(static)
-    if (stress := data.get("stress")) is not None:
-        figures |= _stress_figures(stress)
-    if (modes := data.get("modes")) is not None:
-        figures["mode_shapes"] = plots.mode_shapes(modes, gears)
-        figures["natural_frequencies"] = plots.natural_frequencies(modes)
-    if (dynamics := data.get("dynamics")) is not None:
-        figures["dynamic_transmission_error"] = plots.transmission_error_period(dynamics, static)
-        figures["dynamic_spectrum"] = plots.transmission_error_spectrum(dynamics)
-        figures["ring_static_deflection"] = plots.ring_mean_deflection(dynamics, gears)
-        if dynamics.sizes["speed"] > 3:
-            figures["speed_sweep"] = plots.speed_sweep(dynamics)
-    if (housing := data.get("housing")) is not None:
-        teeth = gears.ring.teeth
-        for s in shown_speeds(housing):
-            name = f"{round(float(housing['speed'][s]))}_rpm"
-            figures[f"housing_signal_{name}"] = plots.housing_signal(housing, speed_index=s, ring_teeth=teeth)
-            figures[f"order_spectrum_{name}"] = plots.order_spectrum(housing, speed_index=s, ring_teeth=teeth)
-            figures[f"modulation_{name}"] = plots.modulation_polar(housing, speed_index=s, ring_teeth=teeth)
+    for stage, draw in FIGURES.items():
+        if stage in data:
+            figures |= draw(data, gears)
     if deviations is not None:
         figures |= _deviation_figures(deviations, gears)
     for name, figure in figures.items():
         plots.save_figure(figure, folder / f"{name}.png")
     return [f"{name}.png" for name in figures]
+
+
+def _static_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
+    from femgear import plots
+
+    static = data["static"]
+    return {
+        "static_transmission_error": plots.static_transmission_error(static),
+        "mesh_stiffness": plots.mesh_stiffness(static, face_width=gears.sun.face_width),
+        "load_sharing": plots.load_sharing(static),
+        "tooth_loads": plots.tooth_loads(static),
+    }
+
+
+def _modes_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
+    from femgear import plots
+
+    modes = data["modes"]
+    figures = {"mode_shapes": plots.mode_shapes(modes, gears)}
+    # a rigid ring has no nodal diameters
+    if "ring_shape_real" in modes:
+        figures["natural_frequencies"] = plots.natural_frequencies(modes)
+    return figures
+
+
+def _dynamics_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
+    from femgear import plots
+
+    dynamics = data["dynamics"]
+    figures = {
+        "dynamic_transmission_error": plots.transmission_error_period(dynamics, data.get("static")),
+        "dynamic_spectrum": plots.transmission_error_spectrum(dynamics),
+        "ring_static_deflection": plots.ring_mean_deflection(dynamics, gears),
+    }
+    if dynamics.sizes["speed"] > 3:
+        figures["speed_sweep"] = plots.speed_sweep(dynamics)
+    return figures
+
+
+def _housing_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
+    from femgear import plots
+
+    figures, housing, teeth = {}, data["housing"], gears.ring.teeth
+    for s in shown_speeds(housing):
+        name = f"{round(float(housing['speed'][s]))}_rpm"
+        figures[f"housing_signal_{name}"] = plots.housing_signal(housing, speed_index=s, ring_teeth=teeth)
+        figures[f"order_spectrum_{name}"] = plots.order_spectrum(housing, speed_index=s, ring_teeth=teeth)
+        figures[f"modulation_{name}"] = plots.modulation_polar(housing, speed_index=s, ring_teeth=teeth)
+    return figures
+
+
+def _branch_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
+    from femgear.plots import planar_results as plots
+
+    return plots.branch_figures(data["branch"])
+
+
+def _response_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
+    from femgear.plots import planar_results as plots
+
+    response, figures = data["response"], {}
+    for s in shown_speeds(response):
+        name = f"{round(float(response['speed'][s]))}_rpm"
+        figures |= {f"{key}_{name}": figure for key, figure in plots.response_figures(response, s).items()}
+    if response.sizes["speed"] > 1:
+        figures["contact_over_speed"] = plots.contact_over_speed(response)
+    return figures
 
 
 def _deviation_figures(deviations: SetDeviations, gears: PlanetarySet) -> dict:
@@ -89,10 +137,11 @@ def _deviation_figures(deviations: SetDeviations, gears: PlanetarySet) -> dict:
     return figures
 
 
-def _stress_figures(stress: xr.Dataset) -> dict:
+def _stress_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
     """Figures of stress.nc; distributions and turns are not in records of several mesh periods."""
     from femgear.plots import stress as plots
 
+    stress = data["stress"]
     figures = {
         "root_stress": plots.root_stress_history(stress),
         "root_profile": plots.root_stress_profile(stress),
@@ -103,6 +152,17 @@ def _stress_figures(stress: xr.Dataset) -> dict:
     if "planet_root_stress" in stress:
         figures["planet_bending"] = plots.planet_bending(stress)
     return figures
+
+
+FIGURES = {
+    "static": _static_figures,
+    "stress": _stress_figures,
+    "modes": _modes_figures,
+    "dynamics": _dynamics_figures,
+    "housing": _housing_figures,
+    "branch": _branch_figures,
+    "response": _response_figures,
+}
 
 
 def shown_speeds(data: xr.Dataset) -> list[int]:
@@ -233,24 +293,37 @@ def write_animation(folder: Path, case: Case, static: StaticResult, dynamics: Dy
 def write_pictures(
     folder: Path,
     case: Case,
+    results: Mapping[str, Any],
     *,
-    static: StaticResult,
-    modes: ModesResult | None,
-    dynamics: DynamicsResult | None,
     data: dict[str, xr.Dataset],
     cache: Path | None,
     progress: Progress | None = None,
 ) -> list[str]:
-    """Everything that a run shows; returns the names of the files."""
-    from femgear.case import set_deviations
+    """Everything that a run shows; returns the names of the files.
 
-    steps = [lambda: write_figures(folder, static.planetary_set, data, deviations=set_deviations(case))]
-    if static.cycle.force.any():
+    Parameters
+    ----------
+    folder : path
+    case : Case
+    results : mapping of str to result
+        By stage, as far as computed.
+    data : dict of str to Dataset
+        Their datasets.
+    cache : path, optional
+        Folder of generated grids.
+    progress : callable, optional
+        Called with (stage, done, total).
+    """
+    from femgear.case import planetary_set, set_deviations
+
+    gears, static = planetary_set(case), results.get("static")
+    steps = [lambda: write_figures(folder, gears, data, deviations=set_deviations(case))]
+    if static is not None and static.cycle.force.any():
         steps.append(lambda: write_deformed_set(folder, case, static, cache=cache))
-    if modes is not None:
+    if case.planar is None and "modes" in results:
         steps.append(lambda: write_ring_modes(folder, case, static, cache=cache))
-    if dynamics is not None:
-        steps.append(lambda: write_animation(folder, case, static, dynamics))
+    if "dynamics" in results:
+        steps.append(lambda: write_animation(folder, case, static, results["dynamics"]))
     names = []
     for done, step in enumerate(steps):
         if progress is not None:

@@ -13,9 +13,10 @@ import numpy as np
 
 from femgear.case import planetary_set
 from femgear.files import checksum, storage_errors, write_text
-from femgear.report_captions import SECTIONS, caption_of
+from femgear.report_captions import SECTIONS, caption_of, comparisons
 from femgear.storage import Results, open_results
 from femgear.summary import Block, describe_case, describe_results
+from femgear.summary_planar import published_modes
 
 _LARGEST_PICTURE = 8_000_000  # bytes
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
@@ -134,6 +135,15 @@ def _warnings(warnings) -> str:
 
 def _verdicts(results: Results) -> Iterator[str]:
     """What the solvers say against their own results."""
+    if "branch" in results.stages:
+        data = results.branch
+        if not bool(data.attrs["complete"]):
+            yield f"the branch did not reach the end of its range: {data.attrs['message']}"
+        if (count := int((~data["converged"].values.astype(bool)).sum())) > 0:
+            yield f"{count} points of the branch did not converge"
+    if "response" in results.stages and not results.response["converged"].values.all():
+        wrong = results.response["speed"].values[~results.response["converged"].values.astype(bool)]
+        yield f"no response found at {', '.join(f'{value:.6g}' for value in wrong[:8])} rpm"
     if "dynamics" not in results.stages:
         return
     data = results.dynamics
@@ -152,6 +162,8 @@ def _section(name: str, numbers, pictures, results: Results) -> str:
     blocks = [numbers[name]] if name in numbers else []
     if name == "Housing" and "housing" in results.stages:
         blocks.append(_bands(results))
+    if name == "Modes" and "modes" in results.stages:
+        blocks += [block for block in (published_modes(results.case, results.modes),) if block is not None]
     figures = [picture for picture in pictures if picture.section == name]
     if not blocks and not figures:
         return ""
@@ -271,6 +283,7 @@ def _pictures(results: Results) -> tuple[list[Picture], list[str]]:
             skipped.append(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)")
             continue
         rank, section, caption = caption_of(path.stem)
+        caption = " ".join((caption, *comparisons(results.case, path.stem)))
         found.append((rank, Picture(section, caption, kind, data)))
     found.sort(key=lambda item: item[0])
     return [picture for _, picture in found], skipped

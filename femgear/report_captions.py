@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from femgear.case import Case
 
 # stem of a file, its section, its caption; {} stands for what follows the stem
 CAPTIONS = (
@@ -133,8 +138,76 @@ CAPTIONS = (
         "Housing",
         "Envelope around a mesh harmonic over the angle of the carrier ({}).",
     ),
+    (
+        "weight_response",
+        "Response to the weight",
+        "Displacement of carrier, ring and sun over the frequency of the weight in the carrier frame, r.m.s. "
+        "about the mean. Drawn through: stable by Floquet's theory; dashed: not; circles: limit points, "
+        "those that corners of the tooth contact split drawn as one.",
+    ),
+    (
+        "carrier_orbit",
+        "Response to the weight",
+        "Path of the carrier's centre in the carrier frame during one turn of the weight against it: at the "
+        "start of the branch, at the last response before back flanks touch, and at the largest stable one.",
+    ),
+    (
+        "planet_bearing_forces",
+        "Response to the weight",
+        "Force between every planet and its pin during one turn of the weight against the carrier, at the "
+        "largest stable response.",
+    ),
+    (
+        "wedged_teeth",
+        "Response to the weight",
+        "Forces of both flanks of the meshes of planet 1 during one turn of the weight, at the largest "
+        "stable response. Where both flanks of a mesh carry at once its teeth are wedged.",
+    ),
+    (
+        "tooth_contact",
+        "Response to the weight",
+        "State of both flanks of the meshes of planet 1 over the frequency of the weight: 1 in contact all "
+        "the time, 0 never; dashed where the response is not stable.",
+    ),
+    (
+        "response_orbit",
+        "Weight and mesh frequency",
+        "Paths of the centres of carrier, ring and sun in the carrier frame during one turn of the "
+        "carrier ({}).",
+    ),
+    (
+        "response_bearing_forces",
+        "Weight and mesh frequency",
+        "Force between every planet and its pin during one turn of the carrier ({}): weight and meshing "
+        "together.",
+    ),
+    (
+        "response_mesh_forces",
+        "Weight and mesh frequency",
+        "Mesh forces of planet 1 during one turn of the carrier, and during six mesh periods ({}).",
+    ),
+    (
+        "response_spectrum",
+        "Weight and mesh frequency",
+        "Lines of a mesh force and of the carrier's displacement ({}): multiples of the weight's frequency, "
+        "and of the mesh frequency with their side bands.",
+    ),
+    (
+        "contact_over_speed",
+        "Weight and mesh frequency",
+        "State of both flanks of the meshes of planet 1 over the speed: 1 in contact all the time, 0 never.",
+    ),
 )
-SECTIONS = ("Static", "Stresses", "Modes", "Dynamics", "Housing", "Other pictures")
+SECTIONS = (
+    "Static",
+    "Stresses",
+    "Modes",
+    "Dynamics",
+    "Housing",
+    "Response to the weight",
+    "Weight and mesh frequency",
+    "Other pictures",
+)
 
 
 def caption_of(stem: str) -> tuple[int, str, str]:
@@ -144,3 +217,10 @@ def caption_of(stem: str) -> tuple[int, str, str]:
             what = stem[len(prefix) :].strip("_").replace("_", " ")
             return rank, section, caption.replace(" ({})", f" ({what})" if what else "")
     return len(CAPTIONS), "Other pictures", re.sub("[_-]+", " ", stem)
+
+
+def comparisons(case: Case, stem: str) -> Iterator[str]:
+    """What the case file says of a picture beside a published one."""
+    for entry in case.planar.published if case.planar is not None else ():
+        if entry.figure is not None and (stem == entry.figure or stem.startswith(f"{entry.figure}_")):
+            yield f"Beside {entry.source}: {entry.comparison}"

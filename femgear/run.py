@@ -7,16 +7,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from femgear import analysis
 from femgear.case import planetary_set, set_deviations
+from femgear.run_stages import KINDS, check_case, kind_of, stages_of
 from femgear.storage import finish, record, write_dataset, write_text
 
 if TYPE_CHECKING:
     from femgear.case import Case
-
-STAGES = ("static", "stress", "modes", "dynamics", "housing")
 
 
 def grid_cache() -> Path:
@@ -44,8 +41,9 @@ def run_case(
     case : Case
     folder : path
         From `storage.run_folder`; its manifest says after every stage what is there.
-    only : {"static", "stress", "modes", "dynamics", "housing"}, optional
-        Last stage to compute; ``"stress"`` computes the stresses whatever ``static.stresses`` says.
+    only : str, optional
+        Last stage to compute, one of `femgear.run_stages.KINDS`; ``"stress"`` computes the stresses whatever
+        ``static.stresses`` says.
     pictures : bool
         Draw figures, fields and report.
     progress : callable, optional
@@ -54,8 +52,7 @@ def run_case(
     from femgear.threads import one_blas_thread
 
     cache = grid_cache()
-    if only not in ("static", "stress"):
-        analysis.check_dynamic_case(case, planetary_set(case))
+    check_case(case, only)
     if only == "stress":
         case = case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})})
     write_text(case.source, folder / "case.toml")
@@ -72,7 +69,7 @@ def run_case(
             data[stage] = results[stage].dataset()
             write_dataset(data[stage], folder / f"{stage}.nc")
             names.append(f"{stage}.nc")
-            convergence[stage] = _convergence(stage, results[stage])
+            convergence[stage] = _convergence(stage, results[stage], kind_of(case))
             record(folder, names, timings=timings, convergence=convergence)
             if progress is not None:
                 progress(stage, 1, 1)
@@ -80,16 +77,7 @@ def run_case(
         from femgear.pictures import write_pictures
 
         start = time.perf_counter()
-        names += write_pictures(
-            folder,
-            case,
-            static=results["static"],
-            modes=results.get("modes"),
-            dynamics=results.get("dynamics"),
-            data=data,
-            cache=cache,
-            progress=progress,
-        )
+        names += write_pictures(folder, case, results, data=data, cache=cache, progress=progress)
         timings["pictures"] = time.perf_counter() - start
     finish(folder, names, timings=timings, convergence=convergence)
     if pictures:
@@ -101,42 +89,17 @@ def run_case(
 
 def _stages(case: Case, only: str | None) -> tuple[str, ...]:
     """Stages to compute, in order."""
-    last = STAGES.index(only) if only else len(STAGES) - 1
-    return tuple(stage for stage in STAGES[: last + 1] if stage != "stress" or case.static.stresses)
+    return stages_of(case, only)
 
 
 def _compute(stage, case, results, cache, progress):
     """One stage from those before it."""
-    if stage == "static":
-        return analysis.solve_static(case, cache=cache, progress=progress)
-    if stage == "stress":
-        from femgear.analysis_stress import solve_stress
-
-        return solve_stress(case, results["static"], progress=progress)
-    if stage == "modes":
-        return analysis.solve_modes(case, results["static"])
-    if stage == "dynamics":
-        return analysis.solve_dynamics(case, results["static"], results["modes"], progress=progress)
-    return analysis.solve_housing(case, results["dynamics"])
+    return KINDS[kind_of(case)].stages[stage].compute(case, results, cache, progress)
 
 
-def _convergence(stage, result) -> dict:
+def _convergence(stage, result, kind) -> dict:
     """What a stage says about its own trustworthiness, for the manifest."""
-    if stage == "static":
-        cycle = result.cycle
-        return {"residual": float(cycle.residual.max()), "message": cycle.message, "contact": cycle.contact}
-    if stage == "stress":
-        return {"root_points": sum(len(root.arc) for root in result.roots), "iso": result.nominal.message}
-    if stage == "modes":
-        return {"modes": len(result.modes.frequency), "degrees_of_freedom": len(result.model.system.M)}
-    if stage == "dynamics":
-        return {
-            "converged": bool(np.all(result.response.converged)),
-            "stable": bool(np.all(result.stability.stable)),
-            "residual": float(np.max(result.response.residual)),
-            "message": result.response.message,
-        }
-    return {"points": result.points}
+    return KINDS[kind].stages[stage].verdict(result)
 
 
 def report_again(folder: Path) -> None:

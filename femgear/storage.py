@@ -46,7 +46,7 @@ __all__ = [
     "write_manifest",
     "write_text",
 ]
-STAGES = ("static", "stress", "modes", "dynamics", "housing")
+STAGES = ("static", "stress", "modes", "dynamics", "housing", "branch", "response")
 CASE = "case.toml"
 LOCK = ".lock"
 RUNNING = ".running"
@@ -68,27 +68,41 @@ class Results:
     @cached_property
     def static(self) -> xr.Dataset:
         """Static transmission error, mesh stiffness, load sharing."""
-        return read_dataset(self._checked("static.nc"))
+        return self.stage("static")
 
     @cached_property
     def stress(self) -> xr.Dataset:
         """Root stresses, contact pressures, load spectra."""
-        return read_dataset(self._checked("stress.nc"))
+        return self.stage("stress")
 
     @cached_property
     def modes(self) -> xr.Dataset:
         """Natural frequencies and mode shapes."""
-        return read_dataset(self._checked("modes.nc"))
+        return self.stage("modes")
 
     @cached_property
     def dynamics(self) -> xr.Dataset:
         """Periodic response at every speed."""
-        return read_dataset(self._checked("dynamics.nc"))
+        return self.stage("dynamics")
 
     @cached_property
     def housing(self) -> xr.Dataset:
         """Signal and orders of the fixed sensor."""
-        return read_dataset(self._checked("housing.nc"))
+        return self.stage("housing")
+
+    @cached_property
+    def branch(self) -> xr.Dataset:
+        """Periodic responses of a planar set to its weight, over the weight's frequency."""
+        return self.stage("branch")
+
+    @cached_property
+    def response(self) -> xr.Dataset:
+        """Responses of a planar set to weight and mesh frequency at every speed."""
+        return self.stage("response")
+
+    def stage(self, name: str) -> xr.Dataset:
+        """Contents of the file of one stage."""
+        return read_dataset(self._checked(f"{name}.nc"))
 
     @property
     def stages(self) -> tuple[str, ...]:

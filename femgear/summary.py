@@ -13,6 +13,8 @@ from femgear.gears.checks import tip_clearances
 from femgear.gears.deviation_checks import check_deviations
 from femgear.models.ring import MAX_DIAMETER
 from femgear.summary_block import Block
+from femgear.summary_phasing import describe_phasing
+from femgear.summary_planar import describe_branch, describe_planar, describe_response
 from femgear.summary_stress import describe_stress
 
 if TYPE_CHECKING:
@@ -39,11 +41,14 @@ def describe_case(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
     -------
     tuple of Block
     """
+    planar = () if case.planar is None else (describe_planar(case, planetary),)
     return (
         Block(case.title),
         _gears(planetary),
         _meshes(planetary),
+        *describe_phasing(planetary),
         _operation(case, planetary),
+        *planar,
         Block("Warnings", notes=warnings_of(case, planetary) or ("none",)),
     )
 
@@ -60,7 +65,7 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
         )
     if case.operation.torque < 0:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
-    if case.housing.points <= 2 * MAX_DIAMETER:
+    if case.planar is None and case.housing.points <= 2 * MAX_DIAMETER:
         found.append(
             f"[W-POINTS] housing.points: {case.housing.points} points do not resolve the ring's "
             f"{MAX_DIAMETER} nodal diameters; use more than {2 * MAX_DIAMETER}"
@@ -166,6 +171,8 @@ def describe_results(results: Results) -> tuple[Block, ...]:
         "modes": _modes,
         "dynamics": _dynamics,
         "housing": _housing,
+        "branch": describe_branch,
+        "response": describe_response,
     }
     blocks = [describe[stage](getattr(results, stage)) for stage in results.stages]
     timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())

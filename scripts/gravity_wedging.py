@@ -49,7 +49,8 @@ def main(
     stability
         Floquet multipliers at every point; branches are dashed where they are not stable.
     sweep
-        Frequencies of a time integration upwards and downwards with the first play; 0 leaves it out.
+        Frequencies of a time integration upwards and downwards with the first play, compared with the branch
+        in sweeps.csv; 0 leaves it out.
     steps
         Of the integration, a period.
     """
@@ -71,13 +72,21 @@ def main(
             problem = gravity_problem_b(backlash=play, driven=driven)
             results.append((text, problem, *_follow(problem, (lowest, highest), harmonics, stability)))
             progress(f"play {text}", 1)
-        sweeps = _sweeps(results[0][1], np.linspace(lowest, highest, sweep), steps) if sweep else []
+        sweeps, compared = [], []
+        if sweep:
+            progress("integration")
+            sweeps, compared = _sweeps(results[0], np.linspace(lowest, highest, sweep), steps)
+            progress("integration", 1)
     write_csv(folder / "branches.csv", HEADER, _records(results))
     curves = [(f"play {text}", hertz, rms, stable) for text, _, _, hertz, rms, stable in results]
     figure = response_branches(curves, sweeps, quantity="carrier x, r.m.s.")
     save_figure(figure, folder / "gravity_wedging.png")
     names = _details(folder, results[0])
+    if compared:
+        write_csv(folder / "sweeps.csv", SWEEP_HEADER, compared)
+        names.append("sweeps.csv")
     _print(results)
+    _print_sweeps(compared)
     say_files(folder, ["branches.csv", "gravity_wedging.png", *names])
 
 
@@ -94,16 +103,62 @@ def _follow(problem, limits, harmonics, stability):
     return branch, branch.parameter / (2.0 * np.pi), rms, stable
 
 
-def _sweeps(problem, hertz, steps):
+SWEEP_HEADER = (
+    "direction",
+    "frequency [Hz]",
+    "integration, carrier x r.m.s. [m]",
+    "settled",
+    "harmonic balance, carrier x r.m.s. [m]",
+)
+
+
+def _sweeps(result, hertz, steps):
+    """Curves of the integration, and rows with the branch's solution nearest to each motion."""
     from femgear.models.wind_turbine_response import sweep_rms
     from femgear.solvers.sweep_response import sweep_up_and_down
 
+    problem = result[1]
     found = sweep_up_and_down(problem, 2.0 * np.pi * hertz, steps=steps, most=100, tolerance=1e-4)
-    words = ("integration upwards", "integration downwards")
-    return [
-        (text, one.frequency / (2.0 * np.pi), sweep_rms(problem, one, steps=steps))
-        for text, one in zip(words, found)
+    curves, rows = [], []
+    for text, one in zip(("upwards", "downwards"), found):
+        rms = sweep_rms(problem, one, steps=steps)
+        curves.append((f"integration {text}", one.frequency / (2.0 * np.pi), rms))
+        for omega, size, settled in zip(one.frequency, rms, one.settled):
+            near = _beside(result, omega, size)
+            rows.append((text, float(omega / (2.0 * np.pi)), float(size), "yes" if settled else "no", near))
+    return curves, rows
+
+
+def _beside(result, omega: float, size: float) -> float:
+    """Carrier x r.m.s. [m] of harmonic balance from the branch point nearest to a motion; nan without one."""
+    from femgear.models.wind_turbine import drive_reduction
+    from femgear.models.wind_turbine_response import member_rms
+    from femgear.solvers.harmonic_balance import solve_harmonic_balance
+
+    _, problem, branch, _, rms, _ = result
+    away = np.abs(branch.parameter - omega) / np.ptp(branch.parameter) + np.abs(rms - size) / rms.max()
+    start = branch.solutions[int(np.argmin(away))]
+    found = solve_harmonic_balance(
+        problem, omega, orders=branch.orders, start=start, reduction=drive_reduction(problem), stability=False
+    )
+    return float(member_rms(problem, [found], "carrier")[0, 0]) if found.converged else float("nan")
+
+
+def _print_sweeps(rows):
+    shown = [
+        (
+            text,
+            f"{hertz:.2f}",
+            f"{1e6 * size:.2f}",
+            settled,
+            f"{1e6 * near:.2f}",
+            f"{100 * (near / size - 1):+.2f}",
+        )
+        for text, hertz, size, settled, near in rows
     ]
+    header = ("sweep", "frequency [Hz]", "integration [um]", "settled", "balance [um]", "difference [%]")
+    if shown:
+        print_table("Integration beside harmonic balance, carrier x r.m.s.", header, shown)
 
 
 def _details(folder, result) -> list[str]:

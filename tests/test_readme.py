@@ -96,7 +96,7 @@ def case_keys(model) -> set[str]:
             inner = [t for t in _types(field.annotation) if isinstance(t, type) and issubclass(t, BaseModel)]
             pending += inner
             if not inner or section is not Case:
-                found.add(name)
+                found.add(field.alias or name)
     return found
 
 

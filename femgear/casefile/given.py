@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from femgear.casefile.planar import planar_notices
 from femgear.casefile.sections import Case
 from femgear.errors import GeometryError
 
@@ -94,6 +95,8 @@ def notices(data: dict) -> tuple[str, ...]:
             f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
             "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
         )
+    if "planar" in data:
+        return (*found, *planar_notices(data))
     if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
         found.append(
             'planet.bearing_clearance has no effect while static.members is "fixed": write '

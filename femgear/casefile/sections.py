@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool, model_validator
 
 from femgear.casefile.deviations import (
     CarrierErrors,
@@ -18,6 +18,7 @@ from femgear.casefile.deviations import (
     check_deviation_sections,
 )
 from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.casefile.planar import PlanarSection, check_planar
 from femgear.casefile.published import check_published
 from femgear.casefile.tomlfile import line_of
 from femgear.casefile.units import (
@@ -251,6 +252,16 @@ class Case(_Section):
     static: StaticSection = StaticSection()
     dynamics: DynamicsSection = DynamicsSection()
     housing: HousingSection = HousingSection()
+    planar: PlanarSection | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _rigid_ring(cls, data: object) -> object:
+        """The ring of a planar case is rigid and needs no foundation."""
+        if isinstance(data, dict) and "planar" in data and isinstance(data.get("ring"), dict):
+            loose = {"foundation_radial": "0 N/m^3", "foundation_tangential": "0 N/m^3"}
+            return data | {"ring": loose | data["ring"]}
+        return data
 
     _source: str = PrivateAttr(default="")
     _lines: str = PrivateAttr(default="")
@@ -321,7 +332,7 @@ def _check_operation(case: Case):
             value=f"{operation.torque:g} N m",
             limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
         )
-    if operation.fixed == "ring" and ring.foundation_tangential == 0.0:
+    if operation.fixed == "ring" and ring.foundation_tangential == 0.0 and case.planar is None:
         yield CaseError(
             "the ring is the fixed member but nothing keeps it from turning",
             code="E-MECHANISM",
@@ -376,4 +387,4 @@ def _check_numbers(case: Case):
         )
 
 
-_CHECKS = (_check_operation, _check_set, _check_numbers, check_deviation_sections)
+_CHECKS = (_check_operation, _check_set, _check_numbers, check_deviation_sections, check_planar)

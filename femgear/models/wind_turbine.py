@@ -4,6 +4,7 @@ Y. Guo, J. Keller and R. G. Parker, Dynamic analysis of wind turbine planetary g
 harmonic balance approach, NREL/CP-5000-55355 (2012); Eur. J. Mech. A/Solids 47, 2014, 45-57. Set A (PG-A) is
 the 750 kW set 21/39/99, set B (PG-B) the 550 kW set 16/26/68. Inertias are read as ``I / r^2`` and base
 radii with the working pressure angle 24.6 degrees. docs/nrel.md says what each reading reproduces.
+cases/nrel_pga.toml and cases/nrel_pgb.toml hold the same sets as case files.
 """
 
 from __future__ import annotations
@@ -15,16 +16,24 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.models.planar import PlanarBody, PlanarSet, PlanarTorque, inertia_of_reduced
+from femgear.models.planar_bearing import (
+    MemberBearing,
+    closed_springs,
+    damping_matrix,
+    mode_ratios,
+    open_back_flanks,
+    with_bearing,
+)
+from femgear.models.planar_modes import planar_modes
 from femgear.models.planar_problem import Gravity, phased_series, planar_meshes, planar_problem
-from femgear.solvers.elements import RadialBearings
-from femgear.solvers.nonlinear import NonlinearSystem, modal_damping
+from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.receptance import Reduction, reduce_problem
 
 # printed data of the nonlinear examples: torques on the carrier [N m], speeds [rpm], play [m]
 TORQUE_A, SPEED_A, BEARING_A = 322_610.0, 22.2, 3.2e9
 TORQUE_B, SPEED_B, BACKLASH_B = 180_000.0, 30.0, 482e-6
-# damping ratios of the first two pairs and two single modes of set B; further modes take the last one
-DAMPING_B = (0.0548, 0.0548, 0.0526, 0.0743, 0.0743, 0.0519)
+# damping ratios of the first natural frequencies of set B; further modes take the last one
+DAMPING_B = (0.0548, 0.0526, 0.0743, 0.0519)
 DAMPING_A = 0.05
 # teeth of sun and ring of set B
 TEETH_B = (16, 68)
@@ -110,7 +119,7 @@ def gravity_problem_b(
         back_flanks=own_lines,
         torque=PlanarTorque(torque, "carrier", output=None),
         gravity=Gravity(orders=(1,) if driven else (-1,)),
-        damping=_ratios_b(data),
+        damping=mode_ratios(planar_modes(data).frequency, DAMPING_B),
     )
 
 
@@ -138,7 +147,7 @@ def extended_problem_b(
         meshes=planar_meshes(data, stiffness=stiffness, smoothing=SMOOTHING),
         torque=PlanarTorque(torque, "carrier", output=None),
         gravity=Gravity(orders=(1, 0)),
-        damping=_ratios_b(data),
+        damping=mode_ratios(planar_modes(data).frequency, DAMPING_B),
     )
 
 
@@ -174,16 +183,10 @@ def bearing_problem_a(
         torque=PlanarTorque(TORQUE_A, "carrier", output=None),
         gravity=Gravity(orders=(1,)),
     )
-    count = base.system.W.shape[1]
-    columns = np.zeros((len(base.system.M), 2))
-    columns[[0, 1], [0, 1]], columns[[3, 4], [0, 1]] = 1.0, -1.0
-    system = replace(base.system, W=np.hstack([base.system.W, columns]))
-    stiffness = np.append(_drive_reference(base, data.n_planets), [BEARING_A] * 2)
-    system = replace(system, C=modal_damping(system, stiffness, DAMPING_A))
-    elements = base.elements
-    if clearance is not None:
-        elements += (RadialBearings(np.array([[count, count + 1]]), BEARING_A, clearance),)
-    return NonlinearSystem(system, elements, base.forces)
+    bearing = MemberBearing(BEARING_A, clearance, "carrier", "ring")
+    problem = with_bearing(base, data, bearing)
+    C = damping_matrix(problem, closed_springs(problem, data, bearing), DAMPING_A)
+    return replace(problem, system=replace(problem.system, C=C))
 
 
 def drive_reduction(problem: NonlinearSystem, *, n_planets: int = 3) -> Reduction:
@@ -191,22 +194,7 @@ def drive_reduction(problem: NonlinearSystem, *, n_planets: int = 3) -> Reductio
 
     The elements' own reference counts them as closed, far from where the train works.
     """
-    return reduce_problem(problem, reference=_drive_reference(problem, n_planets))
-
-
-def _ratios_b(data: PlanarSet) -> np.ndarray:
-    ratios = np.full(3 * (data.n_planets + 3), DAMPING_B[-1])
-    ratios[: len(DAMPING_B)] = DAMPING_B
-    return ratios
-
-
-def _drive_reference(problem: NonlinearSystem, n_planets: int) -> np.ndarray:
-    """Reference springs (n_columns,) [N/m] without the columns of back flanks."""
-    reference, meshes = problem.reference, 2 * n_planets
-    for element in problem.elements[1:]:
-        if np.array_equal(element.columns[:, 0], np.arange(meshes, 2 * meshes)):
-            reference[meshes : 2 * meshes] = 0.0
-    return reference
+    return reduce_problem(problem, reference=open_back_flanks(problem, n_planets))
 
 
 def _set(

@@ -8,18 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.models.planar import CENTRAL, free_motions, pin_directions
+from femgear.models.planar_response import column_contact, fluctuation, weight_curve
 from femgear.models.wind_turbine import SMOOTHING, bearing_problem_a, drive_reduction, wind_turbine_b
-from femgear.solvers.branches import Branch, frequency_response_curve
-from femgear.solvers.continuation import StepOptions
-from femgear.solvers.elements import GearMeshes
+from femgear.solvers.branches import Branch
 from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.nonlinear import NonlinearSystem, element_forces
+from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.strobe import strobe
 from femgear.solvers.sweep_response import SweepResponse
-
-# deflection [m] that counts as much as the whole range of frequencies along a branch
-_SCALE = 2e-3
 
 
 @dataclass(frozen=True)
@@ -65,17 +61,10 @@ def weight_branch(
         Longest step, see `StepOptions`.
     max_points : int
     """
-    return frequency_response_curve(
-        problem,
-        (2.0 * np.pi * limits[0], 2.0 * np.pi * limits[1]),
-        harmonics=harmonics,
-        stability=stability,
-        tolerance=1e-5,
-        samples=max(1024, 128 * harmonics),
-        reduction=drive_reduction(problem),
-        scale=_SCALE,
-        options=StepOptions(largest=largest, max_points=max_points),
-    )
+    return weight_curve(
+        problem, limits, reduction=drive_reduction(problem), harmonics=harmonics, stability=stability,
+        largest=largest, max_points=max_points,
+    )  # fmt: skip
 
 
 def member_lines(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], member: str) -> np.ndarray:
@@ -88,8 +77,7 @@ def member_lines(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution]
 
 def member_rms(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], member: str) -> np.ndarray:
     """Root mean square (p, 2) [m] of x and y about their mean."""
-    lines = member_lines(problem, solutions, member)
-    return np.sqrt(0.5 * (np.abs(lines[..., 1:]) ** 2).sum(axis=-1))
+    return fluctuation(member_lines(problem, solutions, member))
 
 
 def sweep_rms(problem: NonlinearSystem, sweep: SweepResponse, *, steps: int, member="carrier") -> np.ndarray:
@@ -112,20 +100,12 @@ def resonance(branch: Branch, amplitude: np.ndarray) -> tuple[float, float]:
     return float(hertz[top] - 0.5 * b / a), float(c - 0.25 * b * b / a)
 
 
-def contact_shares(problem: NonlinearSystem, solution: PeriodicSolution, *, samples: int = 720) -> np.ndarray:
+def contact_shares(problem: NonlinearSystem, solution: PeriodicSolution) -> np.ndarray:
     """Share of the cycle (n_columns,) in which the flanks of every column touch; nan without a mesh.
 
     A smoothed contact counts as closed beyond half its force scale, the force at the corner itself.
     """
-    theta = 2.0 * np.pi * np.arange(samples)[:, None] / samples
-    x = (np.exp(1j * theta * solution.orders[:, 0]) @ solution.deflection.T).real
-    force = element_forces(problem, x, theta)[0]
-    out = np.full(x.shape[1], np.nan)
-    for element in problem.elements:
-        if isinstance(element, GearMeshes):
-            place = element.columns[:, 0]
-            out[place] = (force[:, place] > 0.5 * element.smoothing * element.stiffness.mean).mean(axis=0)
-    return out
+    return column_contact(problem, solution)[0]
 
 
 def bearing_history(problem: NonlinearSystem, solution: PeriodicSolution, phase) -> np.ndarray:
@@ -174,7 +154,7 @@ def wedging_map(
             problem = bearing_problem_a(play, backlash=backlash, smoothing=smoothing)
             found = solve_harmonic_balance(
                 problem, 2.0 * np.pi * hertz, harmonics=harmonics, samples=512, start=start,
-                reduction=drive_reduction(problem),
+                reduction=drive_reduction(problem), stability=False,
             )  # fmt: skip
             start = found if found.converged else None
             if found.converged:

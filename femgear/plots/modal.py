@@ -75,13 +75,25 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
     ring = _ring_radial(modes, mode)
     bodies = _bodies(planetary_set)
     largest = np.abs(ring).max()
-    for name, (_, radius, *_) in bodies.items():
+    for name, radius in (("ring", outer), *((name, body[1]) for name, body in bodies.items())):
         x, y, turn = _motion(shape, name)
         largest = max(largest, np.hypot(x, y), abs(turn) * radius)
     factor = scale * outer / largest if largest > 0 else 0.0
     circle = np.exp(1j * _CIRCLE)
     ax.plot(*_xy(outer * circle), color="0.8", linewidth=1.0, label="at rest")
-    ax.plot(*_xy((outer + factor * ring) * circle), color=BLACK, linewidth=1.8, label="ring, outer surface")
+    rigid = _motion(shape, "ring")
+    shift, turn = factor * (rigid[0] + 1j * rigid[1]), factor * rigid[2]
+    ax.plot(
+        *_xy((outer + factor * ring) * circle + shift),
+        color=BLACK,
+        linewidth=1.8,
+        label="ring, outer surface",
+    )
+    if "ring: rotation" in shape:
+        # a rigid ring shows its rotation by a mark in its rim
+        mark = np.array([0.9, 1.0]) * outer
+        ax.plot(*_xy(1j * mark), color="0.8", linewidth=1.0)
+        ax.plot(*_xy(shift + 1j * mark * np.exp(1j * turn)), color=BLACK, linewidth=1.8)
     for name, (centre, radius, colour, text) in bodies.items():
         x, y, turn = _motion(shape, name)
         moved = centre + factor * (x + 1j * y)

@@ -30,8 +30,7 @@ def response_branches(curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, 
     for colour, (text, hertz, size, stable) in zip(COLOURS, curves):
         for wanted, dash, note in ((True, "-", ""), (False, "--", ", not stable")):
             # a segment is drawn once, unstable where one of its ends is
-            pieces = _pieces(np.asarray(stable, bool), wanted)
-            for number, part in enumerate(pieces):
+            for number, part in enumerate(pieces(np.asarray(stable, bool), wanted)):
                 ax.plot(
                     hertz[part], 1e6 * size[part], color=colour, linestyle=dash,
                     label=None if number else text + note,
@@ -44,7 +43,7 @@ def response_branches(curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, 
     return figure
 
 
-def _pieces(stable: np.ndarray, wanted: bool) -> list[slice]:
+def pieces(stable: np.ndarray, wanted: bool) -> list[slice]:
     """Runs of segments of a curve that are stable, or that are not."""
     segment = (stable[:-1] & stable[1:]) == wanted
     edges = np.flatnonzero(np.diff(np.concatenate([[False], segment, [False]]).astype(int)))

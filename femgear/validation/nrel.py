@@ -170,8 +170,9 @@ def play_left(clearance: float, backlash: float, *, frequency: float = 0.37) -> 
     """
     problem, data = bearing_problem_a(clearance, backlash=backlash), wind_turbine_a()
     found = solve_harmonic_balance(
-        problem, 2.0 * math.pi * frequency, harmonics=7, samples=512, reduction=drive_reduction(problem)
-    )
+        problem, 2.0 * math.pi * frequency, harmonics=7, samples=512, reduction=drive_reduction(problem),
+        stability=False,
+    )  # fmt: skip
     x = found.at(np.linspace(0.0, 1.0 / frequency, 721))
     apart, angle = np.hypot(x[:, -2], x[:, -1]).max(), data.pressure_angle_planet_ring
     force = TORQUE_A / (3.0 * data.centre_distance * 2.0 * math.cos(angle))
@@ -210,7 +211,9 @@ def extended_errors(
     reduction = drive_reduction(problem)
     for one in lines:
         begin = perf_counter()
-        found = solve_harmonic_balance(problem, frequency, orders=side_bands(*one), reduction=reduction)
+        found = solve_harmonic_balance(
+            problem, frequency, orders=side_bands(*one), reduction=reduction, stability=False
+        )
         seconds.append(perf_counter() - begin)
         solutions.append(found)
     begin = perf_counter()

@@ -19,6 +19,7 @@ from femgear.models.planar import (
 )
 from femgear.models.planar_modes import planar_modes
 from femgear.models.planar_problem import planar_meshes, planar_problem
+from femgear.models.wind_turbine import wind_turbine_b
 from femgear.solvers.nonlinear import NonlinearSystem, element_forces
 from femgear.validation.planetary import nrel_set
 from femgear.validation.rows import Row, at_most, counted, printed, within
@@ -95,37 +96,6 @@ def lin_parker_set(planets: int = 3, *, planet_bearing: float = 1e8, sun_support
         stiffness_sun_planet=5e8,
         stiffness_planet_ring=5e8,
         planet_bearing=planet_bearing,
-    )
-
-
-def wind_turbine_set() -> PlanarSet:
-    """Wind turbine set 16/26/68, module 14 mm, of NREL/CP-5000-55355 (example B).
-
-    Base radii belong to the working pressure angle, and the torsional stiffnesses count as
-    ``k_u = 4 k_theta / r_b^2``.
-    """
-    alpha, half = math.radians(24.6), 0.5 * 14e-3
-    sun, planet, ring = (half * z * math.cos(alpha) for z in (16, 26, 68))
-    distance = 0.294
-
-    def body(mass, reduced, radius, **supports):
-        return PlanarBody(mass, inertia_of_reduced(reduced, radius), **supports)
-
-    return PlanarSet(
-        sun=body(51.0, 61.1, sun, support=100.0, torsional_support=4.0 * 3e6),
-        ring=body(4000.0, 2484.0, ring, support=4e9, torsional_support=4.0 * 24.4e6),
-        carrier=body(1330.0, 314.7, distance, support=126e6),
-        planet=body(114.0, 51.9, planet),
-        sun_radius=sun,
-        ring_radius=ring,
-        planet_radius=planet,
-        centre_distance=distance,
-        planet_angles=2.0 * np.pi * np.arange(3) / 3,
-        pressure_angle_sun_planet=alpha,
-        pressure_angle_planet_ring=alpha,
-        stiffness_sun_planet=3.95e9,
-        stiffness_planet_ring=5.29e9,
-        planet_bearing=5.3e9,
     )
 
 
@@ -343,7 +313,7 @@ def balance() -> tuple[Row, ...]:
 
 def wind_turbine() -> tuple[Row, ...]:
     """Lowest modes of the wind turbine set."""
-    found = by_kind(planar_modes(wind_turbine_set()))
+    found = by_kind(planar_modes(wind_turbine_b()))
     rows, source = [], INDEPENDENT
     for kind, values, texts in (
         ("translational", found["translational"][::2], ("40.761", "156.869")),

@@ -25,7 +25,6 @@ from femgear.models.wind_turbine_response import (
 from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.sweep_response import sweep_response
 from femgear.validation import nrel
-from femgear.validation.planar import wind_turbine_set
 
 
 def solved(problem, hertz, harmonics=9, **options):
@@ -43,8 +42,8 @@ def test_quick_validation_rows_pass():
 
 
 def test_set_b_is_the_one_of_the_mode_table():
-    ours, other = planar_modes(wind_turbine_b()), planar_modes(wind_turbine_set())
-    np.testing.assert_allclose(ours.frequency, other.frequency, rtol=1e-12)
+    found = planar_modes(wind_turbine_b()).frequency
+    np.testing.assert_allclose(found[[0, 2, 3, 5]], [40.761, 69.563, 156.869, 302.710], rtol=1e-5)
     # exchanged supports: nothing but the reading differs
     printed = wind_turbine_b(as_printed=True)
     assert (printed.ring.support, printed.carrier.support) == (126e6, 4e9)

@@ -1,0 +1,308 @@
+"""The section of a case file that asks for the set of rigid bodies in their plane, and what it goes with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, model_validator
+
+from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.casefile.units import (
+    ACCELERATION,
+    ANGLE,
+    FREQUENCY,
+    INERTIA,
+    LENGTH,
+    MASS,
+    STIFFNESS,
+    TORSION,
+)
+from femgear.errors import CaseError
+
+if TYPE_CHECKING:
+    from femgear.casefile.sections import Case
+
+SMOOTHING = 0.3e-6
+"""Length over which tooth contact sets in [m], of the examples of NREL/CP-5000-55355."""
+
+Frequency = Quantity(FREQUENCY, 0.01, 1e5)
+Clearance = Quantity(LENGTH, 0.0, 0.01)
+Torsion = Quantity(TORSION, 0.0, 1e15)
+Ratio = Number(0.0, 1.0, open_high=True)
+
+
+FIGURES = (
+    "mode_shapes",
+    "weight_response",
+    "carrier_orbit",
+    "planet_bearing_forces",
+    "tooth_contact",
+    "wedged_teeth",
+    "response_orbit",
+    "response_bearing_forces",
+    "response_mesh_forces",
+    "response_spectrum",
+    "contact_over_speed",
+)
+"""Figures of a planar case that may be compared with published ones."""
+
+
+def _sentence(value: object) -> str:
+    if not isinstance(value, str):
+        raise refuse(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
+    if len(value) > 600 or not value.isprintable():
+        raise refuse(
+            "the comparison must be one printable line", code="E-RANGE", limit="600 printable characters"
+        )
+    return value
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class MeshStiffnessSection(_Section):
+    """Constant stiffness of every mesh, in place of the static solution's."""
+
+    sun_planet: Quantity(STIFFNESS, 1e3, 1e13)
+    planet_ring: Quantity(STIFFNESS, 1e3, 1e13)
+
+
+class PlanarRingSection(_Section):
+    """The ring as a rigid body on its support in the housing."""
+
+    mass: Quantity(MASS, 1e-6, 1e6)
+    inertia: Quantity(INERTIA, 1e-12, 1e8)
+    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
+
+
+class TorsionSection(_Section):
+    """Torsional supports of the members; the fixed member is held where it has none."""
+
+    sun: Torsion | None = None
+    ring: Torsion | None = None
+    carrier: Torsion | None = None
+
+
+class CarrierBearingSection(_Section):
+    """A bearing of the carrier beside its support."""
+
+    stiffness: Quantity(STIFFNESS, 1.0, 1e15)
+    clearance: Clearance = 0.0
+    on: Literal["ring", "housing"] = "housing"
+
+
+class GravitySection(_Section):
+    """Weight of all bodies; its direction counts from the x axis when the carrier's phase is zero."""
+
+    acceleration: Quantity(ACCELERATION, 1e-3, 1e3) = 9.80665
+    direction: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = -0.5 * math.pi
+
+
+class BranchSection(_Section):
+    """Periodic responses to the weight, followed over its frequency in the carrier frame."""
+
+    start: Frequency = Field(alias="from")
+    to: Frequency
+    harmonics: Count(1, 60) = 9
+    stability: StrictBool = True
+    points: Count(10, 5000) = 600
+
+
+class ResponseSection(_Section):
+    """Responses to weight and mesh frequency together at the speeds of the operation."""
+
+    carrier_harmonics: Count(1, 500) = 3
+    side_bands: Count(0, 100) = 3
+
+
+class PlanarPublished(_Section):
+    """What somebody published: a natural frequency, or a figure and how ours compares with it."""
+
+    kind: Literal["rotational", "translational", "planet"] | None = None
+    frequency: Frequency | None = None
+    figure: Literal[FIGURES] | None = None
+    comparison: Annotated[str, BeforeValidator(_sentence)] | None = None
+    source: Title
+
+    @model_validator(mode="after")
+    def _one_of_two(self):
+        given = {
+            name for name in ("kind", "frequency", "figure", "comparison") if getattr(self, name) is not None
+        }
+        if given not in ({"kind", "frequency"}, {"figure", "comparison"}):
+            raise refuse(
+                "a published entry is a frequency with its kind, or a figure with a comparison",
+                code="E-CHOICE",
+                remedy='write kind = "rotational" and frequency = "69.5 Hz"',
+            )
+        return self
+
+
+class PlanarSection(_Section):
+    """Rigid bodies that move in their plane: sun, ring, carrier and planets.
+
+    With this section a run solves the lumped set of Lin and Parker in place of the elastic ring.
+    """
+
+    mesh_stiffness: MeshStiffnessSection | None = None
+    line_backlash: Clearance | None = None
+    smoothing: Quantity(LENGTH, 0.0, 1e-3) = SMOOTHING
+    back_flanks: StrictBool = False
+    damping_ratios: Annotated[tuple[Ratio, ...], Field(min_length=1, max_length=1000)] | None = None
+    gyroscopic: StrictBool = False
+    reaction: Literal["supports", "output"] = "output"
+    ring: PlanarRingSection
+    torsion: TorsionSection = TorsionSection()
+    carrier_bearing: CarrierBearingSection | None = None
+    gravity: GravitySection | None = None
+    branch: BranchSection | None = None
+    response: ResponseSection | None = None
+    published: Annotated[tuple[PlanarPublished, ...], Field(max_length=100)] = ()
+
+
+def check_planar(case: Case) -> Iterator[CaseError]:
+    """Refusals of what a planar section does not go with."""
+    planar = case.planar
+    if planar is None:
+        return
+    if case.static.members == "elastic":
+        yield CaseError(
+            "the supports belong to the planar model: the static solution is that of the gears alone",
+            code="E-CHOICE",
+            key="static.members",
+            value="elastic",
+            limit='"fixed" in a planar case',
+            remedy="leave static.members out",
+        )
+    if case.operation.torque == 0.0:
+        yield CaseError(
+            "without torque no tooth carries load: the planar set would rattle in its play",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero in a planar case",
+        )
+    if planar.back_flanks and planar.line_backlash == 0.0:
+        yield CaseError(
+            "back flanks need play",
+            code="E-BACKLASH",
+            key="planar.line_backlash",
+            value="0 mm",
+            limit="above 0 mm",
+            remedy="give the play, or write planar.back_flanks = false",
+        )
+    yield from _check_torsion(case)
+    yield from _check_branch(case)
+
+
+def _check_torsion(case: Case) -> Iterator[CaseError]:
+    """The torque must find a way into the housing."""
+    planar, operation = case.planar, case.operation
+    output = output_member(case)
+    if getattr(planar.torsion, operation.fixed) == 0.0:
+        yield CaseError(
+            f"the {operation.fixed} is the fixed member but nothing keeps it from turning",
+            code="E-MECHANISM",
+            key=f"planar.torsion.{operation.fixed}",
+            value="0 N m/rad",
+            limit="above 0 N m/rad",
+            remedy="leave it out: the fixed member is then held",
+        )
+    if planar.reaction == "supports" and not getattr(planar.torsion, output):
+        yield CaseError(
+            f"the torque is to be carried by supports, but the {output}, which is the output, turns freely",
+            code="E-MECHANISM",
+            key=f"planar.torsion.{output}" if getattr(planar.torsion, output) == 0.0 else "planar.reaction",
+            value="supports",
+            limit=f"planar.torsion.{output} above 0 N m/rad",
+            remedy=f'give planar.torsion.{output}, or write reaction = "output"',
+        )
+
+
+def _check_branch(case: Case) -> Iterator[CaseError]:
+    planar, branch = case.planar, case.planar.branch
+    if branch is None:
+        return
+    if not branch.start < branch.to:
+        yield CaseError(
+            "the range of frequencies ends before it begins",
+            code="E-RANGE",
+            key="planar.branch.to",
+            value=FREQUENCY.show(branch.to),
+            limit=f"above {FREQUENCY.show(branch.start)}, where it begins",
+        )
+    if planar.gravity is None:
+        yield CaseError(
+            "the branch follows the response to the weight, and there is none",
+            code="E-KEY-MISSING",
+            key="planar.gravity",
+            remedy="add the section planar.gravity, or leave planar.branch out",
+        )
+    if case.operation.fixed == "carrier":
+        yield CaseError(
+            "the weight does not turn against a carrier that stands",
+            code="E-MECHANISM",
+            key="planar.branch",
+            value="operation.fixed = carrier",
+            limit="a carrier that turns",
+            remedy="leave planar.branch out",
+        )
+    if planar.gyroscopic:
+        yield CaseError(
+            "the gyroscopic terms would change along the branch, which is not computed",
+            code="E-CHOICE",
+            key="planar.gyroscopic",
+            value="true",
+            limit="false with planar.branch",
+            remedy="leave one of them out",
+        )
+
+
+def output_member(case: Case) -> str:
+    """The member that is neither driven nor held."""
+    others = {case.operation.input, case.operation.fixed}
+    return next((name for name in ("carrier", "sun", "ring") if name not in others), "carrier")
+
+
+def planar_notices(data: dict) -> Iterator[str]:
+    """What a planar case gives without effect.
+
+    Parameters
+    ----------
+    data : dict
+        Tables of a case file that was checked, with a section planar.
+    """
+    planar = data["planar"]
+    unused = [name for name in ("motor", "brake", "housing") if name in data]
+    keys = ["tolerance"]
+    if "response" not in planar:
+        keys += ["mesh_harmonics", "response_harmonics"]
+    unused += [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
+    foundations = ("foundation_radial", "foundation_tangential")
+    unused += [f"ring.{key}" for key in foundations if key in data["ring"]]
+    if unused:
+        yield f"{_listed(unused)} no effect in this planar case"
+    if "mesh_stiffness" in planar and (unused := _without_static(data)):
+        yield f"{_listed(unused)} no effect while planar.mesh_stiffness is given"
+    if data["planet"].get("bearing_clearance") and not {"branch", "response"} & planar.keys():
+        yield "planet.bearing_clearance has no effect without planar.branch or planar.response"
+
+
+def _listed(names: list[str]) -> str:
+    return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
+
+
+def _without_static(data: dict) -> list[str]:
+    """Entries that act on the static solution alone, which a given mesh stiffness replaces."""
+    unused = ["static"] if "static" in data else []
+    if "response" in data["planar"]:
+        keys = ("mesh_harmonics", "response_harmonics")
+        unused += [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
+    if data["planar"].get("line_backlash") is not None and "backlash" in data["set"]:
+        unused.append("set.backlash")
+    for name in ("sun", "planet", "ring", "carrier"):
+        keys = ("modifications", "errors", "individual")
+        unused += [f"{name}.{key}" for key in keys if data.get(name, {}).get(key)]
+    return unused

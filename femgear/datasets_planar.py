@@ -1,0 +1,211 @@
+"""Results of a planar case as xarray datasets: modes.nc, branch.nc, response.nc."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.analysis_planar import BranchResult, PlanarModesResult, PlanarResponseResult
+
+RPM = np.pi / 30.0
+MEMBERS = ("carrier", "ring", "sun")
+FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
+
+
+def _variable(dims, values, units, long_name):
+    return dims, np.asarray(values), {"units": units, "long_name": long_name}
+
+
+def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
+    """Contents of modes.nc of a planar case: axes and rotations of all bodies, no elastic ring."""
+    import xarray as xr
+
+    modes, gears = result.modes, result.planetary_set
+    shape, dofs = _in_space(result)
+    n = 2 * gears.n_planets
+    variables = {
+        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
+        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
+        "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
+        "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
+        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
+        "mesh_stiffness": (("mesh",), modes.mesh_stiffness[:n], "N/m", "mean mesh stiffness"),
+        "mesh_deflection": (
+            ("mesh", "mode"), modes.mesh_deflection[:n], "kg^-1/2", "mesh deflection of the mode",
+        ),
+    }  # fmt: skip
+    return xr.Dataset(
+        {name: _variable(*entry) for name, entry in variables.items()},
+        coords={
+            "mode": _variable(("mode",), np.arange(len(modes.frequency)), "1", "mode"),
+            "dof": _variable(("dof",), dofs, "1", "degree of freedom"),
+            "mesh": _variable(("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+        },
+        attrs={
+            "title": "modes of the planar set at standstill, bearings closed, back flanks open",
+            "unknowns": len(modes.shape),
+            "planet_angles": np.asarray(gears.planet_angles),
+        },
+    )
+
+
+def _in_space(result: PlanarModesResult) -> tuple[np.ndarray, list[str]]:
+    """Shapes as x, y and rotation of every body, held ones included."""
+    from femgear.models.planar import free_motions, member_radius
+
+    data, N = result.data, result.planetary_set.n_planets
+    full = (free_motions(data) @ result.modes.shape).reshape(N + 3, 3, -1).copy()
+    cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
+    radial, tangential = full[3:, 0].copy(), full[3:, 1].copy()
+    full[3:, 0], full[3:, 1] = radial * cosine - tangential * sine, radial * sine + tangential * cosine
+    radii = [member_radius(data, name) for name in MEMBERS] + [data.planet_radius] * N
+    full[:, 2] /= np.array(radii)[:, None]
+    bodies = [*MEMBERS, *(f"planet {n + 1}" for n in range(N))]
+    dofs = [f"{body}: {axis}" for body in bodies for axis in ("x", "y", "rotation")]
+    return full.reshape(3 * (N + 3), -1), dofs
+
+
+def branch_dataset(result: BranchResult) -> xr.Dataset:
+    """Contents of branch.nc."""
+    import xarray as xr
+
+    branch, point = result.branch, ("point",)
+    hertz = branch.parameter / (2.0 * np.pi)
+    known = len(branch.verdicts) > 0
+    nothing = np.full(len(hertz), np.nan)
+    loss = branch.loss if known else [""] * len(hertz)
+    folds, crossings = np.zeros((2, len(hertz)), bool)
+    folds[branch.folds], crossings[branch.branch_points] = True, True
+    carrier = result.sense * branch.parameter
+    variables = {
+        "weight_frequency": (point, hertz, "Hz", "frequency of the weight in the carrier frame"),
+        "carrier_speed": (point, carrier, "rad/s", "speed of the carrier, counter-clockwise positive"),
+        "stable": (point, branch.stable if known else folds & False, "1", "whether known to be stable"),
+        "largest_multiplier": (
+            point, branch.largest_multiplier if known else nothing, "1", "largest Floquet multiplier",
+        ),
+        "multiplier_distance": (
+            point, [_nearest(verdict) for verdict in branch.verdicts] if known else nothing, "1",
+            "distance of the nearest Floquet multiplier from 1, which is zero at a limit point of the motion",
+        ),
+        "loss": (point, list(loss), "1", "how stability is lost"),
+        "fold": (point, folds, "1", "whether the point is a limit point"),
+        "branch_point": (point, crossings, "1", "whether another branch crosses"),
+        "tail": (point, branch.tail, "1", "share of the amplitude in the upper half of the harmonics"),
+        "spectral_radius": (point, branch.spectral_radius, "1", "spectral radius of the fixed point"),
+        "residual": (point, branch.residual, "1", "relative residual of the harmonic equations"),
+        "converged": (point, branch.converged, "1", "whether the solution satisfies its tolerance"),
+    }  # fmt: skip
+    variables |= _motions(result.lines, "point", "harmonic")
+    coords = _coordinates(result.planetary_set) | {
+        "point": _variable(point, np.arange(len(hertz)), "1", "point along the branch"),
+        "harmonic": _variable(("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
+    }
+    return xr.Dataset(
+        {name: _variable(*entry) for name, entry in variables.items()},
+        coords=coords,
+        attrs={
+            "title": "periodic responses to the weight",
+            "message": branch.message,
+            "complete": int(branch.complete),
+            "stability": "Floquet multipliers" if known else "not computed",
+            "fourier_convention": FOURIER,
+        },
+    )
+
+
+def _nearest(verdict) -> float:
+    return (
+        float(np.abs(verdict.multipliers - 1.0).min(initial=np.inf)) if len(verdict.multipliers) else np.nan
+    )
+
+
+def response_dataset(result: PlanarResponseResult) -> xr.Dataset:
+    """Contents of response.nc."""
+    import xarray as xr
+
+    found, speed = result.solutions, ("speed",)
+    mesh = [one.mesh_frequency for one in result.speeds]
+    variables = {
+        "carrier_speed": (
+            speed, [one.carrier for one in result.speeds], "rad/s",
+            "speed of the carrier, counter-clockwise positive",
+        ),
+        "mesh_frequency": (speed, mesh, "Hz", "mesh frequency"),
+        "frequency": (
+            ("speed", "line"), [one.line_frequency / (2 * np.pi) for one in found], "Hz",
+            "frequency of the line in the carrier frame",
+        ),
+        "converged": (
+            speed, [one.converged for one in found], "1", "whether the solution satisfies its tolerance",
+        ),
+        "iterations": (speed, [one.iterations for one in found], "1", "iterations of Newton's method"),
+        "residual": (
+            speed, [one.residual for one in found], "1", "relative residual of the harmonic equations",
+        ),
+        "tail": (
+            speed, [one.tail for one in found], "1", "share of the amplitude in the upper half of the lines",
+        ),
+        "spectral_radius": (
+            speed, [one.spectral_radius for one in found], "1", "spectral radius of the fixed point",
+        ),
+    }  # fmt: skip
+    variables |= _motions(result.lines, "speed", "line")
+    orders, line = found[0].orders, ("line",)
+    coords = _coordinates(result.planetary_set) | {
+        "speed": _variable(speed, result.input_speed / RPM, "rpm", "speed of the input"),
+        "carrier_order": _variable(line, orders[:, 0], "1", "multiple of the carrier's frequency"),
+        "mesh_order": _variable(line, orders[:, 1], "1", "multiple of the mesh frequency"),
+    }
+    return xr.Dataset(
+        {name: _variable(*entry) for name, entry in variables.items()},
+        coords=coords,
+        attrs={
+            "title": "responses to weight and mesh frequency together",
+            "message": " ".join(dict.fromkeys(one.message for one in found)),
+            "fourier_convention": FOURIER,
+        },
+    )
+
+
+def _motions(lines, along: str, line: str) -> dict[str, tuple]:
+    """Displacements, forces and contact of all solutions."""
+    from femgear.models.planar_response import fluctuation, stacked
+
+    found, out = stacked(lines), {}
+    member, mesh = (along, "member", "axis"), (along, "mesh")
+    out["rms"] = (member, fluctuation(found["member"]), "m", "displacement about its mean, r.m.s.")
+    for name, key, dims, units, words in (
+        ("displacement", "member", (*member, line), "m", "displacement in the carrier frame"),
+        ("mesh_force", "mesh_force", (*mesh, line), "N", "mesh force along the line of the drive flanks"),
+        ("back_force", "back_force", (*mesh, line), "N", "force of the back flanks on their own line"),
+        (
+            "planet_bearing_force", "planet_bearing", (along, "planet", "direction", line), "N",
+            "force of the pin on the planet",
+        ),
+        (
+            "carrier_bearing_force", "carrier_bearing", (along, "axis", line), "N",
+            "force of the carrier bearing on the carrier",
+        ),
+    ):  # fmt: skip
+        out[f"{name}_real"] = (dims, found[key].real, units, f"{words}, real part")
+        out[f"{name}_imag"] = (dims, found[key].imag, units, f"{words}, imaginary part")
+    for side in ("drive", "back"):
+        words = f"share of the time in which the {side} flanks touch: 1 in contact, 0 not"
+        out[f"{side}_contact"] = (mesh, found[f"{side}_contact"], "1", words)
+    return out
+
+
+def _coordinates(gears) -> dict[str, tuple]:
+    numbers = np.arange(1, gears.n_planets + 1)
+    return {
+        "mesh": _variable(("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+        "planet": _variable(("planet",), numbers, "1", "planet"),
+        "member": _variable(("member",), list(MEMBERS), "1", "member"),
+        "axis": _variable(("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
+        "direction": _variable(("direction",), ["radial", "tangential"], "1", "direction at the planet"),
+    }

@@ -1,0 +1,280 @@
+"""Figures of branch.nc and response.nc, the results of planar cases."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.models.planar_response import merged_folds
+from femgear.plots.planar import bearing_forces, orbits, pieces
+from femgear.plots.style import (
+    BLACK,
+    COLOURS,
+    GREY,
+    SIZE,
+    label,
+    legend_below,
+    line_style,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+_AXIS = "frequency of the weight in the carrier frame [Hz]"
+_PHASES = 721
+_LABELS = 4
+# instants of a carrier turn in figures of two frequencies, at most
+_INSTANTS = 20_000
+
+
+def branch_figures(branch: xr.Dataset) -> dict[str, Figure]:
+    """All figures of a branch, by file name.
+
+    Parameters
+    ----------
+    branch : xarray.Dataset
+        Contents of branch.nc.
+    """
+    points = shown_points(branch)
+    figures = {
+        "weight_response": weight_response(branch),
+        "carrier_orbit": weight_orbits(branch, points),
+        "planet_bearing_forces": weight_bearing_forces(branch, points[-1]),
+        "tooth_contact": contact_over_branch(branch),
+    }
+    if np.any(branch["back_force_real"].values):
+        figures["wedged_teeth"] = mesh_forces(branch, points[-1])
+    return figures
+
+
+def shown_points(branch: xr.Dataset) -> list[int]:
+    """Points whose orbits are drawn: the first, one before flanks wedge, the largest stable response."""
+    rms = branch["rms"].sel(member="carrier").values[:, 0]
+    back = branch["back_contact"].values.max(axis=1)
+    stable = branch["stable"].values.astype(bool)
+    top = int(np.argmax(np.where(stable, rms, -1.0) if stable.any() else rms))
+    points = [0]
+    if back[top] > 0.0:
+        free = np.flatnonzero(back[:top] == 0.0)
+        points += [int(free[-1])] if len(free) and free[-1] else []
+    return [*points, top] if top not in points else points
+
+
+def weight_response(branch: xr.Dataset) -> Figure:
+    """Amplitudes of carrier, ring and sun: stable parts drawn through, others dashed, folds marked."""
+    figure, axes = new_figure(rows=3, width=8.5, height=8.0, sharex=True)
+    hertz, stable = branch["weight_frequency"].values, branch["stable"].values.astype(bool)
+    known = branch.attrs["stability"] != "not computed"
+    folds = merged_folds(branch["weight_frequency"].values, branch["fold"].values)
+    for ax, colour, member in zip(axes, COLOURS, branch["member"].values):
+        size = 1e6 * branch["rms"].sel(member=member).values[:, 0]
+        for wanted, dash in ((True, "-"), (False, "--")):
+            for part in pieces(stable if known else np.ones(len(hertz), bool), wanted):
+                text = "stable" if wanted and known else "stability not computed" if wanted else "not stable"
+                ax.plot(hertz[part], size[part], color=colour, linestyle=dash, label=text)
+        ax.plot(
+            hertz[folds], size[folds], "o", color=BLACK, markersize=6, markerfacecolor="none", label="fold"
+        )
+        ax.set_ylim(bottom=0.0)
+        label(ax, y=f"{member} x, r.m.s. [µm]")
+    # many labels would hide one another; the table of the report has them all
+    for point in folds if len(folds) <= _LABELS else ():
+        axes[0].annotate(
+            f"{hertz[point]:.2f} Hz", (hertz[point], 1e6 * branch["rms"].values[point, 0, 0]), xytext=(8, -3),
+            textcoords="offset points", fontsize=SIZE - 1,
+        )  # fmt: skip
+    label(axes[-1], _AXIS)
+    legend_below(figure, axes[0], columns=4)
+    return figure
+
+
+def weight_orbits(branch: xr.Dataset, points) -> Figure:
+    """Paths of the carrier's centre in the carrier frame during one turn of the weight against it."""
+    lines = branch["displacement_real"].values + 1j * branch["displacement_imag"].values
+    curves = []
+    for point in points:
+        path = _wave(branch) @ np.swapaxes(lines[point, 0], 0, 1)
+        note = "flanks wedge" if branch["back_contact"].values[point].max() > 0.0 else "drive flanks only"
+        curves.append((f"{branch['weight_frequency'].values[point]:.1f} Hz, {note}", path.real.T))
+    return orbits(curves)
+
+
+def weight_bearing_forces(branch: xr.Dataset, point: int) -> Figure:
+    """Sizes of the planet-bearing forces over one turn of the weight against the carrier."""
+    lines = (branch["planet_bearing_force_real"] + 1j * branch["planet_bearing_force_imag"]).values[point]
+    phase, wave = np.linspace(0.0, 2.0 * np.pi, _PHASES), _wave(branch)
+    curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
+    return bearing_forces(phase, curves, title=f"{branch['weight_frequency'].values[point]:.1f} Hz")
+
+
+def mesh_forces(branch: xr.Dataset, point: int) -> Figure:
+    """Forces of drive and back flanks over one turn of the weight against the carrier."""
+    figure, axes = new_figure(rows=2, width=8.0, height=6.0, sharex=True)
+    names, wave = [str(name) for name in branch["mesh"].values], _wave(branch)
+    degrees = np.degrees(np.linspace(0.0, 2.0 * np.pi, _PHASES))
+    for ax, kind, words in zip(axes, ("mesh_force", "back_force"), ("drive flanks", "back flanks")):
+        lines = (branch[f"{kind}_real"] + 1j * branch[f"{kind}_imag"]).values[point]
+        for number, mesh in enumerate((0, len(names) // 2)):
+            force = (lines[mesh] @ wave.T).real
+            ax.plot(degrees, 1e-3 * force, label=names[mesh], **line_style(number))
+        label(ax, y="force [kN]", title=words)
+    axes[-1].set_xlim(0.0, 360.0)
+    axes[-1].set_xticks(np.arange(0.0, 361.0, 60.0))
+    hertz = branch["weight_frequency"].values[point]
+    label(axes[0], title=f"{hertz:.1f} Hz: drive flanks")
+    label(axes[-1], "phase of the weight [°]")
+    legend_below(figure, axes[0])
+    return figure
+
+
+def contact_over_branch(branch: xr.Dataset) -> Figure:
+    """Share of the cycle in which flanks touch over the frequency, stable parts drawn through."""
+    stable = branch["stable"].values.astype(bool)
+    if branch.attrs["stability"] == "not computed":
+        stable = np.ones(len(stable), bool)
+    return _contact(branch, branch["weight_frequency"].values, _AXIS, stable)
+
+
+def response_figures(response: xr.Dataset, speed: int) -> dict[str, Figure]:
+    """Figures of one speed, and with the first one those over all speeds.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Contents of response.nc.
+    speed : int
+        Its number.
+    """
+    figures = {
+        "response_orbit": response_orbit(response, speed),
+        "response_bearing_forces": response_bearing_forces(response, speed),
+        "response_mesh_forces": response_mesh_forces(response, speed),
+        "response_spectrum": response_spectrum(response, speed),
+    }
+    return figures
+
+
+def contact_over_speed(response: xr.Dataset) -> Figure:
+    """Share of the time in which flanks touch over the speeds."""
+    speed = response["speed"].values
+    order = np.argsort(speed)
+    return _contact(response.isel(speed=order), speed[order], "speed of the input [rpm]", None)
+
+
+def response_orbit(response: xr.Dataset, speed: int) -> Figure:
+    """Paths of carrier, ring and sun in the carrier frame during one carrier turn."""
+    lines = (response["displacement_real"] + 1j * response["displacement_imag"]).values[speed]
+    _, wave = _carrier_turn(response, speed)
+    figure, axes = new_figure(columns=3, width=11.0, height=4.2)
+    for ax, colour, name, one in zip(axes, COLOURS, response["member"].values, lines):
+        x, y = 1e6 * (one @ wave.T).real
+        ax.plot(x, y, color=colour, linewidth=0.7)
+        ax.plot([x.mean()], [y.mean()], "+", color=GREY)
+        ax.set_aspect("equal", adjustable="datalim")
+        label(ax, "x [µm]", "y [µm]", f"{name}, {float(response['speed'][speed]):.6g} rpm")
+    return figure
+
+
+def response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
+    """Sizes of the planet-bearing forces over one carrier turn."""
+    lines = (response["planet_bearing_force_real"] + 1j * response["planet_bearing_force_imag"]).values[speed]
+    turn, wave = _carrier_turn(response, speed)
+    figure, (ax,) = new_figure()
+    for number, one in enumerate(lines):
+        force = np.hypot(*(one @ wave.T).real)
+        ax.plot(360.0 * turn, 1e-3 * force, linewidth=1.0, label=f"planet {number + 1}", **line_style(number))
+    ax.set_xlim(0.0, 360.0 * turn[-1])
+    label(ax, "carrier angle [°]", "force [kN]", f"{float(response['speed'][speed]):.6g} rpm")
+    legend_below(figure)
+    return figure
+
+
+def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
+    """Mesh forces of the first planet over one carrier turn, and over the first mesh periods."""
+    lines = (response["mesh_force_real"] + 1j * response["mesh_force_imag"]).values[speed]
+    names = [str(name) for name in response["mesh"].values]
+    turn, wave = _carrier_turn(response, speed)
+    mesh, carrier = float(response["mesh_frequency"][speed]), _carrier_frequency(response, speed)
+    near = turn * mesh / carrier <= 6.0 if carrier else np.ones(len(turn), bool)
+    figure, axes = new_figure(rows=2, width=8.5, height=6.0)
+    for number, one in enumerate((0, len(names) // 2)):
+        force = 1e-3 * (lines[one] @ wave.T).real
+        axes[0].plot(360.0 * turn, force, linewidth=0.8, label=names[one], **line_style(number))
+        axes[1].plot(360.0 * turn[near], force[near], label=names[one], **line_style(number))
+    title = f"{float(response['speed'][speed]):.6g} rpm"
+    label(axes[0], "carrier angle [°]", "mesh force [kN]", f"{title}: one turn of the carrier")
+    label(axes[1], "carrier angle [°]", "mesh force [kN]", "six mesh periods")
+    legend_below(figure, axes[0])
+    return figure
+
+
+def response_spectrum(response: xr.Dataset, speed: int) -> Figure:
+    """Lines of the first mesh's force and of the sun's displacement, by the mesh harmonic they stand at."""
+    force = (response["mesh_force_real"] + 1j * response["mesh_force_imag"]).values[speed, 0]
+    moved = (response["displacement_real"] + 1j * response["displacement_imag"]).values[speed, 0, 0]
+    hertz, mesh = np.abs(response["frequency"].values[speed]), response["mesh_order"].values
+    figure, axes = new_figure(rows=2, width=8.5, height=6.0, sharex=True)
+    quantities = (
+        (np.abs(force), f"force of {response['mesh'].values[0]!s} [N]"),
+        (1e6 * np.abs(moved), "carrier x [µm]"),
+    )
+    for ax, (size, text) in zip(axes, quantities):
+        # five decades below the largest line there is nothing to see
+        floor = 1e-5 * size[hertz > 0.0].max(initial=0.0)
+        shown = (size > floor) & (hertz > 0.0)
+        for number, (words, here) in enumerate((("weight", mesh == 0), ("mesh and side bands", mesh != 0))):
+            if np.any(here & shown):
+                ax.vlines(hertz[here & shown], floor, size[here & shown], color=COLOURS[number], label=words)
+        if np.any(shown):
+            ax.set_yscale("log")
+            ax.set_ylim(bottom=floor)
+        label(ax, y=text)
+    label(axes[-1], "frequency in the carrier frame [Hz]")
+    label(axes[0], title=f"{float(response['speed'][speed]):.6g} rpm")
+    legend_below(figure)
+    return figure
+
+
+def _contact(data: xr.Dataset, x: np.ndarray, words: str, stable) -> Figure:
+    """Four panels: both flanks of the meshes of the first planet."""
+    count = data.sizes["mesh"] // 2
+    panels = [(side, mesh) for side in ("drive", "back") for mesh in (0, count)]
+    figure, axes = new_figure(rows=4, width=8.0, height=6.4, sharex=True)
+    for number, (ax, (side, mesh)) in enumerate(zip(axes, panels)):
+        share, colour = data[f"{side}_contact"].values[:, mesh], COLOURS[number]
+        if stable is None:
+            ax.plot(x, share, "o-", color=colour, markersize=3)
+        else:
+            for wanted, dash in ((True, "-"), (False, "--")):
+                for part in pieces(stable, wanted):
+                    ax.plot(x[part], share[part], color=colour, linestyle=dash)
+        ax.set_ylim(-0.06, 1.06)
+        ax.set_yticks([0.0, 0.5, 1.0])
+        label(ax, title=f"{data['mesh'].values[mesh]!s}, {side} flanks")
+    label(axes[-1], words)
+    figure.supylabel("share of the time in contact: 1 in contact, 0 not", fontsize=SIZE)
+    return figure
+
+
+def _wave(branch: xr.Dataset) -> np.ndarray:
+    """``exp(i h phase)`` (n, H) over one turn."""
+    phase = np.linspace(0.0, 2.0 * np.pi, _PHASES)
+    return np.exp(1j * phase[:, None] * branch["harmonic"].values)
+
+
+def _carrier_frequency(response: xr.Dataset, speed: int) -> float:
+    return abs(float(response["carrier_speed"][speed])) / (2.0 * np.pi)
+
+
+def _carrier_turn(response: xr.Dataset, speed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Fractions of a carrier turn (ten mesh periods where it stands), and ``exp(i omega t)`` of the lines."""
+    carrier, mesh = _carrier_frequency(response, speed), float(response["mesh_frequency"][speed])
+    duration = 1.0 / carrier if carrier else 10.0 / mesh
+    highest = np.abs(response["frequency"].values[speed]).max()
+    count = int(np.clip(8.0 * highest * duration, 720, _INSTANTS))
+    turn = np.linspace(0.0, 1.0, count + 1)
+    wave = np.exp(2j * np.pi * duration * turn[:, None] * response["frequency"].values[speed])
+    return turn, wave

@@ -1,0 +1,246 @@
+"""The stages of every kind of case: what computes them, and what they say about their trustworthiness."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear import analysis
+from femgear.case import planetary_set
+from femgear.errors import CaseError
+
+if TYPE_CHECKING:
+    from femgear.case import Case
+
+Results = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of a run.
+
+    Parameters
+    ----------
+    compute : callable
+        ``(case, results, cache, progress) -> result`` from the results of the stages before, by name.
+    verdict : callable
+        ``(result) -> dict`` for the manifest.
+    wanted : callable
+        ``(case) -> bool``: whether a run without ``only`` computes it.
+    possible : callable
+        ``(case) -> str``: why the case cannot have the stage, empty where it can.
+    needs : callable
+        ``(case) -> tuple of str``: stages that must come before.
+    """
+
+    compute: Callable[[Case, Results, Path, analysis.Progress | None], Any]
+    verdict: Callable[[Any], dict]
+    wanted: Callable[[Case], bool] = lambda case: True
+    possible: Callable[[Case], str] = lambda case: ""
+    needs: Callable[[Case], tuple[str, ...]] = lambda case: ()
+
+
+def kind_of(case: Case) -> str:
+    """Kind of a case: a key of `KINDS`."""
+    return "elastic" if case.planar is None else "planar"
+
+
+def stages_of(case: Case, only: str | None = None) -> tuple[str, ...]:
+    """Stages to compute, in order.
+
+    Parameters
+    ----------
+    case : Case
+    only : str, optional
+        Last stage; it is computed with what it needs, whatever the case says of it.
+
+    Raises
+    ------
+    CaseError
+        E-STAGE: the case has no such stage.
+    """
+    table = KINDS[kind_of(case)].stages
+    names = list(table)
+    if only is None:
+        return tuple(name for name in names if table[name].wanted(case) and not table[name].possible(case))
+    why = table[only].possible(case) if only in table else f"it is no stage of {KINDS[kind_of(case)].words}"
+    if why:
+        allowed = [name for name in names if not table[name].possible(case)]
+        raise CaseError(
+            f"no stage {only}: {why}", code="E-STAGE", key="--only", value=only, limit=", ".join(allowed)
+        )
+    before = names[: names.index(only)]
+    return (*(name for name in before if _goes_before(table, name, only, case)), only)
+
+
+def _goes_before(table: Mapping[str, Stage], name: str, only: str, case: Case) -> bool:
+    needs = table[only].needs(case)
+    return name in needs or any(_goes_before(table, name, other, case) for other in needs)
+
+
+def check_case(case: Case, only: str | None = None) -> None:
+    """Refuse what the stages of a run cannot represent, before anything is computed.
+
+    Raises
+    ------
+    CaseError, GeometryError
+    """
+    stages, gears = stages_of(case, only), planetary_set(case)
+    if set(stages) - {"static", "stress"}:
+        KINDS[kind_of(case)].check(case, gears)
+
+
+def _stress(case, results, cache, progress):
+    from femgear.analysis_stress import solve_stress
+
+    return solve_stress(case, results["static"], progress=progress)
+
+
+def _planar(name: str, **options):
+    """Stage of `femgear.analysis_planar`, by the name of its function."""
+
+    def compute(case, results, cache, progress):
+        from femgear import analysis_planar
+
+        shown = {"progress": progress} if options.get("shows") else {}
+        return getattr(analysis_planar, name)(case, results.get("static"), **shown)
+
+    return compute
+
+
+def _static_verdict(result) -> dict:
+    cycle = result.cycle
+    return {"residual": float(cycle.residual.max()), "message": cycle.message, "contact": cycle.contact}
+
+
+def _dynamics_verdict(result) -> dict:
+    return {
+        "converged": bool(np.all(result.response.converged)),
+        "stable": bool(np.all(result.stability.stable)),
+        "residual": float(np.max(result.response.residual)),
+        "message": result.response.message,
+    }
+
+
+def _branch_verdict(result) -> dict:
+    branch = result.branch
+    return {
+        "converged": bool(np.all(branch.converged)),
+        "complete": bool(branch.complete),
+        "points": len(branch.parameter),
+        "folds": len(branch.folds),
+        "residual": float(np.max(branch.residual)),
+        "message": branch.message,
+    }
+
+
+def _response_verdict(result) -> dict:
+    return {
+        "converged": all(one.converged for one in result.solutions),
+        "residual": max(one.residual for one in result.solutions),
+        "tail": max(one.tail for one in result.solutions),
+    }
+
+
+def _needs_static(case: Case) -> tuple[str, ...]:
+    return ("static",) if case.planar.mesh_stiffness is None else ()
+
+
+def _lacks(section: str) -> Callable[[Case], str]:
+    return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
+
+
+def _check_elastic(case, gears):
+    analysis.check_dynamic_case(case, gears)
+
+
+def _check_planar(case, gears):
+    from femgear.analysis_planar_checks import check_planar_case
+
+    check_planar_case(case, gears)
+
+
+STATIC = Stage(
+    compute=lambda case, _, cache, progress: analysis.solve_static(case, cache=cache, progress=progress),
+    verdict=_static_verdict,
+)
+STRESS = Stage(
+    compute=_stress,
+    verdict=lambda result: {
+        "root_points": sum(len(root.arc) for root in result.roots), "iso": result.nominal.message,
+    },
+    wanted=lambda case: case.static.stresses,
+    needs=lambda case: ("static",),
+)  # fmt: skip
+ELASTIC = {
+    "static": STATIC,
+    "stress": STRESS,
+    "modes": Stage(
+        compute=lambda case, results, *_: analysis.solve_modes(case, results["static"]),
+        verdict=lambda result: {
+            "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.model.system.M),
+        },
+        needs=lambda case: ("static", "stress") if case.static.stresses else ("static",),
+    ),
+    "dynamics": Stage(
+        compute=lambda case, results, _, progress: analysis.solve_dynamics(
+            case, results["static"], results["modes"], progress=progress
+        ),
+        verdict=_dynamics_verdict,
+        needs=lambda case: ("modes",),
+    ),
+    "housing": Stage(
+        compute=lambda case, results, *_: analysis.solve_housing(case, results["dynamics"]),
+        verdict=lambda result: {"points": result.points},
+        needs=lambda case: ("dynamics",),
+    ),
+}  # fmt: skip
+PLANAR = {
+    "static": Stage(
+        compute=STATIC.compute, verdict=STATIC.verdict, wanted=lambda case: bool(_needs_static(case))
+    ),
+    "stress": Stage(
+        compute=STRESS.compute,
+        verdict=STRESS.verdict,
+        wanted=lambda case: bool(_needs_static(case)) and case.static.stresses,
+        needs=STRESS.needs,
+    ),
+    "modes": Stage(
+        compute=_planar("solve_planar_modes"),
+        verdict=lambda result: {
+            "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
+        },
+        needs=_needs_static,
+    ),
+    "branch": Stage(
+        compute=_planar("solve_branch", shows=True),
+        verdict=_branch_verdict,
+        possible=_lacks("branch"),
+        needs=lambda case: ("modes",),
+    ),
+    "response": Stage(
+        compute=_planar("solve_planar_response", shows=True),
+        verdict=_response_verdict,
+        possible=_lacks("response"),
+        needs=lambda case: ("modes",),
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Stages of a kind of case in order, its check before a run, and its name in messages."""
+
+    stages: Mapping[str, Stage]
+    check: Callable[[Case, Any], None]
+    words: str
+
+
+KINDS = {
+    "elastic": Kind(ELASTIC, _check_elastic, "a case with an elastic ring"),
+    "planar": Kind(PLANAR, _check_planar, "a planar case"),
+}
