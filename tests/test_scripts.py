@@ -26,6 +26,7 @@ SET_SCRIPTS = (
     "bearing_clearance.py",
     "planet_phasing.py",
     "multistage.py",
+    "drivetrain.py",
 )
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 
@@ -384,3 +385,10 @@ def test_multistage_writes_its_tables_and_figures(tmp_path):
     done = run("multistage.py", "--points", "40", "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".png"}
+
+
+def test_drivetrain_writes_spectra_and_pictures(tmp_path):
+    settings = ["--duration", "4", "--rate", "4000", "--modes", "0", "--no-sensitivity"]
+    done = run("drivetrain.py", *settings, "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {path.suffix for path in tmp_path.iterdir()} >= {".csv", ".png"}

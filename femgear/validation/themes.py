@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from femgear.validation import (
     contact,
+    drivetrain,
     dynamics,
     elasticity,
     geometry,
@@ -204,6 +205,20 @@ THEMES = (
             multistage.soft_shaft,
             multistage.response,
         ),
+    ),
+    Theme(
+        "drivetrain",
+        "Wind turbine drivetrain",
+        "",
+        (
+            drivetrain.shafts,
+            drivetrain.kinematics,
+            drivetrain.stiffness,
+            drivetrain.reductions,
+            drivetrain.balances,
+            drivetrain.torques,
+        ),
+        (drivetrain.minute,),
     ),
     Theme(
         "wind turbine sets",

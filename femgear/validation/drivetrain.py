@@ -1,0 +1,162 @@
+"""Drivetrains: shafts against closed forms, reductions of the chain, balances, printed numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from femgear.models.drivetrain import balanced_torque, drivetrain_model
+from femgear.models.drivetrain_data import ChainBearing, Drivetrain, MeshWave
+from femgear.models.drivetrain_march import march_drivetrain
+from femgear.models.drivetrain_meshes import planar_of, rectangular_series
+from femgear.models.drivetrain_torque import constant_torques
+from femgear.models.drivetrain_torsional import torsional_matrices, torsional_model
+from femgear.models.planar import planar_system
+from femgear.models.shaft import Disc, ShaftSection, Support, shaft_system
+from femgear.models.wind_turbine_drivetrain import (
+    PRINTED,
+    RADII_TEETH,
+    line_teeth,
+    paper_torques,
+    ratio_of_radii,
+    wind_turbine_drivetrain,
+)
+from femgear.solvers.modal import solve_modes
+from femgear.validation.rows import Row, at_most, information, printed, within
+
+PAPER = "Dynamic analysis of the wind turbine drivetrain considering shaft bending effect"
+LIBRARY = "ross-rotordynamics 2.3.0, the same 24 elements"
+SECTION, LENGTH, COUNT = ShaftSection(0.1, 0.02), 1.0, 24
+DISCS = (Disc(6, 20.0, 0.18, 0.10), Disc(16, 35.0, 0.50, 0.30))
+# bending modes by that library [Hz]: free, free with discs, with discs in bearings of 5e7 and 8e7 N/m
+FREE = ("452.333793", "1189.288296", "2195.991369")
+WITH_DISCS = ("377.474134", "835.190445", "1324.163334")
+IN_BEARINGS = ("106.033701", "275.141073", "575.650784")
+
+
+def _shaft(count=COUNT, **options):
+    system = shaft_system([SECTION] * count, [LENGTH / count] * count, **options)
+    system = replace(system, gyroscopic=None)
+    return solve_modes(replace(system, W=np.zeros((len(system.M), 0))), np.zeros(0)).frequency
+
+
+def shafts() -> tuple[Row, ...]:
+    """Timoshenko shafts."""
+    s, rows = SECTION, []
+    ours = _shaft(96, supports=(Support(0, math.inf), Support(96, math.inf)))
+    slide = s.shear_coefficient * s.shear_modulus
+    for number in (1, 2, 3):
+        k = number * math.pi / LENGTH
+        a = s.density**2 * s.second_moment / slide
+        b = s.density * (s.area + s.second_moment * (1.0 + s.young / slide) * k**2)
+        square = (b - math.sqrt(b * b - 4.0 * a * s.young * s.second_moment * k**4)) / (2.0 * a)
+        wanted = math.sqrt(square) / (2.0 * math.pi)
+        text = f"simply supported Timoshenko shaft, 96 elements, mode {number} [Hz]"
+        rows.append(within("shaft", "closed form", text, wanted, _nearest(ours, wanted), 1e-3))
+    cases = (
+        ("free-free shaft", {}, FREE),
+        ("free-free shaft with two discs", {"discs": DISCS}, WITH_DISCS),
+        (
+            "two discs in bearings", {"discs": DISCS, "supports": (Support(0, 5e7), Support(COUNT, 8e7))},
+            IN_BEARINGS,
+        ),
+    )  # fmt: skip
+    for text, options, values in cases:
+        ours = _shaft(**options)
+        for number, value in enumerate(values, 1):
+            near = _nearest(ours, float(value))
+            rows.append(within("shaft", LIBRARY, f"{text}, bending {number} [Hz]", float(value), near, 1e-5))
+    return tuple(rows)
+
+
+def _nearest(values, wanted: float) -> float:
+    return float(values[np.argmin(np.abs(values - wanted))])
+
+
+def kinematics() -> tuple[Row, ...]:
+    """Ratio and mesh lines of the paper."""
+    rows = [printed("speeds", PAPER, "speed ratio from the radii", "34.654", ratio_of_radii())]
+    teeth = line_teeth()
+    note = "tooth numbers are not printed: the nearest whole numbers"
+    for name, value, ours in zip(("planetary", "gear 1-2", "gear 2-3"), PRINTED.lines, teeth.lines()):
+        rows.append(within("speeds", PAPER, f"mesh line {name} [Hz]", value, ours, 0.005, note=note))
+    for name, value, ours in zip(("planetary", "gear 1-2", "gear 2-3"), PRINTED.lines, RADII_TEETH.lines()):
+        text = f"mesh line {name}, module 5 mm, which divides every radius [Hz]"
+        rows.append(information("speeds", PAPER, text, value, ours))
+    return tuple(rows)
+
+
+def stiffness() -> tuple[Row, ...]:
+    """Rectangular mesh stiffness, contact ratio 1.635, 1 or 0.65."""
+    lines = rectangular_series(MeshWave(0.87225, 1.635, low_share=0.65), 15).real
+    wanted = [0.87225] + [0.7 / (math.pi * h) * math.sin(math.pi * h * 0.635) for h in range(1, 16)]
+    error = np.abs(lines - wanted).max()
+    return (
+        at_most("mesh stiffness", "closed form", "rectangular wave, error of 15 harmonics", 1e-12, error),
+    )
+
+
+def reductions() -> tuple[Row, ...]:
+    """Held axes: torsion; one planetary stage: the planar set."""
+    train = wind_turbine_drivetrain()
+    model = torsional_model(train)
+    parts = zip((model.system.M, model.system.K, model.system.W), torsional_matrices(train)[:3])
+    error = max(np.abs(ours - wanted).max() / np.abs(wanted).max() for ours, wanted in parts)
+    stage = train.planetary[0]
+    bodies = tuple(replace(b, tilts=False) for b in train.bodies if b.name in ("carrier", "sun"))
+    alone = Drivetrain(
+        bodies,
+        planetary=(stage,),
+        bearings=(ChainBearing("carrier", 2e8), ChainBearing("sun", 3e7)),
+        gravity=0.0,
+    )
+    lumped = planar_of(alone, stage)
+    carrier, sun = replace(lumped.carrier, support=2e8), replace(lumped.sun, support=3e7)
+    lumped = replace(lumped, carrier=carrier, sun=sun)
+    ours = drivetrain_model(alone)
+    ours = solve_modes(ours.still, ours.mean_stiffness).frequency[1:]
+    theirs = solve_modes(planar_system(lumped), lumped.mesh_stiffness).frequency[1:]
+    planar = np.abs(ours / theirs - 1.0).max()
+    return (
+        at_most("reductions", "torsional matrices", "chain with held axes, error of M, K and W", 1e-9, error),
+        at_most(
+            "reductions", "planar set", "planetary stage alone, error of natural frequencies", 1e-9, planar
+        ),
+    )
+
+
+def balances() -> tuple[Row, ...]:
+    """Energy and momentum over one second; the minute is in `minute`."""
+    return _balances(1.0)
+
+
+def minute() -> tuple[Row, ...]:
+    """Energy and momentum over 60 s of 20 000 steps a second."""
+    return _balances(60.0)
+
+
+def _balances(duration: float) -> tuple[Row, ...]:
+    model = drivetrain_model(wind_turbine_drivetrain())
+    run = march_drivetrain(
+        model, constant_torques(paper_torques()), duration=duration, step=5e-5, speed=PRINTED.speed,
+        start="zero",
+        every=200,
+    )  # fmt: skip
+    text = f"36 dof, {duration:g} s in steps of 50 µs:"
+    return (
+        at_most("balances", "theory", f"{text} energy", 1e-6, run.ledger.error),
+        at_most("balances", "theory", f"{text} angular momentum", 1e-6, run.momentum),
+        at_most("balances", "theory", f"{text} spin in the deviations [rad]", 1e-9, run.drift),
+    )
+
+
+def torques() -> tuple[Row, ...]:
+    """Torque that holds the speed."""
+    model = drivetrain_model(wind_turbine_drivetrain())
+    ours = -balanced_torque(model, "rotor", PRINTED.torque, "generator")["generator"]
+    wanted = PRINTED.torque / ((1 + 43 / 11) * (29 / 9.5) * (18.5 / 8))
+    return (
+        within("torques", "kinematics", "generator torque that holds the speed [N m]", wanted, ours, 1e-12),
+    )

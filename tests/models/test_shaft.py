@@ -1,0 +1,212 @@
+"""Timoshenko shafts against closed forms, an exact transfer matrix and a rotor-dynamics library."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh, eigvals, expm
+from scipy.optimize import brentq
+
+from femgear.errors import CaseError
+from femgear.models.shaft import (
+    Disc,
+    ShaftSection,
+    Support,
+    beam_element,
+    joint_deflections,
+    joint_springs,
+    shaft_system,
+)
+
+SECTION = ShaftSection(0.1, 0.02)
+LENGTH, COUNT = 1.0, 24
+DISCS = (Disc(6, 20.0, 0.18, 0.10), Disc(16, 35.0, 0.50, 0.30))
+
+
+def shaft(count=COUNT, **options):
+    return shaft_system([SECTION] * count, [LENGTH / count] * count, **options)
+
+
+def natural(system):
+    """[Hz], ascending."""
+    return np.sqrt(np.abs(eigh(system.K, system.M, eigvals_only=True))) / (2.0 * np.pi)
+
+
+def exact_bending(low, high, discs=(), count=400):
+    """Frequencies [Hz] of a free-free Timoshenko shaft: zeros of the exact transfer matrix.
+
+    ``w' = psi + V / (kappa G A)``, ``psi' = M / (E I)``, ``M' = -V - rho I omega^2 psi``, ``V' = -rho A
+    omega^2
+    w``; a disc adds ``-I_t omega^2 psi`` to M and ``-m omega^2 w`` to V.
+    """
+    s = SECTION
+    shear, bend = s.shear_coefficient * s.shear_modulus * s.area, s.young * s.second_moment
+    stops = [(d.station / COUNT * LENGTH, d) for d in discs] + [(LENGTH, None)]
+
+    def residue(hertz):
+        square = (2.0 * np.pi * hertz) ** 2
+        field = np.zeros((4, 4))
+        field[0, 1], field[0, 3], field[1, 2] = 1.0, 1.0 / shear, 1.0 / bend
+        field[2, 1], field[2, 3] = -s.density * s.second_moment * square, -1.0
+        field[3, 0] = -s.density * s.area * square
+        total, here = np.eye(4), 0.0
+        for place, disc in stops:
+            total = expm(field * (place - here)) @ total
+            here = place
+            if disc is not None:
+                point = np.eye(4)
+                point[2, 1], point[3, 0] = -disc.transverse * square, -disc.mass * square
+                total = point @ total
+        return np.linalg.det(total[2:, :2])
+
+    grid = np.linspace(low, high, count)
+    values = [residue(h) for h in grid]
+    return [brentq(residue, a, b) for a, b, u, v in zip(grid, grid[1:], values, values[1:]) if u * v < 0.0]
+
+
+def test_rigid_motions_have_the_exact_mass():
+    M, K, G = beam_element(SECTION, LENGTH)
+    mass = SECTION.density * SECTION.area * LENGTH
+    move, turn = np.zeros(10), np.zeros(10)
+    move[[0, 5]] = 1.0
+    turn[[3, 8]], turn[0], turn[5] = 1.0, -0.5 * LENGTH, 0.5 * LENGTH
+    inertia = mass * LENGTH**2 / 12.0 + SECTION.density * SECTION.second_moment * LENGTH
+    assert move @ M @ move == pytest.approx(mass, rel=1e-13)
+    assert turn @ M @ turn == pytest.approx(inertia, rel=1e-13)
+    assert np.abs(K @ np.stack([move, turn], axis=1)).max() < 1e-6
+    about_x = np.zeros(10)
+    about_x[[2, 7]], about_x[1], about_x[6] = 1.0, 0.5 * LENGTH, -0.5 * LENGTH
+    # a rigid shaft has the angular momentum of a disc
+    polar = 2.0 * SECTION.density * SECTION.second_moment * LENGTH
+    assert about_x @ G @ turn == pytest.approx(polar, rel=1e-13)
+    assert np.array_equal(G, -G.T)
+
+
+@pytest.mark.parametrize(("discs", "top"), [((), 2500.0), (DISCS, 2150.0)])
+def test_free_shaft_against_the_characteristic_equation(discs, top):
+    wanted = np.array(exact_bending(100.0, top, discs))
+    assert len(wanted) >= 3
+    errors = []
+    for factor in (2, 4):
+        stations = tuple(Disc(d.station * factor, d.mass, d.polar, d.transverse) for d in discs)
+        ours = natural(shaft(COUNT * factor, discs=stations))
+        errors.append([np.min(np.abs(ours / one - 1.0)) for one in wanted])
+    errors = np.array(errors)
+    assert np.all(errors[1] < 1e-3)
+    # second order in the length of the elements
+    assert np.allclose(errors[0] / errors[1], 4.0, rtol=0.1)
+
+
+def test_simply_supported_shaft_against_its_closed_form():
+    """``rho^2 I / (kappa G) w^4 - (rho A + rho I (1 + E / (kappa G)) k^2) w^2 + E I k^4 = 0``."""
+    s, count = SECTION, 96
+    ours = natural(shaft(count, supports=(Support(0, math.inf), Support(count, math.inf))))
+    slide = s.shear_coefficient * s.shear_modulus
+    for number in (1, 2, 3):
+        k = number * math.pi / LENGTH
+        a = s.density**2 * s.second_moment / slide
+        b = s.density * (s.area + s.second_moment * (1.0 + s.young / slide) * k**2)
+        square = (b - math.sqrt(b * b - 4.0 * a * s.young * s.second_moment * k**4)) / (2.0 * a)
+        wanted = math.sqrt(square) / (2.0 * math.pi)
+        assert np.min(np.abs(ours / wanted - 1.0)) < 2e-4
+
+
+def test_torsion_of_a_free_shaft():
+    """``f_n = n / (2 l) sqrt(G / rho)``."""
+    ours = natural(shaft(96))
+    wanted = math.sqrt(SECTION.shear_modulus / SECTION.density) / (2.0 * LENGTH)
+    assert np.min(np.abs(ours / wanted - 1.0)) < 1e-4
+
+
+# damped natural frequencies [Hz] by ross-rotordynamics 2.3.0 (Petrobras, UFRJ): the same 24 elements, steel
+# of 206 GPa, 0.3 and 7850 kg/m^3, discs as above; bearings of 5e7 and 8e7 N/m at the ends; 0 and 1000 rad/s.
+# Its axial modes, which femgear leaves out, are not in the lists.
+ROSS_FREE = (452.333793, 1189.288296, 1589.615652, 2195.991369, 3186.042934, 3393.854392)
+ROSS_DISCS = (377.474134, 562.711177, 835.190445, 1324.163334, 2108.046811)
+ROSS_BEARINGS = (106.033701, 275.141073, 562.711176, 575.650784, 947.624003, 1380.710501)
+ROSS_TURNING = (
+    104.871976, 107.138874, 269.019913, 280.980129, 539.582438, 562.711177, 611.726325, 931.268824,
+    963.704651,
+)  # fmt: skip
+BEARINGS = (Support(0, 5e7), Support(COUNT, 8e7))
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        ({}, ROSS_FREE),
+        ({"discs": DISCS}, ROSS_DISCS),
+        ({"discs": DISCS, "supports": BEARINGS}, ROSS_BEARINGS),
+    ],
+)
+def test_against_the_rotor_dynamics_library(options, wanted):
+    ours = natural(shaft(**options))
+    assert max(np.min(np.abs(ours / one - 1.0)) for one in wanted) < 2e-6
+
+
+def test_whirl_against_the_rotor_dynamics_library():
+    system = shaft(discs=DISCS, supports=BEARINGS)
+    n = len(system.M)
+    damping = 1000.0 * system.gyroscopic
+    zero, one = np.zeros((n, n)), np.eye(n)
+    poles = eigvals(np.block([[zero, one], [-system.K, -damping]]), np.block([[one, zero], [zero, system.M]]))
+    ours = np.abs(poles.imag) / (2.0 * np.pi)
+    assert max(np.min(np.abs(ours / wanted - 1.0)) for wanted in ROSS_TURNING) < 2e-6
+
+
+def test_two_links_are_the_static_beam():
+    """Tip of a cantilever under a force and a moment, and a simple span: Timoshenko's deflections."""
+    length = 0.4
+    K = beam_element(SECTION, length)[1][5:, 5:]
+    bend, phi = SECTION.young * SECTION.second_moment, SECTION.shear_ratio(length)
+    tip = np.linalg.solve(K, np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+    assert tip[0] == pytest.approx(length**3 / (3.0 * bend) * (1.0 + 0.25 * phi), rel=1e-12)
+    assert tip[3] == pytest.approx(length**2 / (2.0 * bend), rel=1e-12)
+    moment = np.linalg.solve(K, np.array([0.0, 0.0, 0.0, 1.0, 0.0]))
+    assert moment[3] == pytest.approx(length / bend, rel=1e-12)
+
+
+@pytest.mark.parametrize(("rule", "which"), [("moment", 3), ("tip force", 0)])
+def test_springs_of_the_spherical_joint_meet_their_load_case(rule, which):
+    """Two rigid links: a moment M turns the tip by M / k, a force F moves it by ``F l^2 / (4 k)``."""
+    length = 0.4
+    bend, phi = SECTION.young * SECTION.second_moment, SECTION.shear_ratio(length)
+    k = joint_springs(SECTION, length, rule=rule).bending
+    if which == 3:
+        assert 1.0 / k == pytest.approx(length / bend, rel=1e-12)
+    else:
+        wanted = length**3 / (3.0 * bend) * (1.0 + 0.25 * phi)
+        assert length**2 / (4.0 * k) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_springs_of_a_simple_span():
+    """A force F in the joint bends it by ``F l / (4 k)`` and lowers it by l / 4 times that."""
+    length = 0.4
+    bend, phi = SECTION.young * SECTION.second_moment, SECTION.shear_ratio(length)
+    k = joint_springs(SECTION, length, rule="simple span").bending
+    assert length**2 / (16.0 * k) == pytest.approx(length**3 / (48.0 * bend) * (1.0 + phi), rel=1e-12)
+
+
+def test_joint_does_not_see_rigid_motions():
+    rows = joint_deflections(0.7)
+    turn = np.zeros(10)
+    turn[[3, 8]], turn[5] = 1.0, 0.7
+    assert np.abs(rows @ turn).max() < 1e-15
+    assert np.linalg.matrix_rank(rows) == 5
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: ShaftSection(0.0),
+        lambda: ShaftSection(0.1, 0.1),
+        lambda: ShaftSection(0.1, poisson=0.5),
+        lambda: ShaftSection(math.nan),
+        lambda: joint_springs(SECTION, -1.0),
+        lambda: joint_springs(SECTION, 1.0, rule="guess"),
+        lambda: shaft(discs=(Disc(25, 1.0, 1.0, 1.0),)),
+    ],
+)
+def test_shafts_that_cannot_be_are_refused(make):
+    with pytest.raises(CaseError, match="E-SHAFT"):
+        make()
