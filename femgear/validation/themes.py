@@ -14,6 +14,7 @@ from femgear.validation import (
     geometry,
     helical,
     housing,
+    impacts,
     integration,
     members,
     modulation,
@@ -267,6 +268,13 @@ THEMES = (
             nonlinear_tones.other_package,
         ),
         (integration.sweeps,),
+    ),
+    Theme(
+        "impacts",
+        "Impacts and chaos",
+        "",
+        (impacts.one_term_balance,),
+        (impacts.linear_exponents, impacts.damping_and_impacts, impacts.period_two, impacts.chaos),
     ),
     Theme(
         "time integration",

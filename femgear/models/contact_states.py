@@ -1,0 +1,128 @@
+"""Contact of meshes with backlash in a motion: always closed, impact on one flank, impact on both.
+
+A. Kahraman and R. Singh, J. Sound Vib. 142 (1990) 49-75, tell no impact, single-sided and double-sided impact
+apart by the range of the relative deflection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.elements import GearMeshes
+from femgear.solvers.periodic import PeriodicSolution
+
+NORMAL, ONE_SIDED, TWO_SIDED = 0, 1, 2
+STATE_NAMES = ("normal", "one-sided impact", "two-sided impact")
+
+
+@dataclass(frozen=True)
+class ContactStates:
+    """What every mesh of a motion does.
+
+    Parameters
+    ----------
+    state : (..., g) int array
+        Index into `STATE_NAMES`: one flank stays closed; it opens and the other does not close; both close.
+    drive, free, back : (..., g) arrays
+        Shares of the instants with the drive flanks, no flanks and the back flanks in contact.
+    """
+
+    state: np.ndarray
+    drive: np.ndarray
+    free: np.ndarray
+    back: np.ndarray
+
+
+def contact_states(meshes: GearMeshes, x, theta) -> ContactStates:
+    """Contact over the instants of a motion.
+
+    Parameters
+    ----------
+    meshes : GearMeshes
+        Meshes that separate.
+    x : (..., T, n_columns) array
+        Deflections of all columns at T instants, at least one period of them [m].
+    theta : (T, n_bases) array
+        Phases of the instants [rad].
+
+    Raises
+    ------
+    CaseError
+        Meshes that do not separate (E-CONTACT-STATE).
+    """
+    if not meshes.separates:
+        raise CaseError(
+            "meshes that do not separate have no impacts", code="E-CONTACT-STATE", limit="separates=True"
+        )
+    k = meshes.stiffness.at(theta)
+    line = meshes.force.at(theta) + k * (
+        np.asarray(x, float)[..., meshes.columns[:, 0]] - meshes.deflection.at(theta)
+    )
+    drive, back = line > 0.0, line + k * meshes.backlash < 0.0
+    return _judged(drive, back, axis=-2)
+
+
+def solution_states(meshes: GearMeshes, solution: PeriodicSolution, *, samples: int = 1024) -> ContactStates:
+    """Contact in a periodic solution, at equidistant phases; with several bases on a grid of all phases.
+
+    Parameters
+    ----------
+    meshes : GearMeshes
+    solution : PeriodicSolution
+    samples : int
+        Phases of every base: 1024 for one base, ``samples ** (1 / n_bases)`` but 64 at least for several.
+    """
+    bases = solution.orders.shape[1]
+    each = samples if bases == 1 else max(64, round(samples ** (1.0 / bases)))
+    axes = np.meshgrid(*[2.0 * np.pi * np.arange(each) / each] * bases, indexing="ij")
+    theta = np.stack([axis.ravel() for axis in axes], axis=1)
+    x = (np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T).real
+    return contact_states(meshes, x, theta)
+
+
+def range_states(lowest, highest, *, drive: float, back: float) -> np.ndarray:
+    """States (...) from the smallest and largest deflection, where the flanks close at constant deflections.
+
+    Parameters
+    ----------
+    lowest, highest : (...) arrays
+        Of the relative deflection.
+    drive, back : float
+        Deflections above and below which the drive and the back flanks touch.
+    """
+    lowest, highest = np.asarray(lowest, float), np.asarray(highest, float)
+    both = (highest > drive) & (lowest < back)
+    closed = (lowest >= drive) | (highest <= back)
+    return np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
+
+
+def state_regions(parameter, state) -> list[tuple[int, float, float]]:
+    """Runs of equal states along a curve or sweep: state, first and last value of the parameter.
+
+    Neighbouring runs share no value; where the state changes the border lies between them.
+    """
+    parameter, state = np.asarray(parameter, float), np.asarray(state)
+    ends = np.flatnonzero(np.diff(state, append=-1, prepend=-1))
+    return [
+        (int(state[first]), float(parameter[first]), float(parameter[last - 1]))
+        for first, last in pairwise(ends)
+    ]
+
+
+def level_crossings(parameter, value, level: float) -> np.ndarray:
+    """Parameters at which a quantity along a curve passes a level, by linear interpolation."""
+    parameter, away = np.asarray(parameter, float), np.asarray(value, float) - level
+    i = np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:]))
+    share = away[i] / (away[i] - away[i + 1])
+    return parameter[i] + share * (parameter[i + 1] - parameter[i])
+
+
+def _judged(drive, back, axis: int) -> ContactStates:
+    both = drive.any(axis) & back.any(axis)
+    closed = drive.all(axis) | back.all(axis)
+    state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
+    return ContactStates(state, drive.mean(axis), (~drive & ~back).mean(axis), back.mean(axis))

@@ -1,0 +1,233 @@
+"""A gear pair with backlash in dimensionless form: rotations, or rotations and two bearings.
+
+Lengths are counted in half backlashes b, forces in k b with the mean mesh stiffness k, times in 1 / omega_n,
+omega_n = sqrt(k / m_e), with the equivalent mass ``m_e = 1 / (r_1^2 / I_1 + r_2^2 / I_2)`` (A. Kahraman and
+R. Singh, J. Sound Vib. 142 (1990) 49-75, rotations; 146 (1991) 135-156, with bearings and k(t)). With the
+dynamic approach ``u = r_1 theta_1 - r_2 theta_2``, the displacements y_1, y_2 of the gears along the line of
+action and the error e(t), the relative deflection of the mesh is
+
+``x = u + y_1 - y_2 - e(t)``
+
+drive flanks touch above x = 1, back flanks below x = -1. In the coordinates (y_1, y_2, x) the error acts
+through the inertia of ``u = x + e - y_1 + y_2`` alone: ``x'' + 2 zeta x' + k(t) f(x) = F - e''`` without
+bearings. Time is scaled once more so that the tooth frequency is one for every frequency ratio Omega,
+``theta = Omega t``: M and C carry Omega^2 and Omega, and branches over Omega are branches over a parameter.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.elements import GearMeshes
+from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.solvers.series import FourierSeries, constant
+from femgear.system import MechanicalSystem
+
+# deflections of drive and back contact in half backlashes
+DRIVE, BACK = 1.0, -1.0
+
+
+@dataclass(frozen=True)
+class PairBearings:
+    """Bearings of both gears along the line of action.
+
+    Parameters
+    ----------
+    mass : (float, float)
+        Of gears 1 and 2 over the equivalent mass m_e.
+    stiffness : (float, float)
+        Of their bearings over the mean mesh stiffness.
+    damping_ratio : float
+        ``c_i = 2 xi sqrt(k_i m_i)``, see `femgear.models.equivalent_damping`.
+    """
+
+    mass: tuple[float, float]
+    stiffness: tuple[float, float]
+    damping_ratio: float = 0.0
+
+    def __post_init__(self):
+        values = (*self.mass, *self.stiffness)
+        if len(values) != 4 or not all(math.isfinite(v) and v > 0.0 for v in values):
+            raise CaseError(
+                f"bearings with masses {self.mass} and stiffnesses {self.stiffness}", code="E-PAIR",
+                limit="two of each, above 0",
+            )  # fmt: skip
+        _not_negative("damping ratio of the bearings", self.damping_ratio)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ImpactPair:
+    """Dimensionless gear pair with backlash, k(t) and errors.
+
+    Parameters
+    ----------
+    damping_ratio : float
+        zeta of the mesh: ``c = 2 zeta sqrt(k m_e)``.
+    load : float
+        Mean force F over k b; positive keeps the drive flanks in contact.
+    stiffness : sequence of complex
+        Harmonics 1, 2, ... of k(t) over its mean, of the tooth frequency.
+    tooth_error : sequence of complex
+        Harmonics 1, 2, ... of the tooth-frequency error, in half backlashes.
+    eccentricity : (complex, complex)
+        Of gears 1 and 2 along the line of action, in half backlashes, with their phases.
+    teeth : (int, int)
+        Shaft frequencies are the tooth frequency over the tooth numbers.
+    bearings : PairBearings, optional
+        None holds both axes.
+    """
+
+    damping_ratio: float
+    load: float
+    stiffness: tuple[complex, ...] = ()
+    tooth_error: tuple[complex, ...] = ()
+    eccentricity: tuple[complex, complex] = (0.0, 0.0)
+    teeth: tuple[int, int] = (20, 30)
+    bearings: PairBearings | None = None
+
+    def __post_init__(self):
+        _not_negative("damping ratio", self.damping_ratio)
+        for name in ("stiffness", "tooth_error", "eccentricity"):
+            values = np.atleast_1d(np.array(getattr(self, name), complex))
+            if values.ndim != 1 or not np.all(np.isfinite(values)):
+                raise CaseError(f"{name} {values.tolist()}", code="E-PAIR", key=name, limit="finite numbers")
+            object.__setattr__(self, name, tuple(values.tolist()))
+        if not math.isfinite(self.load):
+            raise CaseError(f"a load of {self.load}", code="E-PAIR", key="load", limit="finite")
+        if len(self.eccentricity) != 2 or len(self.teeth) != 2 or min(self.teeth) < 1:
+            raise CaseError(
+                f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth", code="E-PAIR",
+                limit="two of each, one tooth or more",
+            )  # fmt: skip
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Base frequencies of the scaled time: the teeth, then the shafts that are eccentric."""
+        return np.array([1.0, *(1.0 / z for e, z in zip(self.eccentricity, self.teeth) if e)])
+
+    @property
+    def periods(self) -> int:
+        """Tooth periods after which everything repeats."""
+        return math.lcm(*(z for e, z in zip(self.eccentricity, self.teeth) if e))
+
+    def problem(self, ratio: float, *, divided: int = 1) -> NonlinearSystem:
+        """The pair at the frequency ratio Omega, tooth frequency over omega_n, in the scaled time.
+
+        Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `frequency`; for motions that
+        repeat after several tooth periods ``divided`` counts these, and the first base is 1 / divided.
+        """
+        if divided < 1:
+            raise CaseError(f"{divided} tooth periods", code="E-FREQUENCY", key="divided", limit="1 or more")
+        if not (math.isfinite(ratio) and ratio > 0.0):
+            raise CaseError(f"a frequency ratio of {ratio}", code="E-FREQUENCY", key="ratio", limit="above 0")
+        M, C, K, along = self._matrices()
+        system = MechanicalSystem(
+            M=ratio**2 * M, C=ratio * C, K=K, W=np.eye(len(M))[:, -1:], load=self.load * along,
+            dofs=("y 1", "y 2", "x") if self.bearings else ("x",),
+        )  # fmt: skip
+        count = len(self.frequency)
+        k = FourierSeries([[1.0, *self.stiffness]], _orders(0, divided, count))
+        mesh = GearMeshes([0], k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
+        return NonlinearSystem(system, (mesh,), tuple(self._forces(ratio, along, divided)))
+
+    def _matrices(self):
+        """M, C, K with unit time 1 / omega_n, and the direction of u in the coordinates."""
+        if self.bearings is None:
+            return np.eye(1), np.array([[2.0 * self.damping_ratio]]), np.zeros((1, 1)), np.ones(1)
+        along = np.array([-1.0, 1.0, 1.0])
+        mass, stiffness = np.array([*self.bearings.mass, 0.0]), np.array([*self.bearings.stiffness, 0.0])
+        damping = 2.0 * self.bearings.damping_ratio * np.sqrt(mass * stiffness)
+        damping[-1] = 2.0 * self.damping_ratio
+        return np.diag(mass) + np.outer(along, along), np.diag(damping), np.diag(stiffness), along
+
+    def _forces(self, ratio: float, along, divided: int):
+        """Inertia forces ``-e''`` of the errors."""
+        count, base = len(self.frequency), 0
+        for h, error in enumerate(self.tooth_error, 1):
+            if error:
+                yield HarmonicForce((ratio * h) ** 2 * error * along, _orders(0, h * divided, count))
+        for error, z in zip(self.eccentricity, self.teeth):
+            if error:
+                base += 1
+                yield HarmonicForce((ratio / z) ** 2 * error * along, _orders(base, 1, count))
+
+
+def example_pair(damping_ratio: float) -> ImpactPair:
+    """Load 0.9, tooth error 0.72 in half backlashes, k(t) with a first harmonic of 10 % against the error.
+
+    The values are those of docs/impacts.md, chosen so that a damping ratio of 0.15 leaves one answer at every
+    frequency ratio and 0.09 does not.
+    """
+    return ImpactPair(damping_ratio=damping_ratio, load=0.9, tooth_error=(0.72,), stiffness=(-0.1,))
+
+
+def lightly_loaded_pair(damping_ratio: float = 0.05) -> ImpactPair:
+    """Load 0.1, tooth error 0.2, constant stiffness: chaotic at frequency ratios between 1.3 and 1.7.
+
+    Kahraman and Singh (1990) find chaotic motion in lightly loaded, lightly damped pairs; the values are
+    those of docs/impacts.md.
+    """
+    return ImpactPair(damping_ratio=damping_ratio, load=0.1, tooth_error=(0.2,))
+
+
+@dataclass(frozen=True)
+class PairScales:
+    """Units of the dimensionless pair.
+
+    Parameters
+    ----------
+    length : float
+        Half backlash along the line of action [m].
+    frequency : float
+        omega_n [rad/s].
+    force : float
+        k b [N].
+    """
+
+    length: float
+    frequency: float
+    force: float
+
+
+def pair_scales(*, inertia, base_radius, stiffness: float, backlash: float) -> PairScales:
+    """Units of a pair with polar inertias [kg m^2], base radii [m], mesh stiffness [N/m] and play [m].
+
+    Parameters
+    ----------
+    inertia, base_radius : (float, float)
+    stiffness : float
+        Mean.
+    backlash : float
+        Total play along the line of action.
+    """
+    values = (*inertia, *base_radius, stiffness, backlash)
+    if len(values) != 6 or not all(math.isfinite(v) and v > 0.0 for v in values):
+        raise CaseError(f"a gear pair with the data {values}", code="E-PAIR", limit="all above 0")
+    mass = 1.0 / sum(r * r / i for r, i in zip(base_radius, inertia))
+    return PairScales(0.5 * backlash, math.sqrt(stiffness / mass), 0.5 * stiffness * backlash)
+
+
+def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tuple[float, ...]:
+    """Frequency ratios at which drive flanks begin to part, ascending: none, one or two.
+
+    Rotations, constant stiffness, one harmonic of the error: as long as flanks touch the pair is linear and
+    they part where ``error Omega^2 / |1 - Omega^2 + 2 i zeta Omega| = load``, a quadratic equation of
+    Omega^2 (Kahraman and Singh 1990, transition from no impact to single-sided impact).
+    """
+    s = (error / load) ** 2
+    roots = np.roots([1.0 - s, 4.0 * damping_ratio**2 - 2.0, 1.0])
+    real = roots[np.abs(roots.imag) < 1e-12].real
+    return tuple(float(value) for value in np.sort(np.sqrt(real[real > 0.0])))
+
+
+def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
+    return tuple(order if place == base else 0 for place in range(count))
+
+
+def _not_negative(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value >= 0.0):
+        raise CaseError(f"{name} {value}", code="E-PAIR", limit="0 or more")

@@ -1,0 +1,246 @@
+"""Errors of a planetary set as mesh deflections, each at its own frequency in the carrier frame.
+
+Teeth whose axis stands off the axis of rotation by an eccentricity turn with their member. In the frame of
+the carrier the sun, the planets and the ring turn with the mesh frequency over their numbers of teeth. The
+approach of flanks is that of the mesh columns, so that an eccentricity E of the sun changes the deflections
+at which the flanks of mesh n touch unloaded by ``E sin(psi_n - alpha - phi)``, phi its direction (Kahraman,
+J. Mech. Des. 116 (1994) 713-720, errors of the teeth; Mech. Mach. Theory 29 (1994) 1151-1165, runout). The
+carrier's own eccentricity stands still in its frame: see `carrier_pins`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.models.planar import CENTRAL, PlanarSet, mesh_directions
+from femgear.solvers.elements import GearMeshes
+from femgear.solvers.lines import distinct_lines
+from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.solvers.series import FourierSeries
+from femgear.solvers.summed_series import SummedSeries
+
+# sense of the rotation relative to the carrier where the sun turns counter-clockwise in its frame
+SENSE = {"sun": 1, "planet": -1, "ring": -1}
+
+
+@dataclass(frozen=True)
+class Eccentricity:
+    """Teeth beside the axis of rotation.
+
+    Parameters
+    ----------
+    amplitude : float, or (N,) array for planets
+        [m]
+    phase : float, or (N,) array for planets
+        Direction when the member's phase is zero, counter-clockwise from the x axis, for planets from the
+        radial direction outwards [rad].
+    """
+
+    amplitude: float | np.ndarray
+    phase: float | np.ndarray = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TransmissionErrors:
+    """Errors of a set; bases are the mesh frequency and then those of the eccentric members in use.
+
+    Parameters
+    ----------
+    data : PlanarSet
+    teeth : dict
+        Numbers of teeth of ``sun``, ``planet`` and ``ring``.
+    sun, planet, ring : Eccentricity, optional
+    tooth : (2N, H) complex array, optional
+        Harmonics 1 to H of the tooth-frequency error of every mesh, its phase included: the deflection at
+        which the flanks touch unloaded [m]. `tooth_lines` makes it from one wave and the mesh phases.
+    flank : int
+        1, or -1 when the torque loads the other flanks.
+    direction : int
+        1 where the sun turns counter-clockwise relative to the carrier, else -1.
+    """
+
+    data: PlanarSet
+    teeth: dict[str, int]
+    sun: Eccentricity | None = None
+    planet: Eccentricity | None = None
+    ring: Eccentricity | None = None
+    tooth: np.ndarray | None = None
+    flank: int = 1
+    direction: int = 1
+    bases: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self):
+        missing = {"sun", "planet", "ring"} - self.teeth.keys()
+        if missing or min(self.teeth.values()) < 1 or abs(self.flank) != 1 or abs(self.direction) != 1:
+            raise CaseError(
+                f"errors of gears with teeth {self.teeth}, flank {self.flank}, direction {self.direction}",
+                code="E-ERRORS", limit="teeth of sun, planet and ring; 1 or -1",
+            )  # fmt: skip
+        used = tuple(name for name in SENSE if getattr(self, name) is not None)
+        object.__setattr__(self, "bases", ("mesh", *used))
+        for name in used:
+            self._vector(name)
+        if self.tooth is not None:
+            lines = np.array(self.tooth, complex)
+            if lines.ndim != 2 or len(lines) != 2 * self.data.n_planets or not np.all(np.isfinite(lines)):
+                raise CaseError(
+                    f"tooth errors of shape {lines.shape}", code="E-SHAPE", key="tooth",
+                    limit=f"({2 * self.data.n_planets}, harmonics), finite",
+                )  # fmt: skip
+            object.__setattr__(self, "tooth", lines)
+
+    def frequency(self, mesh_frequency: float) -> np.ndarray:
+        """Base frequencies (n_bases,) at a mesh frequency, in its unit."""
+        return mesh_frequency / np.array([1.0, *(self.teeth[name] for name in self.bases[1:])])
+
+    @property
+    def series(self) -> SummedSeries:
+        """Deflections (2N) at which the flanks touch unloaded [m]."""
+        count = len(self.bases)
+        parts = [self.member_series(name) for name in self.bases[1:]]
+        if self.tooth is not None:
+            mean = np.zeros((2 * self.data.n_planets, 1))
+            parts.insert(0, FourierSeries(np.hstack([mean, self.tooth]), _unit(0, count)))
+        return SummedSeries(tuple(parts or [FourierSeries(np.zeros((2 * self.data.n_planets, 1)))]))
+
+    def member_series(self, name: str) -> FourierSeries:
+        """The part of one eccentric member, of its own base frequency."""
+        W = mesh_directions(self.data, self.flank)
+        vector, n = self._vector(name), np.arange(self.data.n_planets)
+        if name == "planet":
+            rows = 9 + 3 * n
+            approach = np.zeros((W.shape[1], len(n)), complex)
+            approach[:, n] = (W[rows] * vector[:, :1] + W[rows + 1] * vector[:, 1:]).T
+            total = approach.sum(axis=1)
+        else:
+            first = 3 * CENTRAL.index(name)
+            total = W[first : first + 2].T @ vector
+        lines = np.stack([np.zeros_like(total), -total], axis=1)
+        return FourierSeries(lines, _unit(self.bases.index(name), len(self.bases)))
+
+    def lines(self, *, mesh: int, member: int = 1, bands: int = 1) -> np.ndarray:
+        """Lines (L, n_bases) for harmonic balance: mesh harmonics, member harmonics, side bands of each.
+
+        Parameters
+        ----------
+        mesh, member : int
+            Harmonics of the mesh frequency and of every member's frequency.
+        bands : int
+            Side bands of every mesh harmonic at multiples of each member's frequency.
+        """
+        count = len(self.bases)
+        rows = [np.zeros(count, int)]
+        for h in range(mesh + 1):
+            rows.append(h * np.eye(count, dtype=int)[0])
+            for base in range(1, count):
+                reach = member if h == 0 else bands
+                for q in range(-reach, reach + 1):
+                    rows.append(h * np.eye(count, dtype=int)[0] + q * np.eye(count, dtype=int)[base])
+        return distinct_lines(np.array(rows))
+
+    def _vector(self, name: str) -> np.ndarray:
+        """Complex displacement (2,) of the teeth in x and y; planets (N, 2), radial and tangential."""
+        given = getattr(self, name)
+        amplitude, phase = np.asarray(given.amplitude, float), np.asarray(given.phase, float)
+        size = (self.data.n_planets,) if name == "planet" else ()
+        sense = SENSE[name] * self.direction
+        try:
+            turned = np.broadcast_to(amplitude * np.exp(1j * sense * phase), size)
+        except ValueError:
+            turned = np.array(np.nan)
+        if not np.all(np.isfinite(turned)) or np.any(amplitude < 0.0):
+            raise CaseError(
+                f"an eccentricity of {amplitude.tolist()} m at {phase.tolist()} rad", code="E-ERRORS",
+                key=name, limit="0 m or more, finite, one value, for planets also one each",
+            )  # fmt: skip
+        return np.stack([turned, -1j * sense * turned], axis=-1)
+
+
+def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
+    """Tooth errors (2N, H) of one wave of each kind, shifted by the mesh phases.
+
+    Parameters
+    ----------
+    sun_planet, planet_ring : (H,) complex arrays
+        Harmonics 1 to H at phase zero [m].
+    phases : (2N,) array
+        Fractions of the mesh period, see `femgear.models.planar_problem.phased_series`.
+    """
+    waves = [np.atleast_1d(np.asarray(wave, complex)) for wave in (sun_planet, planet_ring)]
+    phases, count = np.asarray(phases, float), max(map(len, waves))
+    table = np.repeat([np.pad(wave, (0, count - len(wave))) for wave in waves], len(phases) // 2, axis=0)
+    return table * np.exp(2j * np.pi * phases[:, None] * np.arange(1, count + 1))
+
+
+def with_errors(
+    problem: NonlinearSystem, errors: TransmissionErrors, *, dampers=None, mesh_frequency: float | None = None
+) -> NonlinearSystem:
+    """A problem of `planar_problem` with the errors added to the deflections of its drive flanks.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+        With one base, the mesh frequency; its meshes act on both flanks or have no back side.
+    errors : TransmissionErrors
+    dampers : (2N,) array, optional
+        Mesh dampers in ``C`` [N s/m], as of `planar_mesh_dampers`: they act on the rate of the deflection
+        less the error, ``c (w^T q' - e')``, so that ``W c e'`` joins the forces.
+    mesh_frequency : float, optional
+        [rad/s], needed with dampers, since their forces grow with it.
+
+    Raises
+    ------
+    CaseError
+        Back flanks on their own lines, stepwise series (E-ERRORS), dampers without a frequency (E-FREQUENCY).
+    """
+    drive = problem.elements[0]
+    plain = isinstance(drive, GearMeshes) and isinstance(drive.deflection, FourierSeries | SummedSeries)
+    others = any(isinstance(one, GearMeshes) for one in problem.elements[1:])
+    if not plain or others or len(drive.columns) != 2 * errors.data.n_planets:
+        raise CaseError(
+            "errors need one element of all meshes with Fourier series", code="E-ERRORS",
+            remedy="build the problem with planar_problem, without back flanks on their own lines",
+        )  # fmt: skip
+    series = errors.series
+    known = drive.deflection.parts if isinstance(drive.deflection, SummedSeries) else (drive.deflection,)
+    elements = (replace(drive, deflection=SummedSeries((*known, *series.parts))), *problem.elements[1:])
+    forces = problem.forces
+    if dampers is not None:
+        if mesh_frequency is None:
+            raise CaseError(
+                "mesh dampers without the mesh frequency", code="E-FREQUENCY", key="mesh_frequency"
+            )
+        pushes = problem.system.W[:, drive.columns[:, 0]] * np.asarray(dampers, float)
+        forces = (*forces, *_rates(pushes, series, errors.frequency(mesh_frequency)))
+    return replace(problem, elements=elements, forces=forces)
+
+
+def carrier_pins(data: PlanarSet, amplitude: float, phase: float = 0.0) -> np.ndarray:
+    """Pin displacements (N, 2), radial and tangential [m], of a pin circle beside the carrier's axis.
+
+    Parameters
+    ----------
+    data : PlanarSet
+    amplitude : float
+        [m]
+    phase : float
+        Direction from the x axis of the carrier [rad].
+    """
+    angle = phase - data.planet_angles
+    return amplitude * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def _rates(pushes, series: SummedSeries, frequency):
+    """Forces ``pushes e'`` of every harmonic of every part."""
+    for part in series.parts:
+        rate = float(np.dot(part.orders, frequency[: len(part.orders)]))
+        for h, line in enumerate(part.amplitudes.T):
+            if h and np.any(line):
+                yield HarmonicForce(pushes @ (1j * h * rate * line), tuple(h * o for o in part.orders))
+
+
+def _unit(base: int, count: int) -> tuple[int, ...]:
+    return tuple(int(place == base) for place in range(count))

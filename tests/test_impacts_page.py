@@ -1,0 +1,60 @@
+"""docs/impacts.md: its examples print what it says, its pictures and the names in it exist."""
+
+import contextlib
+import importlib
+import io
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = (ROOT / "docs" / "impacts.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
+PRINTED = re.findall(r"^```text\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
+MODULES = (
+    "models.equivalent_damping", "models.transmission_errors", "models.impact_pair", "models.impact_borders",
+    "models.contact_states", "solvers.lyapunov", "solvers.summed_series", "solvers.nonlinear",
+    "solvers.branches", "solvers.sweep_response", "solvers.poincare", "plots.impacts",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def outputs():
+    """What the examples print, run one after the other as on the page."""
+    names, found = {"__name__": "__main__"}, []
+    for number, example in enumerate(EXAMPLES):
+        output = io.StringIO()
+        with contextlib.redirect_stdout(output):
+            exec(compile(example, f"docs/impacts.md, example {number + 1}", "exec"), names)
+        found.append(output.getvalue())
+    return found
+
+
+def test_every_example_has_its_output():
+    assert len(EXAMPLES) == len(PRINTED) == 3
+
+
+@pytest.mark.parametrize("number", range(len(EXAMPLES)))
+def test_examples_print_what_the_page_says(outputs, number):
+    assert outputs[number] == PRINTED[number]
+
+
+def test_pictures_exist_and_come_from_the_script():
+    pictures = re.findall(r"!\[[^\]]+\]\(images/impacts_(\w+)\.png\)", PAGE)
+    script = (ROOT / "scripts" / "impacts.py").read_text(encoding="utf-8")
+    assert len(pictures) >= 5
+    for name in pictures:
+        assert (ROOT / "docs" / "images" / f"impacts_{name}.png").stat().st_size > 5000
+        assert f'"{name}.png"' in script or f'"{name}"' in script
+
+
+def test_named_functions_exist():
+    prose = re.sub(r"^```.*?^```", "", PAGE.split("## Two routes")[0], flags=re.MULTILINE | re.DOTALL)
+    known = set()
+    for module in MODULES:
+        known |= set(vars(importlib.import_module(f"femgear.{module}")))
+    named = set(re.findall(r"`([A-Za-z_]\w+)`", prose))
+    assert {"ImpactPair", "with_errors", "lyapunov_exponents", "contact_states"} <= named
+    # a field of the result, which is no function
+    assert named <= known | {"chaotic"}
