@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from femgear.case_flanks import flank_form
 from femgear.case_floating import check_floating
+from femgear.case_shafts import with_shafts
 from femgear.casefile import tomlfile
 from femgear.casefile.deviations import CarrierErrors, GearErrors
 from femgear.casefile.given import added_material, in_terms_of_the_case, notices
@@ -351,4 +352,4 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
         raise combine(problems, lines, name)
     case._source, case._lines, case._name, case._profile_files = text, lines, name, files
     case._notices = (*notices(data), *added_material(case))
-    return case
+    return with_shafts(case)

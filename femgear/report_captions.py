@@ -161,8 +161,8 @@ CAPTIONS = (
         "wedged_teeth",
         "Response to the weight",
         "Forces of both flanks of the meshes of planet 1 during one turn of the weight, at the largest "
-        "stable response. Where both flanks of a mesh carry at once its teeth are wedged. The forces are drawn "
-        "from their harmonics, so that they ring about zero beside a short contact.",
+        "stable response. Where both flanks of a mesh carry at once its teeth are wedged. The forces are "
+        "drawn from their harmonics, so that they ring about zero beside a short contact.",
     ),
     (
         "tooth_contact",

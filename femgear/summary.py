@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case_shafts import shaft_lines
 from femgear.gears import check_set, speeds, tooth_thickness, torques
 from femgear.gears.checks import tip_clearances
 from femgear.gears.deviation_checks import check_deviations
@@ -150,6 +151,7 @@ def _operation(case: Case, s: PlanetarySet) -> Block:
     ]
     if len(operation.speeds) > _MANY:
         notes.append(f"{len(operation.speeds)} speeds, of which the first and the last are shown")
+    notes += shaft_lines(case)
     header = ("sun [rpm]", "carrier [rpm]", "ring [rpm]", "planet [rpm]", "mesh frequency [Hz]")
     return Block("Operation", header, tuple(rows), tuple(notes))
 

@@ -91,6 +91,17 @@ class MaterialSection(_Section):
     density: Quantity(DENSITY, 100.0, 25000.0)
 
 
+class ShaftPart(_Section):
+    """One part of a stepped shaft of the material of the gears."""
+
+    length: Quantity(LENGTH, 1e-4, 10.0)
+    outer_diameter: Quantity(LENGTH, 1e-4, 5.0)
+    inner_diameter: Quantity(LENGTH, 0.0, 5.0) = 0.0
+
+
+_Shaft = Annotated[tuple[ShaftPart, ...], Field(max_length=50)]
+
+
 class SunSection(_Section):
     """The sun, and with it the module and the pressure angle of the set."""
 
@@ -101,7 +112,8 @@ class SunSection(_Section):
     bore_radius: Radius
     mass: Mass
     inertia: Inertia
-    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
+    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15) | None = None
+    support_shaft: _Shaft = ()
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
@@ -149,7 +161,8 @@ class CarrierSection(_Section):
 
     mass: Mass
     inertia: Inertia
-    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
+    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15) | None = None
+    support_shaft: _Shaft = ()
     errors: CarrierErrors | None = None
 
 
@@ -367,6 +380,21 @@ def _check_set(case: Case):
         )
 
 
+def _check_supports(case: Case):
+    for name in ("sun", "carrier"):
+        section = getattr(case, name)
+        if (section.support_stiffness is None) == (not section.support_shaft):
+            both = section.support_stiffness is not None
+            how = "twice" if both else "neither as stiffness nor as shaft"
+            yield CaseError(
+                f"the support of the {name} is given {how}",
+                code="E-DUPLICATE" if both else "E-KEY-MISSING",
+                key=f"{name}.support_stiffness",
+                limit="one of support_stiffness and support_shaft",
+                remedy='write support_stiffness = "5e7 N/m" or the like, "0 N/m" for a member that floats',
+            )
+
+
 def _check_numbers(case: Case):
     positions, dynamics = case.static.positions, case.dynamics
     if positions <= 2 * dynamics.mesh_harmonics:
@@ -387,4 +415,11 @@ def _check_numbers(case: Case):
         )
 
 
-_CHECKS = (_check_operation, _check_set, _check_numbers, check_deviation_sections, check_planar)
+_CHECKS = (
+    _check_operation,
+    _check_set,
+    _check_supports,
+    _check_numbers,
+    check_deviation_sections,
+    check_planar,
+)
