@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from femgear.case_drivetrain import build_drivetrain, refuse_drivetrain
 from femgear.case_flanks import flank_form
 from femgear.case_floating import check_floating
 from femgear.case_shafts import with_shafts
 from femgear.casefile import tomlfile
 from femgear.casefile.deviations import CarrierErrors, GearErrors
+from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.casefile.given import added_material, in_terms_of_the_case, notices
 from femgear.casefile.problems import combine, translate
 from femgear.casefile.profiles import embed_profiles
@@ -51,8 +53,8 @@ __all__ = [
 ]
 
 
-def read_case(path: str | os.PathLike) -> Case:
-    """Case of a TOML file.
+def read_case(path: str | os.PathLike) -> Case | DrivetrainCase:
+    """Case of a TOML file: a planetary set, or with ``model = "drivetrain"`` a chain of bodies.
 
     Parameters
     ----------
@@ -61,7 +63,7 @@ def read_case(path: str | os.PathLike) -> Case:
 
     Returns
     -------
-    Case
+    Case or DrivetrainCase
         Checked, frozen, in SI units and radians.
 
     Raises
@@ -160,9 +162,9 @@ def to_toml(case: Case) -> str:
     return case.source
 
 
-def case_schema() -> dict[str, Any]:
-    """JSON schema of the case file, for editors."""
-    return Case.model_json_schema()
+def case_schema(model: str | None = None) -> dict[str, Any]:
+    """JSON schema of the case file, for editors; with ``"drivetrain"`` that of these cases."""
+    return (DrivetrainCase if model else Case).model_json_schema()
 
 
 def planetary_set(case: Case) -> PlanetarySet:
@@ -183,6 +185,7 @@ def planetary_set(case: Case) -> PlanetarySet:
         What cannot be made, assembled or run (see `femgear.gears.checks.check_set`), and members that float
         without being held (E-MECHANISM), with file and line.
     """
+    refuse_drivetrain(case)
     ring = case.ring
     cutter = None
     if ring.cutter_teeth is not None:
@@ -330,6 +333,8 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
             remedy="update femgear",
             file=name,
         )
+    if "model" in data:
+        return build_drivetrain(data, text, name, numbered=numbered)
     lines = text if numbered else ""
     files = embed_profiles(data, name)
     if files:

@@ -52,6 +52,7 @@ MODULUS = Dimension("a modulus of elasticity", "Pa", "GPa", 1e9)
 STIFFNESS = Dimension("a stiffness", "N/m", "N/m", 1.0)
 TORSION = Dimension("a torsional stiffness", "N m/rad", "N m/rad", 1.0)
 FREQUENCY = Dimension("a frequency", "Hz", "Hz", 1.0)
+TIME = Dimension("a time", "s", "s", 1.0)
 ACCELERATION = Dimension("an acceleration", "m/s^2", "m/s^2", 1.0)
 FOUNDATION = Dimension("a foundation stiffness per area", "N/m^3", "N/m^3", 1.0)
 
