@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from dataclasses import replace
@@ -15,13 +16,14 @@ from femgear.case_flanks import flank_form
 from femgear.case_floating import check_floating
 from femgear.case_shafts import with_shafts
 from femgear.casefile import tomlfile
+from femgear.casefile.cross_checks import cross_check
 from femgear.casefile.deviations import CarrierErrors, GearErrors
 from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.casefile.given import added_material, in_terms_of_the_case, notices
 from femgear.casefile.problems import combine, translate
 from femgear.casefile.profiles import embed_profiles
 from femgear.casefile.published import without_uncomputed
-from femgear.casefile.sections import FORMAT, Case, PlanetSection, RingSection, SunSection, cross_check
+from femgear.casefile.sections import FORMAT, Case, PlanetSection, RingSection, SunSection
 from femgear.errors import CaseError, GeometryError
 from femgear.gears import (
     BasicRack,
@@ -40,6 +42,7 @@ from femgear.gears.deviations import (
     no_deviations,
     tooth_displacements,
 )
+from femgear.gears.helix import transverse_rack, transverse_tool
 
 __all__ = [
     "Case",
@@ -168,7 +171,7 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
 
 
 def planetary_set(case: Case) -> PlanetarySet:
-    """Gears of a case, closed on their centre distance and checked.
+    """Gears of a case, closed on their centre distance and checked; of a helical one the transverse section.
 
     Parameters
     ----------
@@ -189,7 +192,8 @@ def planetary_set(case: Case) -> PlanetarySet:
     ring = case.ring
     cutter = None
     if ring.cutter_teeth is not None:
-        cutter = PinionCutter(teeth=ring.cutter_teeth, profile_shift=ring.cutter_profile_shift)
+        shift = ring.cutter_profile_shift * _normal_modules(case)
+        cutter = PinionCutter(teeth=ring.cutter_teeth, profile_shift=shift)
     left_open = (("sun", case.sun.profile_shift), ("ring", ring.profile_shift))
     try:
         closed = close_set(
@@ -215,22 +219,32 @@ def _gear(
     rim: float,
     cutter: PinionCutter | None = None,
 ) -> Gear:
-    rack = section.rack or case.rack
+    given, module, pressure_angle = section.rack or case.rack, case.sun.module, case.sun.pressure_angle
+    rack = BasicRack(addendum=given.addendum, dedendum=given.dedendum, root_radius=given.root_radius)
+    if case.helical is not None:
+        helix = case.helical.helix_angle
+        module, pressure_angle = transverse_tool(module, pressure_angle, helix)
+        rack = transverse_rack(rack, helix)
     return Gear(
         teeth=section.teeth,
-        module=case.sun.module,
-        pressure_angle=case.sun.pressure_angle,
-        profile_shift=section.profile_shift or 0.0,
+        module=module,
+        pressure_angle=pressure_angle,
+        profile_shift=(section.profile_shift or 0.0) * _normal_modules(case),
         face_width=case.set.face_width,
         rim_radius=rim,
         internal=name == "ring",
-        rack=BasicRack(addendum=rack.addendum, dedendum=rack.dedendum, root_radius=rack.root_radius),
+        rack=rack,
         cutter=cutter,
         tip_diameter=section.tip_diameter,
         root_diameter=section.root_diameter,
         thickness_allowance=0.5 * case.set.backlash,
         name=name,
     )
+
+
+def _normal_modules(case: Case) -> float:
+    """Normal modules in the module of the gears' section: cos(beta) of helical teeth, 1 of spur teeth."""
+    return 1.0 if case.helical is None else math.cos(case.helical.helix_angle)
 
 
 def set_deviations(case: Case) -> SetDeviations:

@@ -74,6 +74,10 @@ def _modes_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
     from femgear import plots
 
     modes = data["modes"]
+    if modes.attrs.get("model") == "helical":
+        from femgear.plots.helical_results import helical_modes_figures
+
+        return helical_modes_figures(modes, gears, data.get("static"))
     figures = {"mode_shapes": plots.mode_shapes(modes, gears)}
     # a rigid ring has no nodal diameters
     if "ring_shape_real" in modes:
@@ -84,12 +88,21 @@ def _modes_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
 def _dynamics_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
     from femgear import plots
 
-    dynamics = data["dynamics"]
+    dynamics, static = data["dynamics"], data.get("static")
+    helical = dynamics.attrs.get("model") == "helical"
+    if helical:
+        # static.nc holds the spur gears of the transverse section
+        static = data["modes"].rename(helical_ste="ste")
     figures = {
-        "dynamic_transmission_error": plots.transmission_error_period(dynamics, data.get("static")),
+        "dynamic_transmission_error": plots.transmission_error_period(dynamics, static),
         "dynamic_spectrum": plots.transmission_error_spectrum(dynamics),
-        "ring_static_deflection": plots.ring_mean_deflection(dynamics, gears),
     }
+    if helical:
+        from femgear.plots.helical_results import mesh_force_spectra
+
+        figures["mesh_force_spectra"] = mesh_force_spectra(dynamics, data["modes"])
+    else:
+        figures["ring_static_deflection"] = plots.ring_mean_deflection(dynamics, gears)
     if dynamics.sizes["speed"] > 3:
         figures["speed_sweep"] = plots.speed_sweep(dynamics)
     return figures
@@ -318,11 +331,13 @@ def write_pictures(
 
     gears, static = planetary_set(case), results.get("static")
     steps = [lambda: write_figures(folder, gears, data, deviations=set_deviations(case))]
-    if static is not None and static.cycle.force.any():
+    # static of a helical case holds spur gears that nobody makes
+    if static is not None and case.helical is None and static.cycle.force.any():
         steps.append(lambda: write_deformed_set(folder, case, static, cache=cache))
-    if case.planar is None and "modes" in results:
+    elastic = case.planar is None and case.helical is None
+    if elastic and "modes" in results:
         steps.append(lambda: write_ring_modes(folder, case, static, cache=cache))
-    if "dynamics" in results:
+    if elastic and "dynamics" in results:
         steps.append(lambda: write_animation(folder, case, static, results["dynamics"]))
     names = []
     for done, step in enumerate(steps):

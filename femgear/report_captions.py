@@ -85,6 +85,26 @@ CAPTIONS = (
         "surface of the ring; at rest in grey.",
     ),
     (
+        "spatial_mode_shapes",
+        "Modes",
+        "Mode shapes of the helical set with mean mesh stiffness, from the front and, below, from the side, "
+        "where bodies tilt and move along the axis; small motions are drawn larger by the factor given. At "
+        "rest in grey.",
+    ),
+    (
+        "mesh_phasing",
+        "Modes",
+        "Phases of sun and ring meshes at every planet for the first harmonics of the mesh frequency, and "
+        "what is left of equal mesh forces on sun and ring: what cancels excites no mode of that kind.",
+    ),
+    (
+        "helical_mesh_stiffness",
+        "Static",
+        "Stiffness and static transmission error of the meshes of planet 1 along the transverse line of "
+        "action, centres fixed: of the helical meshes (solid), and of the spur gears of the transverse "
+        "section (dotted) that the slices come from.",
+    ),
+    (
         "natural_frequencies",
         "Modes",
         "Natural frequencies over the nodal diameters of the ring.",
@@ -109,6 +129,13 @@ CAPTIONS = (
         "Dynamics",
         "Fluctuation of the transmission error over the speed, and the verdicts on the solution: the "
         "fixed point contracts below 1, the motion is stable below 1.",
+    ),
+    (
+        "mesh_force_spectra",
+        "Dynamics",
+        "Mesh forces of planet 1 along the tooth normals over the frequency of each harmonic, h times the "
+        "mesh frequency. Marks along the axis are natural frequencies by the phasing of the mode: a harmonic "
+        "meets modes of its own phasing.",
     ),
     (
         "ring_static_deflection",

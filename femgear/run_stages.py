@@ -46,6 +46,8 @@ class Stage:
 
 def kind_of(case: Case) -> str:
     """Kind of a case: a key of `KINDS`."""
+    if case.helical is not None:
+        return "helical"
     return "elastic" if case.planar is None else "planar"
 
 
@@ -112,6 +114,19 @@ def _planar(name: str, **options):
     return compute
 
 
+def _helical(name: str, *, after: str = "", cached: bool = False, shows: bool = False):
+    """Stage of `femgear.analysis_helical`, by the names of its function and of the stage it starts from."""
+
+    def compute(case, results, cache, progress):
+        from femgear import analysis_helical
+
+        before = (results.get(after),) if after else ()
+        more = ({"cache": cache} if cached else {}) | ({"progress": progress} if shows else {})
+        return getattr(analysis_helical, name)(case, *before, **more)
+
+    return compute
+
+
 def _static_verdict(result) -> dict:
     cycle = result.cycle
     return {"residual": float(cycle.residual.max()), "message": cycle.message, "contact": cycle.contact}
@@ -150,12 +165,27 @@ def _needs_static(case: Case) -> tuple[str, ...]:
     return ("static",) if case.planar.mesh_stiffness is None else ()
 
 
+def _needs_helical_static(case: Case) -> tuple[str, ...]:
+    return ("static",) if case.helical.mesh_stiffness is None else ()
+
+
+def _nothing_excites(case: Case) -> str:
+    given = case.helical.mesh_stiffness is not None
+    return "a given helical.mesh_stiffness does not vary: nothing excites the set" if given else ""
+
+
 def _lacks(section: str) -> Callable[[Case], str]:
     return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
 
 
 def _check_elastic(case, gears):
     analysis.check_dynamic_case(case, gears)
+
+
+def _check_helical(case, gears):
+    from femgear.analysis_helical_checks import check_helical_case
+
+    check_helical_case(case, gears)
 
 
 def _check_planar(case, gears):
@@ -231,6 +261,26 @@ PLANAR = {
 }  # fmt: skip
 
 
+HELICAL = {
+    "static": Stage(
+        compute=_helical("solve_helical_static", cached=True, shows=True),
+        verdict=_static_verdict,
+        wanted=lambda case: bool(_needs_helical_static(case)),
+    ),
+    "modes": Stage(
+        compute=_helical("solve_helical_modes", after="static", cached=True),
+        verdict=PLANAR["modes"].verdict,
+        needs=_needs_helical_static,
+    ),
+    "dynamics": Stage(
+        compute=_helical("solve_helical_dynamics", after="modes", shows=True),
+        verdict=_dynamics_verdict,
+        possible=_nothing_excites,
+        needs=lambda case: ("modes",),
+    ),
+}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Kind:
     """Stages of a kind of case in order, its check before a run, and its name in messages."""
@@ -243,4 +293,5 @@ class Kind:
 KINDS = {
     "elastic": Kind(ELASTIC, _check_elastic, "a case with an elastic ring"),
     "planar": Kind(PLANAR, _check_planar, "a planar case"),
+    "helical": Kind(HELICAL, _check_helical, "a helical case"),
 }

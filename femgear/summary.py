@@ -14,6 +14,7 @@ from femgear.gears.checks import tip_clearances
 from femgear.gears.deviation_checks import check_deviations
 from femgear.models.ring import MAX_DIAMETER
 from femgear.summary_block import Block
+from femgear.summary_helical import describe_helical
 from femgear.summary_phasing import describe_phasing
 from femgear.summary_planar import describe_branch, describe_planar, describe_response
 from femgear.summary_stress import describe_stress
@@ -43,6 +44,7 @@ def describe_case(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
     tuple of Block
     """
     planar = () if case.planar is None else (describe_planar(case, planetary),)
+    helical = () if case.helical is None else describe_helical(case, planetary)
     return (
         Block(case.title),
         _gears(planetary),
@@ -50,6 +52,7 @@ def describe_case(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
         *describe_phasing(planetary),
         _operation(case, planetary),
         *planar,
+        *helical,
         Block("Warnings", notes=warnings_of(case, planetary) or ("none",)),
     )
 
@@ -66,7 +69,8 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
         )
     if case.operation.torque < 0:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
-    if case.planar is None and case.housing.points <= 2 * MAX_DIAMETER:
+    elastic = case.planar is None and case.helical is None
+    if elastic and case.housing.points <= 2 * MAX_DIAMETER:
         found.append(
             f"[W-POINTS] housing.points: {case.housing.points} points do not resolve the ring's "
             f"{MAX_DIAMETER} nodal diameters; use more than {2 * MAX_DIAMETER}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from femgear.casefile.helical import helical_notices
 from femgear.casefile.planar import planar_notices
 from femgear.casefile.sections import Case
 from femgear.errors import GeometryError
@@ -29,9 +30,21 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
     if error.code == "E-ASSEMBLY":
         _assembly(error, case)
     _shift_left_out(error, case)
+    _in_transverse_section(error, case)
     if isinstance(error.value, float) and (error.key or "").rpartition(".")[2] in _LENGTHS:
         error.value = f"{1e3 * error.value:.6g} mm"
     error.file = case.location(error.key or "")
+
+
+def _in_transverse_section(error: GeometryError, case: Case) -> None:
+    """Gears of a helical case are refused in their transverse section, the file gives the normal one."""
+    if case.helical is None:
+        return
+    error.message += " (in the transverse section of the helical gears"
+    if (error.key or "").endswith("profile_shift") or "rack." in (error.key or ""):
+        factor = math.cos(case.helical.helix_angle)
+        error.message += f", whose coefficients are {factor:.6g} times those of the file"
+    error.message += ")"
 
 
 def _assembly(error: GeometryError, case: Case) -> None:
@@ -97,6 +110,8 @@ def notices(data: dict) -> tuple[str, ...]:
         )
     if "planar" in data:
         return (*found, *planar_notices(data))
+    if "helical" in data:
+        return (*found, *helical_notices(data))
     if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
         found.append(
             'planet.bearing_clearance has no effect while static.members is "fixed": write '

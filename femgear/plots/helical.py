@@ -85,14 +85,14 @@ def helical_mode_shapes(
     for place, mode in enumerate(shown):
         row, column = divmod(place, columns)
         front, side = (axes[(2 * row + i) * columns + column] for i in (0, 1))
-        _draw_mode(front, side, data, motions[:, :, mode], scale)
+        draw_mode(front, side, data, motions[:, :, mode], scale)
         text = f"mode {mode + 1}: {modes.frequency[mode]:.6g} Hz\n{modes.kind[mode]}\n{names[mode]}"
         front.set_title(text, fontsize=SIZE - 2)
     legend_below(figure, columns=5)
     return figure
 
 
-def _draw_mode(front, side, data: HelicalSet, moved: np.ndarray, scale: float) -> None:
+def draw_mode(front, side, data: HelicalSet, moved: np.ndarray, scale: float) -> None:
     """Both views of one mode, each at its own magnification."""
     sizes = [np.abs(moved[:, axis]).max() for axis in ([0, 1, 5], [2, 3, 4])]
     # a view without motion shows none

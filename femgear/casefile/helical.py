@@ -1,0 +1,163 @@
+"""The section of a case file that makes the teeth helical, and what it goes with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from femgear.casefile.fields import Count, Quantity
+from femgear.casefile.planar import MeshStiffnessSection
+from femgear.casefile.units import ANGLE, INERTIA, MASS, STIFFNESS, TORSION
+from femgear.errors import CaseError
+
+if TYPE_CHECKING:
+    from femgear.casefile.sections import Case
+
+LARGEST_HELIX = math.radians(45.0)
+Stiffness = Quantity(STIFFNESS, 0.0, 1e15)
+Turning = Quantity(TORSION, 0.0, 1e15)
+Diametral = Quantity(INERTIA, 1e-12, 1e8)
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Supported(_Section):
+    """What a body needs beyond its mass, polar inertia and radial support to move in space."""
+
+    diametral_inertia: Diametral
+    axial_stiffness: Stiffness
+    tilt_stiffness: Turning
+    torsional_stiffness: Turning | None = None
+
+
+class HelicalSunSection(_Supported):
+    """The sun in space."""
+
+
+class HelicalCarrierSection(_Supported):
+    """The carrier in space."""
+
+
+class HelicalPlanetSection(_Supported):
+    """Each planet in space, on its pin."""
+
+
+class HelicalRingSection(_Supported):
+    """The ring as a rigid body on its support in the housing."""
+
+    mass: Quantity(MASS, 1e-6, 1e6)
+    inertia: Diametral
+    support_stiffness: Stiffness
+
+
+class HelicalSection(_Section):
+    """Helical teeth on rigid bodies that move in space: sun, ring, carrier and planets.
+
+    With this section module, pressure angle, racks and profile shifts are those of the normal section, and a
+    run solves the set of Kahraman in place of the elastic ring.
+    """
+
+    helix_angle: Quantity(ANGLE, 0.0, LARGEST_HELIX)
+    hand: Literal["right", "left"] = "right"
+    slices: Count(1, 200) = 1
+    contact_points: Literal["pitch_point", "base_circles"] = "pitch_point"
+    section: Literal["normal", "transverse"] = "normal"
+    mesh_stiffness: MeshStiffnessSection | None = None
+    sun: HelicalSunSection
+    ring: HelicalRingSection
+    carrier: HelicalCarrierSection
+    planet: HelicalPlanetSection
+
+    @property
+    def signed_helix_angle(self) -> float:
+        """Of the sun, positive for a right-handed one [rad]."""
+        return self.helix_angle if self.hand == "right" else -self.helix_angle
+
+
+def check_helical(case: Case) -> Iterator[CaseError]:
+    """Refusals of what a helical section does not go with."""
+    helical = case.helical
+    if helical is None:
+        return
+    if case.planar is not None:
+        yield CaseError(
+            "a set is planar or helical: the planar model has no motion out of its plane",
+            code="E-CHOICE",
+            key="helical",
+            value="planar and helical",
+            limit="one of the two sections",
+            remedy="leave one of them out",
+        )
+    if helical.helix_angle == 0.0:
+        yield CaseError(
+            "without a helix the teeth are spur teeth",
+            code="E-RANGE",
+            key="helical.helix_angle",
+            value="0 deg",
+            limit="above 0 deg up to 45 deg",
+            remedy="leave the section helical out",
+        )
+    if case.static.members == "elastic":
+        yield CaseError(
+            "the supports belong to the helical model: the static solution is that of the gears alone",
+            code="E-CHOICE",
+            key="static.members",
+            value="elastic",
+            limit='"fixed" in a helical case',
+            remedy="leave static.members out",
+        )
+    if case.operation.torque == 0.0:
+        yield CaseError(
+            "without torque no tooth carries load, so there is no mesh stiffness",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero in a helical case",
+        )
+    fixed = case.operation.fixed
+    if getattr(helical, fixed).torsional_stiffness == 0.0:
+        yield CaseError(
+            f"the {fixed} is the fixed member but nothing keeps it from turning",
+            code="E-MECHANISM",
+            key=f"helical.{fixed}.torsional_stiffness",
+            value="0 N m/rad",
+            limit="above 0 N m/rad",
+            remedy="leave the entry out to hold the member, or hold another one",
+        )
+
+
+def helical_notices(data: dict) -> Iterator[str]:
+    """What a helical case gives without effect.
+
+    Parameters
+    ----------
+    data : dict
+        Tables of a case file that was checked, with a section helical.
+    """
+    unused = [name for name in ("motor", "brake", "housing") if name in data]
+    unused += [f"ring.{key}" for key in ("foundation_radial", "foundation_tangential") if key in data["ring"]]
+    unused += [f"static.{key}" for key in ("stresses", "back_flanks") if key in data.get("static", {})]
+    if data["planet"].get("bearing_clearance"):
+        unused.append("planet.bearing_clearance")
+    if unused:
+        yield f"{_listed(unused)} no effect in this helical case"
+    if "mesh_stiffness" in data["helical"]:
+        given = [name for name in ("static", "dynamics") if name in data]
+        if "section" in data["helical"]:
+            given.append("helical.section")
+        for name in ("sun", "planet", "ring", "carrier"):
+            keys = ("modifications", "errors", "individual")
+            given += [f"{name}.{key}" for key in keys if data.get(name, {}).get(key)]
+        if given:
+            yield (
+                f"{_listed(given)} no effect while helical.mesh_stiffness is given: it leaves nothing that "
+                "excites, and modes are all that is computed"
+            )
+
+
+def _listed(names: list[str]) -> str:
+    return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
