@@ -15,7 +15,7 @@ LAYERS = (
     ("contact", "models", "housing", "case"),
     ("storage", "datasets", "plots", "scene"),
     ("analysis", "design", "summary"),
-    ("report", "sweep", "validation", "pictures"),
+    ("report", "optimisation", "validation", "pictures"),
     ("run",),
     ("cli",),
 )

@@ -18,6 +18,7 @@ SCRIPTS = (
     "harris_map.py",
     "tip_relief_design.py",
     "pin_error_load_sharing.py",
+    "optimise.py",
 )
 # of published sets, without a case file
 SET_SCRIPTS = (

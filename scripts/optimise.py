@@ -1,0 +1,274 @@
+#!/usr/bin/env python3
+"""Best values of some entries of the case file, checked by a run of its own."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter
+from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
+
+ERRORS = ("ste overall", "ste sun-planet", "ste planet-ring")
+FORCES = ("mesh force", "peak mesh force", "housing")
+QUIET = {"static.stresses": False, "housing.published": None}
+COLUMNS = ("quantity", "before", "optimum", "change")
+
+
+def main(
+    case: Path = REFERENCE_CASE,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/optimise"),
+    vary: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    objective: str = "ste",
+    limit: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    of: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    second: str | None = None,
+    torque: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    speeds: tuple[str, str] = ("1000 rpm", "3500 rpm"),
+    method: Literal["auto", "minimax", "global", "simplex", "powell"] = "auto",
+    positions: int = 24,
+    flank_elements: int = 12,
+    samples: int | None = None,
+    max_designs: int | None = None,
+    seed: int = 0,
+    check: bool = True,
+) -> None:
+    """Search with few positions on a coarse grid, refine with those of the case, check on a finer one.
+
+    Every design is kept in the journals of the output folder: the same command goes on where an interrupted
+    one was. The optimum is written as a case file.
+
+    Parameters
+    ----------
+    case
+        TOML case file; the reference set when left out.
+    output
+        Folder of the results.
+    vary
+        Design variable, as in "sun.modifications[0].amount=0 um..15 um +- 1 um" with its tolerance; may be
+        repeated. Default: a tip relief more on every loaded flank, its amount and its start.
+    objective
+        What to minimise: ste (largest of the next three), ste overall, ste sun-planet, ste planet-ring, mesh
+        force, peak mesh force, housing, contact pressure, root stress sun (planet, ring), contact ratio
+        sun-planet (planet-ring), tip thickness sun (planet, ring).
+    limit
+        As in "root stress sun <= 300 MPa"; of the same quantities. May be repeated.
+    of
+        Further quantities to report; may be repeated. Default: transmission errors, mesh forces, housing.
+    second
+        Second objective: the Pareto front of both is searched as well.
+    torque
+        Of the input, with its unit. Default: that of the case.
+    speeds
+        First and last speed of the input, for mesh forces and the housing.
+    method
+        Of the search; auto takes derivatives where the problem has them.
+    positions
+        Positions over one mesh period in the search; the refinement takes those of the case, the check 128.
+    flank_elements
+        Elements along a flank in the search; the refinement takes those of the case, the check 32.
+    samples
+        Designs before the descents. Default: five a variable.
+    max_designs
+        Designs after which search and refinement end.
+    seed
+        Of the samples.
+    check
+        Run case and optimum anew into the folders before and after.
+    """
+    from femgear import read_case, with_value
+    from femgear.optimisation import (
+        Problem,
+        minimise,
+        named_quantity,
+        parse_limit,
+        parse_variable,
+        with_values,
+    )
+    from femgear.optimisation.reliefs import tip_reliefs
+    from femgear.run import grid_cache
+
+    data = read_case(case)
+    data = data if torque is None else with_value(data, "operation.torque", torque)
+    variables = tuple(parse_variable(text) for text in vary)
+    if not variables:
+        data, variables = tip_reliefs(data)
+    fast = {"static.positions": positions, "static.flank_elements": flank_elements}
+    coarse = with_values(data, fast | QUIET)
+    elastic = data.planar is None and getattr(data, "helical", None) is None
+    reported = of or (*ERRORS, *(FORCES if elastic else ()))
+    first, *others = (named_quantity(words, speeds=speeds) for words in (objective, *reported))
+    another = None if second is None else named_quantity(second, speeds=speeds)
+    limits = [parse_limit(text, speeds=speeds) for text in limit]
+    problem = Problem(coarse, variables, first, also=others, limits=limits)
+    folder = ready_folder(output)
+    options = {"seed": seed, "samples": samples, "max_designs": max_designs, "cache": grid_cache()}
+    coarsely = options | {"journal": folder / "journal.jsonl"}
+    with Progress() as progress:
+        rough = minimise(problem, method=method, sensitivity=False, progress=progress, **coarsely)
+        progress("refinement", 0, 1)
+        found = _refined(rough, with_values(data, QUIET), folder, options, method)
+        progress("refinement", 1, 1)
+    names = _write(found, data, folder, rough)
+    if another is not None:
+        names += _front(problem, another, folder, coarsely | {"start": rough.x})
+    if check:
+        names += _check(found, data, folder, speeds if elastic else None, rough)
+    say_files(folder, names)
+
+
+def _refined(rough, case, folder: Path, options, method: str):
+    """The optimum at the positions and on the grid of the case: between few positions errors may hide."""
+    from dataclasses import replace
+
+    from femgear.optimisation import minimise
+
+    problem = replace(rough.problem, case=case)
+    local = "auto" if rough.method == "minimax" else "simplex" if method in ("auto", "global") else method
+    if any(variable.integer for variable in problem.variables):
+        local = "global"
+    options = options | {"samples": 0, "journal": folder / "journal_fine.jsonl"}
+    return minimise(problem, method=local, start=rough.x, starts=1, **options)
+
+
+def _write(found, data, folder: Path, rough) -> list[str]:
+    """Tables on the terminal, and the files of the search."""
+    from femgear.case import to_toml
+    from femgear.files import write_text
+    from femgear.optimisation import with_values
+    from femgear.optimisation.words import comparison_rows, tolerance_rows, verdict
+    from femgear.plots.optimisation import tolerance_bars
+    from femgear.plots.style import save_figure
+
+    best, name, dimension = found.values, found.problem.objective.name, found.problem.objective.dimension
+    write_text(to_toml(with_values(data, best)), folder / "optimum.toml")
+    rows = [(name, before, after, change) for name, before, after, change in comparison_rows(found)]
+    print_table("At the positions and on the grid of the case", COLUMNS, rows)
+    print_table("Optimum", ("entry", "value"), [(key, str(value)) for key, value in best.items()])
+    if found.tolerances:
+        header = ("variable", "off by", "less", "more")
+        print_table(f"{name} with tolerances", header, tolerance_rows(found))
+    for variable in found.at_bounds:
+        print(f"at a bound: {variable}")
+    print(f"search: {verdict(rough)}\nrefinement: {verdict(found)}")
+    si = [(q.name, q.dimension.si, found.before[q.name], found.after[q.name]) for q in found.problem.reported]
+    write_csv(folder / "optimum.csv", ("quantity", "unit", "before", "optimum"), si)
+    off = [[t.less[name], t.more[name]] for t in found.tolerances]
+    less, more = (np.array(off).T / dimension.scale).reshape(2, -1)
+    labels = [f"{t.variable.name}\n± {t.tolerance:.4g} {t.variable.unit}" for t in found.tolerances]
+    value = found.after[name] / dimension.scale
+    bars = tolerance_bars(labels, less, more, value, quantity=name, unit=dimension.shown.replace("um", "µm"))
+    save_figure(bars, folder / "tolerances.png")
+    return ["optimum.toml", "optimum.csv", "tolerances.png", "journal.jsonl", "journal_fine.jsonl"]
+
+
+def _front(problem, second, folder: Path, options) -> list[str]:
+    from femgear.optimisation import pareto_front
+    from femgear.plots.optimisation import front
+    from femgear.plots.style import save_figure
+
+    with Progress() as progress:
+        found = pareto_front(problem, second, progress=progress, **options)
+    both = (problem.objective, second)
+    scale = np.array([q.dimension.scale for q in both])
+    titles = [f"{q.name} [{q.dimension.shown}]".replace("um]", "µm]") for q in both]
+    figure = front(
+        found.values / scale, found.dominated / scale, found.before / scale, names=titles,
+        compromise=found.compromise,
+    )  # fmt: skip
+    save_figure(figure, folder / "front.png")
+    header = [f"{v.name} [{v.unit or 1}]" for v in problem.variables]
+    header += [f"{q.name} [{q.dimension.si}]" for q in both]
+    write_csv(folder / "front.csv", header, np.hstack([found.x, found.values]).tolist())
+    low, high = (found.values[i] for i in (0, -1))
+    print(f"front: {len(found.values)} designs of {found.designs}, from")
+    for end in (low, found.values[found.compromise], high):
+        print("  " + ", ".join(f"{q.name} {q.show(value)}" for q, value in zip(both, end)))
+    return ["front.csv", "front.png"]
+
+
+def _check(found, data, folder: Path, speeds, rough) -> list[str]:
+    """Case and optimum anew: a full run each on a finer grid, read back from its files."""
+    from femgear.optimisation import with_values
+    from femgear.plots.optimisation import before_and_after
+    from femgear.plots.style import save_figure
+
+    fine = {"static.positions": 128, "static.flank_elements": 32} | QUIET
+    if speeds is not None:
+        fine["operation.speeds"] = {"from": speeds[0], "to": speeds[1], "count": 126}
+    only = "static" if speeds is None else "housing"
+    runs = [
+        _run(with_values(data, values | fine), folder / name, only)
+        for name, values in (("before", {}), ("after", found.values))
+    ]
+    numbers = [_numbers(results, only) for results in runs]
+    rows = [(name, before, numbers[1][name][0], unit) for name, (before, unit) in numbers[0].items()]
+    shown = [(n, f"{b:.5g} {unit}", f"{a:.5g} {unit}", f"{a / b - 1:+.1%}") for n, b, a, unit in rows]
+    print_table("Computed anew: 128 positions, 32 elements along a flank", COLUMNS, shown)
+    write_csv(folder / "check.csv", ("quantity", "before", "optimum", "unit"), rows)
+    errors = [results.static["ste_overall"].values[0] for results in runs]
+    dynamic = {}
+    if speeds is not None:
+        dynamic["speed"] = runs[0].dynamics["speed"].values
+        dynamic["forces"] = [_dynamic_force(results.dynamics) for results in runs]
+        for name, results in zip(("before", "optimum"), runs):
+            unstable = int((~results.dynamics["stable"].values).sum())
+            print(f"{name}: unstable at {unstable} of {len(dynamic['speed'])} speeds")
+    position = runs[0].static["position"].values
+    save_figure(
+        before_and_after(position, errors, **dynamic, costs=_costs(rough)),
+        folder / "optimum.png",
+    )
+    return ["check.csv", "optimum.png", "before", "after"]
+
+
+def _run(case, folder: Path, only: str):
+    from femgear import open_results
+    from femgear.run import run_case
+    from femgear.storage import run_folder
+
+    with run_folder(folder, force=True) as place, Progress() as progress:
+        run_case(case, place, only=only, pictures=False, progress=progress)
+    return open_results(folder, partial=False)
+
+
+def _numbers(results, only: str) -> dict[str, tuple[float, str]]:
+    """Largest values of a run by name, with their units."""
+    static = results.static
+    found = {"STE peak to peak, overall": (1e6 * np.ptp(static["ste_overall"].values, axis=1).max(), "um")}
+    for kind in ("sun-planet", "planet-ring"):
+        rows = ["ring" in name if kind == "planet-ring" else "sun" in name for name in static["mesh"].values]
+        found[f"STE peak to peak, {kind}"] = (1e6 * np.ptp(static["ste"].values[rows], axis=1).max(), "um")
+    if only == "housing":
+        dynamics = results.dynamics
+        found["dynamic mesh force"] = (_dynamic_force(dynamics).max(), "N")
+        found["peak mesh force"] = (_history(dynamics).max(), "N")
+        found["housing level"] = (results.housing["order_amplitude_exact"].values.max(), "m/s^2")
+    return found
+
+
+def _history(dynamics) -> np.ndarray:
+    """Mesh forces over a period, (speed, mesh, time) [N], from ``Re sum F_h exp(i h omega t)``."""
+    lines = dynamics["mesh_force_real"].values + 1j * dynamics["mesh_force_imag"].values
+    harmonic = np.arange(lines.shape[-1])
+    turn = np.exp(2j * np.pi * np.outer(harmonic, np.arange(360) / 360))
+    return np.real(lines @ turn)
+
+
+def _dynamic_force(dynamics) -> np.ndarray:
+    """Largest deviation of any mesh force from its mean at every speed [N]."""
+    history = _history(dynamics)
+    return np.abs(history - history.mean(axis=-1, keepdims=True)).max(axis=(1, 2))
+
+
+def _costs(found) -> list[float]:
+    """Objective over that of the case, in the order of the search."""
+    return [value / (found.before[found.problem.objective.name] or 1.0) for value in found.course]
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(main))
