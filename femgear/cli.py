@@ -1,4 +1,4 @@
-"""The command line: ``femgear check``, ``run``, ``report``, ``validate`` and ``schema``."""
+"""The command line: ``femgear check``, ``run``, ``report``, ``sweep``, ``validate`` and ``schema``."""
 
 from __future__ import annotations
 
@@ -212,6 +212,45 @@ def validate(
         output = Path("docs/validation.md")
     with _Progress() as progress:
         return compute(output, theme=theme, quick=quick, progress=progress)
+
+
+@app.command
+def sweep(
+    case: Path,
+    /,
+    *,
+    over: Annotated[tuple[str, ...], Parameter(negative="")],
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    of: Annotated[tuple[str, ...], Parameter(negative="")] = ("ste", "ste sun-planet", "ste planet-ring"),
+    speeds: tuple[str, str] | None = None,
+) -> int:
+    """Compute quantities over values of entries of a case; goes on where it was interrupted.
+
+    Parameters
+    ----------
+    case
+        TOML case file.
+    over
+        As "operation.torque=50 N m,100 N m" or "sun.modifications[0].amount=0 um..12 um/7"; may be repeated.
+    output
+        Folder of sweep.csv, sweep.png and the journal sweep.jsonl.
+    of
+        Quantities as in docs/optimise.md: ste, ste overall, mesh force, housing, ...; may be repeated.
+    speeds
+        First and last speed of the input, for mesh forces and the housing.
+    """
+    from femgear.case import read_case
+    from femgear.optimisation import sweep_into
+    from femgear.run import grid_cache
+
+    data = read_case(case)
+    with _Progress() as progress:
+        options = {"speeds": speeds, "cache": grid_cache(), "progress": progress}
+        found, names = sweep_into(data, output, over=over, of=of, **options)
+    failed = sum(bool(error) for error in found.errors)
+    print(f"{len(found.points)} cases, {found.computed} computed now, {failed} cannot be computed")
+    print(f"files in {output}: {', '.join(names)}")
+    return 0
 
 
 @app.command
