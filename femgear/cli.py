@@ -120,11 +120,10 @@ def check(case: Path, /) -> int:
     case
         TOML case file.
     """
-    from femgear.case import planetary_set, read_case
-    from femgear.summary import describe_case
+    from femgear.case import read_case
+    from femgear.summary import describe
 
-    data = read_case(case)
-    _print(describe_case(data, planetary_set(data)))
+    _print(describe(read_case(case)))
     return 0
 
 
@@ -134,7 +133,10 @@ def run(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    only: Literal["static", "stress", "modes", "dynamics", "housing", "branch", "response"] | None = None,
+    only: Literal[
+        "static", "stress", "modes", "dynamics", "housing", "branch", "response", "transient", "spectrum"
+    ]
+    | None = None,
     pictures: bool = True,
     force: bool = False,
 ) -> int:
@@ -148,7 +150,7 @@ def run(
         Folder of the results.
     only
         Compute this stage and what it needs, no further; "stress" whatever static.stresses says, "branch" and
-        "response" of planar cases.
+        "response" of planar cases, "transient" and "spectrum" of drivetrains.
     pictures
         Draw figures, fields and report.
     force
@@ -254,13 +256,19 @@ def sweep(
 
 
 @app.command
-def schema() -> int:
-    """Print the JSON schema of the case file, for editors."""
+def schema(*, model: Literal["drivetrain"] | None = None) -> int:
+    """Print the JSON schema of the case file, for editors.
+
+    Parameters
+    ----------
+    model
+        Of the case files that name this model.
+    """
     import json
 
     from femgear.case import case_schema
 
-    print(json.dumps(case_schema(), indent=1))
+    print(json.dumps(case_schema(model), indent=1))
     return 0
 
 

@@ -328,7 +328,12 @@ def write_pictures(
         Called with (stage, done, total).
     """
     from femgear.case import planetary_set, set_deviations
+    from femgear.casefile.drivetrain import DrivetrainCase
 
+    if isinstance(case, DrivetrainCase):
+        from femgear.pictures_drivetrain import write_drivetrain_pictures
+
+        return write_drivetrain_pictures(folder, case, data, progress=progress)
     gears, static = planetary_set(case), results.get("static")
     steps = [lambda: write_figures(folder, gears, data, deviations=set_deviations(case))]
     # static of a helical case holds spur gears that nobody makes

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from femgear.case import planetary_set
 from femgear.files import checksum, storage_errors, write_text
 from femgear.report_captions import SECTIONS, caption_of, comparisons
 from femgear.storage import Results, open_results
-from femgear.summary import Block, describe_case, describe_results
+from femgear.summary import Block, describe, describe_results
+from femgear.summary_drivetrain import transient_warnings
 from femgear.summary_planar import published_modes
 
 _LARGEST_PICTURE = 8_000_000  # bytes
@@ -84,9 +84,8 @@ def write_report(folder: str | os.PathLike) -> Path:
 def page(results: Results) -> str:
     """The page as text; see `write_report`."""
     case = results.case
-    gears = planetary_set(case)
     pictures, skipped = _pictures(results)
-    title, *geometry = describe_case(case, gears)
+    title, *geometry = describe(case)
     warnings = [note for block in geometry if block.title == "Warnings" for note in block.notes]
     warnings = [text for text in warnings if text != "none"] + list(_verdicts(results)) + skipped
     numbers = {block.title: block for block in describe_results(results)}
@@ -144,6 +143,8 @@ def _verdicts(results: Results) -> Iterator[str]:
     if "response" in results.stages and not results.response["converged"].values.all():
         wrong = results.response["speed"].values[~results.response["converged"].values.astype(bool)]
         yield f"no response found at {', '.join(f'{value:.6g}' for value in wrong[:8])} rpm"
+    if "transient" in results.stages:
+        yield from transient_warnings(results.transient)
     if "dynamics" not in results.stages:
         return
     data = results.dynamics

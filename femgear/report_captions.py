@@ -166,6 +166,53 @@ CAPTIONS = (
         "Envelope around a mesh harmonic over the angle of the carrier ({}).",
     ),
     (
+        "stiffness_series",
+        "Modes",
+        "Mesh stiffness over the mesh period as the model takes it: a Fourier series, and the rectangular "
+        "wave of the number of tooth pairs in contact that it stands for.",
+    ),
+    (
+        "campbell",
+        "Modes",
+        "Natural frequencies over the speed of the first body, with gyroscopic terms and mean mesh "
+        "stiffness, and the mesh frequencies.",
+    ),
+    (
+        "drivetrain_mode",
+        "Modes",
+        "Mode shape of the drivetrain ({}), magnified; at rest in grey. The rays show how far each wheel "
+        "turns. The drawing is a scheme: bodies without gears have a radius that is not theirs.",
+    ),
+    (
+        "transient_speeds",
+        "Transient",
+        "Speed of the first and of the last body.",
+    ),
+    (
+        "transient_deviations",
+        "Transient",
+        "Rotation of the bodies less that of the free spin, which is the motion of the rigid chain under the "
+        "same torques.",
+    ),
+    (
+        "transient_forces",
+        "Transient",
+        "Mesh forces along the lines of action, low-passed to the rate of the records. Negative: the mesh "
+        "is linear and pulls; real teeth would part.",
+    ),
+    (
+        "mesh_force_spectrum",
+        "Spectrum",
+        "Amplitude spectra of mesh forces after the start: segments under Hann's window that overlap by "
+        "half, root of the mean square, peak values. Dotted: mesh frequencies at the mean speed.",
+    ),
+    (
+        "side_bands",
+        "Spectrum",
+        "Mesh force around a mesh line over orders of the first body, in one segment ({}). Dotted: "
+        "distances of the carrier's turn, or of the mesh line of the planetary stage.",
+    ),
+    (
         "weight_response",
         "Response to the weight",
         "Displacement of carrier, ring and sun over the frequency of the weight in the carrier frame, r.m.s. "
@@ -234,6 +281,8 @@ SECTIONS = (
     "Housing",
     "Response to the weight",
     "Weight and mesh frequency",
+    "Transient",
+    "Spectrum",
     "Other pictures",
 )
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from femgear import analysis
 from femgear.case import planetary_set, set_deviations
+from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.run_stages import KINDS, check_case, kind_of, stages_of
 from femgear.storage import finish, record, write_dataset, write_text
 
@@ -111,6 +112,7 @@ def report_again(folder: Path) -> None:
         Results of a complete run.
     """
     from femgear.pictures import write_figures
+    from femgear.pictures_drivetrain import write_drivetrain_pictures
     from femgear.report import write_report
     from femgear.storage import folder_lock, open_results
 
@@ -120,9 +122,13 @@ def report_again(folder: Path) -> None:
         names = [name for name in manifest.files if name != "report.html"]
         if not any(name.endswith(".png") for name in names):
             data = {stage: getattr(results, stage) for stage in results.stages}
-            names += write_figures(
-                results.folder, planetary_set(results.case), data, deviations=set_deviations(results.case)
-            )
+            case = results.case
+            if isinstance(case, DrivetrainCase):
+                names += write_drivetrain_pictures(results.folder, case, data)
+            else:
+                names += write_figures(
+                    results.folder, planetary_set(case), data, deviations=set_deviations(case)
+                )
             finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
         write_report(folder)
         finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)

@@ -11,6 +11,7 @@ import numpy as np
 
 from femgear import analysis
 from femgear.case import planetary_set
+from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.errors import CaseError
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ class Stage:
 
 def kind_of(case: Case) -> str:
     """Kind of a case: a key of `KINDS`."""
+    if isinstance(case, DrivetrainCase):
+        return "drivetrain"
     if case.helical is not None:
         return "helical"
     return "elastic" if case.planar is None else "planar"
@@ -91,7 +94,8 @@ def check_case(case: Case, only: str | None = None) -> None:
     ------
     CaseError, GeometryError
     """
-    stages, gears = stages_of(case, only), planetary_set(case)
+    stages = stages_of(case, only)
+    gears = None if isinstance(case, DrivetrainCase) else planetary_set(case)
     if set(stages) - {"static", "stress"}:
         KINDS[kind_of(case)].check(case, gears)
 
@@ -290,7 +294,55 @@ class Kind:
     words: str
 
 
+def _check_drivetrain(case, _):
+    from femgear.models.drivetrain_case import check_drivetrain
+
+    check_drivetrain(case)
+
+
+def _drivetrain(name: str, *, after: str = "", shows: bool = False):
+    """Stage of `femgear.analysis_drivetrain`, by the names of its function and of the stage before."""
+
+    def compute(case, results, cache, progress):
+        from femgear import analysis_drivetrain
+
+        before = (results[after],) if after else ()
+        return getattr(analysis_drivetrain, name)(case, *before, **({"progress": progress} if shows else {}))
+
+    return compute
+
+
+def _transient_verdict(result) -> dict:
+    runs = result.runs.values()
+    return {
+        "steps": next(iter(runs)).steps,
+        "energy": max(run.ledger.error for run in runs),
+        "momentum": max(run.momentum for run in runs),
+        "pulling": {variant: float(np.max(run.pulling, initial=0.0)) for variant, run in result.runs.items()},
+    }
+
+
+DRIVETRAIN = {
+    "modes": Stage(
+        compute=_drivetrain("solve_drivetrain_modes"),
+        verdict=lambda result: {
+            "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
+        },
+    ),
+    "transient": Stage(
+        compute=_drivetrain("solve_transient_run", shows=True), verdict=_transient_verdict
+    ),
+    "spectrum": Stage(
+        compute=_drivetrain("solve_spectrum", after="transient"),
+        verdict=lambda result: {
+            "lines": len(result.lines), "segments": min(one.segments for one in result.spectra.values()),
+        },
+        possible=lambda case: "" if case.parallel or case.planetary else "the chain has no gears",
+        needs=lambda case: ("transient",),
+    ),
+}  # fmt: skip
 KINDS = {
+    "drivetrain": Kind(DRIVETRAIN, _check_drivetrain, "a drivetrain"),
     "elastic": Kind(ELASTIC, _check_elastic, "a case with an elastic ring"),
     "planar": Kind(PLANAR, _check_planar, "a planar case"),
     "helical": Kind(HELICAL, _check_helical, "a helical case"),

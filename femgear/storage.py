@@ -28,6 +28,8 @@ from femgear.storage_manifest import (
 if TYPE_CHECKING:
     import xarray as xr
 
+    from femgear.casefile.drivetrain import DrivetrainCase
+
 __all__ = [
     "MANIFEST",
     "Manifest",
@@ -46,7 +48,7 @@ __all__ = [
     "write_manifest",
     "write_text",
 ]
-STAGES = ("static", "stress", "modes", "dynamics", "housing", "branch", "response")
+STAGES = ("static", "stress", "modes", "dynamics", "housing", "branch", "response", "transient", "spectrum")
 CASE = "case.toml"
 LOCK = ".lock"
 RUNNING = ".running"
@@ -61,7 +63,7 @@ class Results:
     manifest: Manifest
 
     @cached_property
-    def case(self) -> Case:
+    def case(self) -> Case | DrivetrainCase:
         """The case as run."""
         return read_case(self._checked(CASE))
 
@@ -99,6 +101,16 @@ class Results:
     def response(self) -> xr.Dataset:
         """Responses of a planar set to weight and mesh frequency at every speed."""
         return self.stage("response")
+
+    @cached_property
+    def transient(self) -> xr.Dataset:
+        """Motion of a drivetrain in time."""
+        return self.stage("transient")
+
+    @cached_property
+    def spectrum(self) -> xr.Dataset:
+        """Spectra and lines of the mesh forces of a drivetrain."""
+        return self.stage("spectrum")
 
     def stage(self, name: str) -> xr.Dataset:
         """Contents of the file of one stage."""

@@ -9,11 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case_shafts import shaft_lines
+from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.gears import check_set, speeds, tooth_thickness, torques
 from femgear.gears.checks import tip_clearances
 from femgear.gears.deviation_checks import check_deviations
 from femgear.models.ring import MAX_DIAMETER
 from femgear.summary_block import Block
+from femgear.summary_drivetrain import (
+    describe_drivetrain,
+    describe_drivetrain_modes,
+    describe_spectrum,
+    describe_transient,
+)
 from femgear.summary_helical import describe_helical
 from femgear.summary_phasing import describe_phasing
 from femgear.summary_planar import describe_branch, describe_planar, describe_response
@@ -28,6 +35,15 @@ if TYPE_CHECKING:
 
 RPM = math.pi / 30
 _MANY = 8
+
+
+def describe(case: Case | DrivetrainCase) -> tuple[Block, ...]:
+    """Blocks of any kind of case: its title first, its warnings last."""
+    if isinstance(case, DrivetrainCase):
+        return describe_drivetrain(case)
+    from femgear.case import planetary_set
+
+    return describe_case(case, planetary_set(case))
 
 
 def describe_case(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
@@ -179,7 +195,11 @@ def describe_results(results: Results) -> tuple[Block, ...]:
         "housing": _housing,
         "branch": describe_branch,
         "response": describe_response,
+        "transient": describe_transient,
+        "spectrum": describe_spectrum,
     }
+    if isinstance(results.case, DrivetrainCase):
+        describe["modes"] = describe_drivetrain_modes
     blocks = [describe[stage](getattr(results, stage)) for stage in results.stages]
     timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
     return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))

@@ -18,6 +18,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.models.drivetrain_coordinates import (
     Coordinates,
+    bearing_place,
     coordinates_of,
     free_coordinates,
     joint_rows,
@@ -285,7 +286,7 @@ def _stiffness(train: Drivetrain, place: Coordinates) -> np.ndarray:
         K += _springs(joint_rows(place, shaft), [s.shear, s.shear, s.bending, s.bending, s.torsion])
     for bearing in train.bearings:
         rows = np.zeros((5, place.count))
-        first = place.body[bearing.body]
+        first = bearing_place(train, place, bearing)
         rows[np.arange(5), first + np.arange(5)] = 1.0
         rows[0, first + 3], rows[1, first + 2] = bearing.offset, -bearing.offset
         K += _springs(rows, [bearing.radial] * 2 + [bearing.tilt] * 2 + [bearing.torsion])

@@ -59,6 +59,25 @@ def coordinates_of(train: Drivetrain) -> Coordinates:
     )  # fmt: skip
 
 
+def bearing_place(train: Drivetrain, place: Coordinates, bearing) -> int:
+    """First of the five places that a bearing holds.
+
+    Raises
+    ------
+    CaseError
+        There is no such station (E-DRIVETRAIN).
+    """
+    if not bearing.station:
+        return place.body[bearing.body]
+    for shaft, inner in zip(train.shafts, place.inner):
+        if (shaft.first, shaft.second) == (bearing.body, bearing.other) and bearing.station <= len(inner):
+            return inner[bearing.station - 1]
+    raise CaseError(
+        f"no station {bearing.station} inside a shaft from {bearing.body} to {bearing.other}",
+        code="E-DRIVETRAIN", limit="1 to the number of elements less one", key="station",
+    )  # fmt: skip
+
+
 def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray, tuple[str, ...]]:
     """All coordinates per unit of the free ones (n, n_free), and the names of those.
 
@@ -70,7 +89,7 @@ def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray,
         if not one.tilts:
             held[place.body[one.name] + np.array([2, 3])] = True
     for bearing in train.bearings:
-        first = place.body[bearing.body]
+        first = bearing_place(train, place, bearing)
         held[first : first + 2] |= math.isinf(bearing.radial)
         held[first + 2 : first + 4] |= math.isinf(bearing.tilt)
     for stage, own in zip(train.planetary, place.planets):

@@ -255,11 +255,12 @@ class PlanetaryStage:
 
 @dataclass(frozen=True)
 class ChainBearing:
-    """Bearing of a body in the housing.
+    """Bearing in the housing, of a body or of a station inside a shaft of several elements.
 
     Parameters
     ----------
     body : str
+        Of a station the first body of its shaft.
     radial : float
         Along x and y [N/m]; infinite holds the body (with no offset).
     tilt : float
@@ -268,6 +269,10 @@ class ChainBearing:
         Place along z from the centre of the body [m].
     torsion : float
         Against rotation [N m/rad].
+    other : str, optional
+        Second body of the shaft.
+    station : int
+        Number of the station inside the shaft, from 1 beside the first body; 0 is the body itself.
     """
 
     body: str
@@ -275,6 +280,8 @@ class ChainBearing:
     tilt: float = 0.0
     offset: float = 0.0
     torsion: float = 0.0
+    other: str | None = None
+    station: int = 0
 
     def __post_init__(self):
         values = (self.radial, self.tilt, self.torsion)

@@ -19,6 +19,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.models.drivetrain import DrivetrainModel
 from femgear.models.drivetrain_books import Books, Ledger
+from femgear.models.drivetrain_record import Record
 from femgear.models.drivetrain_torque import TorqueHistory
 from femgear.solvers.newmark import AVERAGE_ACCELERATION, StepRule
 from femgear.solvers.series import FourierSeries
@@ -52,6 +53,10 @@ class DrivetrainRun:
     steps : int
     step : float
         [s]
+    extremes : (2, n_meshes) array
+        Least and largest force at any step [N], whatever is recorded.
+    pulling : (n_meshes,) array
+        Share of the steps with a negative force.
     """
 
     time: np.ndarray
@@ -68,6 +73,8 @@ class DrivetrainRun:
     momentum: float
     steps: int
     step: float
+    extremes: np.ndarray
+    pulling: np.ndarray
 
 
 def march_drivetrain(
@@ -80,6 +87,7 @@ def march_drivetrain(
     start="static",
     outputs: Sequence[str] | None = None,
     every: int = 1,
+    lowpass: bool = False,
     rule: StepRule = AVERAGE_ACCELERATION,
     separate_spin: bool = True,
 ) -> DrivetrainRun:
@@ -99,6 +107,9 @@ def march_drivetrain(
         Coordinates to record; all rotations when not given.
     every : int
         Steps between records.
+    lowpass : bool
+        Records are low-passed (`femgear.models.drivetrain_record.Decimator`), so that nothing beyond half
+        their rate appears as something else; False takes the motion at these instants as it is.
     rule : StepRule
         Newmark's gamma and beta; without the averaging of generalised alpha.
     separate_spin : bool
@@ -118,16 +129,20 @@ def march_drivetrain(
     names = _outputs(model, outputs)
     at = np.array([model.index(name) for name in names], int)
     state = _start(model, scheme, track, start)
-    record = _Record(model, count, every, at)
+    record = Record(model, count, every, at, lowpass=lowpass)
     books = Books(model, scheme, track, state)
     for first in range(0, count, _BLOCK):
         number = min(_BLOCK, count - first)
         block = track.block(first, number)
-        states, free = _march(scheme, block, state)
-        record.take(first, number, states, free, block)
+        states = _march(scheme, block, state)
+        record.take(first, number, states, block)
         books.add(states, block)
         state = books.without_drift(states[-1]) if separate_spin else states[-1].copy()
-    return record.finish(model, names, books, count, step)
+    return DrivetrainRun(
+        step * every * np.arange(count // every + 1), names, *record.columns(), model.meshes, books.ledger(),
+        books.drift, books.momentum_error(), count, step,
+        record.extremes, record.pulled / record.steps,
+    )  # fmt: skip
 
 
 def _check(duration, step, every, rule) -> None:
@@ -245,7 +260,7 @@ class _Scheme:
 
 
 def _march(scheme: _Scheme, block: _Block, state):
-    """States (count + 1, 2 n + m) with the column forces, and motions (count, m) before the mesh forces."""
+    """States (count + 1, 2 n + m) with the column forces."""
     S, k = block.selection[1:], block.stiffness[1:]
     inner = np.matmul(np.swapaxes(S, 1, 2), np.matmul(scheme.flexibility, S)) * k[:, None, :]
     inner = np.swapaxes(inner, 1, 2)
@@ -255,19 +270,18 @@ def _march(scheme: _Scheme, block: _Block, state):
     matrices = np.matmul(S, mesh)
     loads = block.loads[:-1] @ scheme.loads_before + block.loads[1:] @ scheme.loads_after
     count, width = len(loads), scheme.transition.shape[1]
-    states, free = np.empty((count + 1, width)), np.empty((count, scheme.flexibility.shape[0]))
+    states = np.empty((count + 1, width))
     states[0] = state
     n2, step, drawn = 2 * scheme.n, scheme.transition, scheme.drawn
-    ahead = np.empty(n2 + free.shape[1])
+    ahead = np.empty(n2 + scheme.flexibility.shape[0])
     for i in range(count):
         np.dot(step, states[i], out=ahead)
         ahead += loads[i]
         after = states[i + 1]
-        free[i] = ahead[n2:]
         g = np.dot(matrices[i], ahead[n2:])
         after[n2:] = g
         np.subtract(ahead[:n2], np.dot(drawn, g), out=after[:n2])
-    return states, np.einsum("tjm,tm->tj", mesh, free)
+    return states
 
 
 def _start(model, scheme, track, start):
@@ -293,33 +307,3 @@ def _start(model, scheme, track, start):
         if q.shape != (n,) or v.shape != (n,):
             raise CaseError(f"a start of shapes {q.shape}, {v.shape}", code="E-START", limit=f"two ({n},)")
     return np.concatenate([q, v, S @ (k * (W.T @ q))])
-
-
-class _Record:
-    def __init__(self, model, count, every, at):
-        self.every, self.at = every, at
-        rows, meshes = count // every + 1, len(model.meshes)
-        self.motion, self.velocity = np.empty((2, rows, len(at)))
-        self.approach, self.force = np.empty((2, rows, meshes))
-        self.spin, self.speed = np.empty((2, rows))
-        self.basic = model.geometry.basic
-
-    def take(self, first, number, states, forces, block):
-        n = len(self.basic)
-        begin = -first % self.every
-        steps = np.arange(begin if first else 0, number + 1, self.every)
-        if first:
-            steps = steps[steps > 0] if begin == 0 else steps
-        rows = (first + steps) // self.every
-        q = states[steps, :n]
-        self.motion[rows], self.velocity[rows] = q[:, self.at], states[steps, n : 2 * n][:, self.at]
-        self.approach[rows] = np.einsum("tmj,tm->tj", block.selection[steps], q @ self.basic)
-        self.force[rows] = block.stiffness[steps] * self.approach[rows]
-        self.spin[rows], self.speed[rows] = block.angle[steps], block.speed[steps]
-
-    def finish(self, model, names, books, count, step):
-        time = step * self.every * np.arange(len(self.spin))
-        return DrivetrainRun(
-            time, names, self.motion, self.velocity, self.approach, self.force, self.spin, self.speed,
-            model.meshes, books.ledger(), books.drift, books.momentum_error(), count, step,
-        )  # fmt: skip

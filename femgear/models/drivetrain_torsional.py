@@ -23,7 +23,7 @@ def held_train(train: Drivetrain) -> Drivetrain:
     bodies = tuple(replace(one, tilts=False) for one in train.bodies)
     bearings = tuple(ChainBearing(one.name, math.inf) for one in train.bodies)
     planetary = tuple(replace(one, planet_bearing=math.inf) for one in train.planetary)
-    twist = tuple(ChainBearing(b.body, 0.0, torsion=b.torsion) for b in train.bearings if b.torsion)
+    twist = tuple(replace(b, radial=0.0, tilt=0.0, offset=0.0) for b in train.bearings if b.torsion)
     return replace(train, bodies=bodies, bearings=bearings + twist, planetary=planetary, gravity=0.0)
 
 

@@ -1,0 +1,192 @@
+"""The pipeline of a drivetrain case: modes, transient -> spectrum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.analysis import Progress
+from femgear.casefile.drivetrain import DrivetrainCase
+from femgear.casefile.drivetrain_checks import settle_time
+from femgear.errors import CaseError, ConvergenceError
+from femgear.models.drivetrain_case import (
+    BENDING,
+    TORSIONAL,
+    case_model,
+    check_drivetrain,
+    torque_histories,
+)
+from femgear.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.models.drivetrain import DrivetrainModel
+    from femgear.models.drivetrain_lines import MeshLine
+    from femgear.models.drivetrain_march import DrivetrainRun
+    from femgear.models.drivetrain_spectra import AveragedSpectrum
+    from femgear.models.drivetrain_torque import TorqueHistory
+    from femgear.solvers.campbell import CampbellData
+    from femgear.system import Modes
+
+# Campbell diagram: speeds, and modes up to so many times those of operation and mesh lines.
+_SPEEDS, _FASTEST, _HIGHEST, _MOST_BRANCHES = 21, 10.0 / 3.0, 2.5, 40
+# Orders are read off up to this share of the record rate: beyond it the interpolation takes more than 1.4 %.
+_ORDERS = 0.25
+
+
+@dataclass(frozen=True)
+class DrivetrainModesResult:
+    """Modes at standstill with mean mesh stiffnesses, and over the speed with gyroscopic terms."""
+
+    model: DrivetrainModel
+    modes: Modes
+    campbell: CampbellData
+    speed: float
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of modes.nc."""
+        from femgear.datasets_drivetrain import drivetrain_modes_dataset
+
+        return drivetrain_modes_dataset(self)
+
+
+@dataclass(frozen=True)
+class TransientResult:
+    """Motion in time, by variant: with bending, and torsional where it is asked for."""
+
+    models: dict[str, DrivetrainModel]
+    runs: dict[str, DrivetrainRun]
+    torques: tuple[TorqueHistory, ...]
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of transient.nc."""
+        from femgear.datasets_drivetrain import transient_dataset
+
+        return transient_dataset(self)
+
+
+@dataclass(frozen=True)
+class SpectrumResult:
+    """Spectra of the mesh forces by variant, over frequency and order, and the named lines."""
+
+    transient: TransientResult
+    settle: float
+    speed: float
+    spectra: dict[str, AveragedSpectrum]
+    orders: dict[str, AveragedSpectrum]
+    lines: tuple[MeshLine, ...]
+    amplitudes: dict[str, np.ndarray]
+    order_distance: float
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of spectrum.nc."""
+        from femgear.datasets_drivetrain import spectrum_dataset
+
+        return spectrum_dataset(self)
+
+
+@one_blas_thread()
+def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
+    """Natural frequencies and modes, and the Campbell diagram with the mesh lines."""
+    from femgear.solvers.campbell import campbell_data
+    from femgear.solvers.modal import solve_modes
+
+    model, speed = check_drivetrain(case), case.operation.speed
+    modes = solve_modes(model.still, model.mean_stiffness)
+    still = replace(model.still, gyroscopic=model.system.gyroscopic)
+    orders = model.base_ratio[np.unique(model.mesh_base)]
+    top = _HIGHEST * speed * orders.max(initial=1.0) / (2.0 * np.pi)
+    most = min(_MOST_BRANCHES, len(modes.frequency) - 1)
+    count = int(np.clip(np.count_nonzero(modes.frequency < top), min(2, most), most))
+    speeds = np.linspace(0.0, _FASTEST * speed, _SPEEDS)
+    found = campbell_data(lambda _: still, speeds, model.mean_stiffness, orders=orders, count=count)
+    ratio = np.where(modes.frequency > 0.0, case.simulation.damping_ratio, 0.0)
+    return DrivetrainModesResult(model, replace(modes, damping_ratio=ratio), found, speed)
+
+
+@one_blas_thread()
+def solve_transient_run(case: DrivetrainCase, *, progress: Progress | None = None) -> TransientResult:
+    """Integrate the case; records are low-passed before they are thinned out.
+
+    Raises
+    ------
+    ConvergenceError
+        The motion grew beyond all numbers (E-DIVERGED).
+    """
+    from femgear.models.drivetrain_march import march_drivetrain
+
+    check_drivetrain(case)
+    s = case.simulation
+    variants = (BENDING, TORSIONAL) if s.torsional else (BENDING,)
+    models, runs, torques = {}, {}, ()
+    for done, variant in enumerate(variants):
+        model = models[variant] = case_model(case, variant)
+        torques = torque_histories(case, model.ratio)
+        with np.errstate(over="ignore", invalid="ignore"):
+            run = march_drivetrain(
+                model,
+                torques,
+                duration=s.duration,
+                step=1.0 / s.rate,
+                speed=case.operation.speed,
+                start=s.start,
+                outputs=[f"{body.name}: rotation" for body in model.train.bodies],
+                every=case.every,
+                lowpass=True,
+            )
+        if not (np.isfinite(run.force).all() and np.isfinite(run.motion).all()):
+            raise ConvergenceError(
+                f"the motion {variant} grows without end: a parametric resonance",
+                code="E-DIVERGED",
+                key="simulation.damping_ratio",
+                value=s.damping_ratio,
+                remedy="give more damping, or another speed",
+            )
+        runs[variant] = run
+        if progress is not None:
+            progress("transient", done + 1, len(variants))
+    return TransientResult(models, runs, torques)
+
+
+def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> SpectrumResult:
+    """Spectra of the mesh forces after the start, over frequency and over orders of the first body.
+
+    Raises
+    ------
+    CaseError
+        A first body that stops or turns back (E-SPECTRUM).
+    """
+    from femgear.models.drivetrain_lines import line_amplitudes, mesh_lines
+    from femgear.models.drivetrain_spectra import averaged_spectrum, order_spectrum
+
+    first, settle = next(iter(transient.runs.values())), settle_time(case)
+    late, step = first.time >= settle, 1.0 / case.record_rate
+    span = float(np.ptp(first.time[late]))
+    resolution = case.simulation.resolution or max(0.1, 4.0 / span)
+    speed = float(first.spin_speed[late].mean())
+    turns = float(np.ptp(first.spin[late])) / (2.0 * np.pi)
+    slowest = min(float(run.spin_speed[late].min()) for run in transient.runs.values())
+    if not slowest > 0.0:
+        raise CaseError(
+            "the first body stops or turns back: there are no orders", code="E-SPECTRUM",
+            key="operation.torque", remedy="give torques that keep it turning",
+        )  # fmt: skip
+    lines = mesh_lines(transient.models[BENDING])
+    per_turn = int(np.ceil(2.0 * np.pi * case.record_rate / slowest))
+    distance = 1.0 / (0.99 * turns)
+    spectra, tracked, amplitudes = {}, {}, {}
+    for variant, run in transient.runs.items():
+        force, angle = run.force[late], run.spin[late]
+        spectra[variant] = averaged_spectrum(force, step, resolution=resolution)
+        found = order_spectrum(force, angle, resolution=distance, per_turn=per_turn)
+        kept = found.frequency <= _ORDERS * case.record_rate * 2.0 * np.pi / run.spin_speed[late].max()
+        tracked[variant] = replace(
+            found, frequency=found.frequency[kept], amplitude=found.amplitude[..., kept]
+        )
+        amplitudes[variant] = line_amplitudes(
+            force, angle, run.spin_speed[late], lines, record_rate=case.record_rate
+        )
+    return SpectrumResult(transient, settle, speed, spectra, tracked, lines, amplitudes, distance)

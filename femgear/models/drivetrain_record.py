@@ -1,0 +1,124 @@
+"""Records of a drivetrain that is stepped through time: every step, or low-passed and thinned out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# The pass band ends at this share of half the record rate, where the stop band begins.
+PASS_BAND = 0.8
+# Attenuation of the stop band [dB].
+STOP = 80.0
+
+
+class Decimator:
+    """Low pass and decimation of columns that come in blocks, without delay.
+
+    A linear-phase filter (Kaiser window; J. F. Kaiser and R. W. Schafer, IEEE Trans. Acoust. Speech Signal
+    Process. 28, 1980, 105-107) with 80 dB between 0.8 and 1.0 of half the record rate. At both ends the
+    columns are continued point-symmetrically, so that constants and ramps pass unchanged.
+
+    Parameters
+    ----------
+    every : int
+        Steps a record; 1 passes everything.
+    count : int
+        Steps in all; rows 0 to `count` come.
+    """
+
+    def __init__(self, every: int, count: int):
+        from scipy.signal import firwin, kaiserord
+
+        self.every, self.count, self.seen = every, count, 0
+        self.rows = count // every + 1
+        length, beta = kaiserord(STOP, (1.0 - PASS_BAND) / every)
+        # the continuation needs as many rows as it adds
+        half = min(length // 2, count) if every > 1 else 0
+        self.half = half
+        middle = 0.5 * (1.0 + PASS_BAND) / every
+        self.weights = firwin(2 * half + 1, middle, window=("kaiser", beta)) if half else np.ones(1)
+        self.buffer, self.first, self.done = None, 0, 0
+
+    def push(self, rows) -> np.ndarray:
+        """Records (k, c) that become complete with further rows (n, c)."""
+        rows = np.asarray(rows, float)
+        self.seen += len(rows)
+        self.buffer = rows.copy() if self.buffer is None else np.vstack([self.buffer, rows])
+        half, last = self.half, self.seen == self.count + 1
+        if self.done == 0 and self.first == 0:
+            if len(self.buffer) <= half and not last:
+                return np.empty((0, rows.shape[1]))
+            ahead = 2.0 * self.buffer[0] - self.buffer[half:0:-1]
+            self.buffer, self.first = np.vstack([ahead, self.buffer]), -half
+        if last and half:
+            behind = 2.0 * self.buffer[-1] - self.buffer[-2 : -2 - half : -1]
+            self.buffer = np.vstack([self.buffer, behind])
+        return self._filtered()
+
+    def _filtered(self) -> np.ndarray:
+        """Records whose whole window is in the buffer."""
+        from scipy.signal import upfirdn
+
+        reach = self.first + len(self.buffer) - 1 - self.half
+        stop = min(reach // self.every + 1, self.rows)
+        if stop <= self.done:
+            return np.empty((0, self.buffer.shape[1]))
+        begin, number = self.done * self.every - self.half - self.first, stop - self.done
+        wanted = self.buffer[begin : begin + (number - 1) * self.every + 2 * self.half + 1]
+        # only every so many values of the convolution are computed: the padding makes the first one of them
+        pad = -2 * self.half % self.every
+        padded = np.vstack([np.zeros((pad, wanted.shape[1])), wanted])
+        start = (2 * self.half + pad) // self.every
+        found = upfirdn(self.weights, padded, down=self.every, axis=0)[start : start + number]
+        self.done = stop
+        keep = max(stop * self.every - self.half - self.first, 0)
+        self.buffer, self.first = self.buffer[keep:].copy(), self.first + keep
+        return found
+
+
+class Record:
+    """What a run keeps: coordinates, meshes, spin."""
+
+    def __init__(self, model, count: int, every: int, at, *, lowpass: bool):
+        self.every, self.at, self.basic = every, at, model.geometry.basic
+        rows, meshes = count // every + 1, len(model.meshes)
+        widths = [len(at), len(at), meshes, meshes, 1, 1]
+        self.cuts = np.cumsum(widths)[:-1]
+        self.table = np.empty((rows, sum(widths)))
+        self.decimator = Decimator(every, count) if lowpass and every > 1 else None
+        self.filled, self.steps = 0, 0
+        self.extremes = np.array([np.full(meshes, np.inf), np.full(meshes, -np.inf)])
+        self.pulled = np.zeros(meshes)
+
+    def take(self, first: int, number: int, states, block) -> None:
+        """Rows of a block of `number` steps; that of its start comes with the first block alone."""
+        begin = min(first, 1)
+        force = self._forces(np.arange(begin, number + 1), states, block)[1]
+        self.extremes[0] = np.minimum(self.extremes[0], force.min(axis=0, initial=np.inf))
+        self.extremes[1] = np.maximum(self.extremes[1], force.max(axis=0, initial=-np.inf))
+        self.pulled += np.count_nonzero(force < 0.0, axis=0)
+        self.steps += len(force)
+        if self.decimator is None:
+            at = (-first % self.every) or self.every if first else 0
+            new = self._rows(np.arange(at, number + 1, self.every), states, block)
+        else:
+            new = self.decimator.push(self._rows(np.arange(begin, number + 1), states, block))
+        self.table[self.filled : self.filled + len(new)] = new
+        self.filled += len(new)
+
+    def _forces(self, steps, states, block) -> tuple[np.ndarray, np.ndarray]:
+        """Approaches and forces (n, n_meshes)."""
+        approach = np.einsum(
+            "tmj,tm->tj", block.selection[steps], states[steps, : len(self.basic)] @ self.basic
+        )
+        return approach, block.stiffness[steps] * approach
+
+    def _rows(self, steps, states, block) -> np.ndarray:
+        n = len(self.basic)
+        motion, velocity = states[steps, :n][:, self.at], states[steps, n : 2 * n][:, self.at]
+        spin = block.angle[steps, None], block.speed[steps, None]
+        return np.hstack([motion, velocity, *self._forces(steps, states, block), *spin])
+
+    def columns(self) -> tuple[np.ndarray, ...]:
+        """Motion, velocity, approach, force (n, c each), spin angle and speed (n,)."""
+        *tables, angle, speed = np.split(self.table, self.cuts, axis=1)
+        return (*(np.ascontiguousarray(one) for one in tables), angle[:, 0].copy(), speed[:, 0].copy())

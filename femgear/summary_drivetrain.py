@@ -1,0 +1,219 @@
+"""Tables of drivetrains: the chain of a case, and the numbers of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.summary_block import Block
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.casefile.drivetrain import DrivetrainCase
+    from femgear.models.drivetrain import DrivetrainModel
+
+RPM = math.pi / 30
+_SHOWN = 16
+# The step rule keeps the energy exactly: more is rounding that grew, or a motion that runs away.
+_BALANCE = 1e-6
+
+
+def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
+    """Bodies, shafts, gear stages, operation and warnings of a drivetrain case.
+
+    Raises
+    ------
+    CaseError
+        As `femgear.models.drivetrain_case.check_drivetrain`.
+    """
+    from femgear.models.drivetrain_case import check_drivetrain
+
+    model = check_drivetrain(case)
+    return (
+        Block(case.title),
+        _bodies(case, model),
+        _shafts(model),
+        _stages(case, model),
+        _operation(case, model),
+        Block("Warnings", notes=case.notices or ("none",)),
+    )
+
+
+def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
+    rows = []
+    for body in model.train.bodies:
+        held = [one for one in model.train.bearings if one.body == body.name]
+        rows.append(
+            (
+                body.name,
+                f"{body.inertia:.6g}",
+                f"{body.mass:.6g}",
+                f"{body.transverse_inertia:.6g}" if body.tilts else "-",
+                f"{sum(one.radial for one in held):.3g}" if held else "-",
+                f"{model.ratio[body.name]:.6g}",
+                f"{model.ratio[body.name] * case.operation.speed / RPM:.4f}",
+            )
+        )
+    header = (
+        "", "inertia [kg m^2]", "mass [kg]", "about a diameter", "bearings [N/m]", "ratio", "speed [rpm]",
+    )  # fmt: skip
+    notes = (
+        f"{len(model.rigid)} degrees of freedom, {len(model.meshes)} meshes; inertia of the chain about the "
+        f"axis of {model.train.bodies[0].name} {model.inertia:.6g} kg m^2",
+    )
+    return Block("Bodies", header, tuple(rows), notes)
+
+
+def _shafts(model: DrivetrainModel) -> Block:
+    rows = []
+    for one in model.train.shafts:
+        s = one.springs
+        kind = f"beam, {one.elements} elements" if one.elements else "joint"
+        values = (f"{value:.4g}" for value in (s.bending, s.torsion, s.shear))
+        rows.append((f"{one.first} - {one.second}", f"{one.length:.4g}", *values, kind))
+    header = ("", "length [m]", "bending [N m/rad]", "torsion [N m/rad]", "shear [N/m]", "model")
+    return Block("Shafts", header, tuple(rows))
+
+
+def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
+    train, hertz = model.train, model.frequencies(case.operation.speed) / (2.0 * np.pi)
+    rows = []
+    for i, (one, given) in enumerate(zip(train.planetary, case.planetary)):
+        teeth = f"{given.sun_teeth} / {given.ring_teeth}, {len(one.planet_angles)} planets"
+        radii = f"{1e3 * one.sun_radius:.4f}, {1e3 * one.planet_radius:.4f}, {1e3 * one.ring_radius:.4f}"
+        contact = f"{one.sun_mesh.contact_ratio:.4g}, {one.ring_mesh.contact_ratio:.4g}"
+        stiffness = f"{one.sun_mesh.stiffness:.4g}, {one.ring_mesh.stiffness:.4g}"
+        ratio = model.ratio[one.sun] / model.ratio[one.carrier]
+        rows.append((one.name, teeth, radii, f"{ratio:.5g}", contact, stiffness, f"{hertz[2 * i + 1]:.4f}"))
+    for i, (one, given) in enumerate(zip(train.parallel, case.parallel)):
+        radii = f"{1e3 * one.first_radius:.4f}, {1e3 * one.second_radius:.4f}"
+        ratio = model.ratio[one.second] / model.ratio[one.first]
+        line = hertz[2 * len(train.planetary) + i]
+        rows.append(
+            (
+                one.name, f"{given.teeth[0]} / {given.teeth[1]}", radii, f"{ratio:.5g}",
+                f"{one.mesh.contact_ratio:.4g}", f"{one.mesh.stiffness:.4g}", f"{line:.4f}",
+            )
+        )  # fmt: skip
+    header = (
+        "stage", "teeth", "pitch radii [mm]", "ratio", "contact ratio", "stiffness [N/m]", "mesh [Hz]",
+    )  # fmt: skip
+    return Block("Gear stages", header, tuple(rows))
+
+
+def _operation(case: DrivetrainCase, model: DrivetrainModel) -> Block:
+    from femgear.models.drivetrain_case import torque_histories
+
+    rows, drive = [], 0.0
+    for one in torque_histories(case, model.ratio):
+        low, high = one.values.min(), one.values.max()
+        text = f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}, {len(one.times)} points"
+        rows.append((one.body, text))
+        drive += float(one.values[0]) * model.ratio[one.body]
+    s = case.simulation
+    notes = (
+        f"first body {case.operation.speed / RPM:.6g} rpm; at the start the torques change its speed by "
+        f"{round(drive / model.inertia / RPM, 6) + 0.0:.4g} rpm a second",
+        f"{s.duration:g} s at {s.rate:g} steps a second, {case.record_rate:g} records a second",
+    )
+    return Block("Operation", ("torque on", "[N m]"), tuple(rows), notes)
+
+
+def describe_drivetrain_modes(data: xr.Dataset) -> Block:
+    """Table of modes.nc of a drivetrain."""
+    shown = min(data.sizes["mode"], _SHOWN)
+    energy, members = data["energy"].values, [str(name) for name in data["member"].values]
+    rows = []
+    for i in range(shown):
+        most = np.argsort(-energy[:, i])[:2]
+        where = ", ".join(f"{members[m]} {energy[m, i]:.0%}" for m in most)
+        share = f"{float(data['rotation_share'][i]):.1%}"
+        hertz = f"{float(data['frequency'][i]):.3f}"
+        rows.append((str(i + 1), hertz, str(data["kind"].values[i]), share, where))
+    top = float(data["frequency"].max())
+    notes = [f"{data.sizes['mode']} modes up to {top:.0f} Hz, the first {shown} shown"]
+    lines = zip(data["base"].values, data["mesh_frequency"].values)
+    if data.sizes["base"]:
+        notes.append("mesh lines: " + ", ".join(f"{name} {float(value):.3f} Hz" for name, value in lines))
+    header = ("mode", "frequency [Hz]", "kind", "rotation", "kinetic energy in")
+    return Block("Modes", header, tuple(rows), tuple(notes))
+
+
+def describe_transient(data: xr.Dataset) -> Block:
+    """Table of transient.nc: mesh forces, speeds, balances."""
+    rows, mean = [], data["mesh_force"].values.mean(axis=1)
+    least, largest, pulling = (data[name].values for name in ("least_force", "largest_force", "pulling"))
+    for v, variant in enumerate(data["variant"].values):
+        for m, mesh in enumerate(data["mesh"].values):
+            forces = (f"{1e-3 * values[v, m]:.4f}" for values in (mean, least, largest))
+            rows.append((str(variant), str(mesh), *forces, f"{100.0 * pulling[v, m]:.2f}"))
+    header = ("model", "mesh", "mean [kN]", "least [kN]", "largest [kN]", "pulling [% of time]")
+    speed, body = data["speed"].values[0], str(data["body"].values[0])
+    notes = [
+        f"{data.attrs['steps']} steps, at any of which least and largest force may be; {body} from "
+        f"{speed[0, 0] / RPM:.4f} to {speed[-1, 0] / RPM:.4f} rpm",
+        f"energy balance {float(data['energy_error'].max()):.1e}, angular momentum "
+        f"{float(data['momentum_error'].max()):.1e}",
+    ]
+    if pulling.any():
+        notes.append("these meshes are linear and keep contact: where they pull, real teeth part")
+    return Block("Transient", header, tuple(rows), tuple(notes))
+
+
+def transient_warnings(data: xr.Dataset) -> Iterator[str]:
+    """What transient.nc says against itself."""
+    pulling, least = data["pulling"].values, data["least_force"].values
+    for v, variant in enumerate(data["variant"].values):
+        if pulling[v].any():
+            worst, lowest = int(np.argmax(pulling[v])), int(np.argmin(least[v]))
+            yield (
+                f"{variant}: {data['mesh'].values[worst]} pulls for {pulling[v, worst]:.2%} of the time, "
+                f"{data['mesh'].values[lowest]} with up to {-1e-3 * least[v, lowest]:.4g} kN: real teeth "
+                "would part"
+            )
+    if (error := float(data["energy_error"].max())) > _BALANCE:
+        yield f"the energy balance misses {error:.1e} of its largest term"
+
+
+def describe_spectrum(data: xr.Dataset) -> Block:
+    """Table of spectrum.nc: amplitudes of the named lines, of one mesh of every kind."""
+    from femgear.plots.drivetrain_results import chosen_meshes, symbols
+
+    meshes, amplitude = chosen_meshes(data), data["line_amplitude"].values
+    names, variants = symbols(data), [str(name) for name in data["variant"].values]
+    rows = []
+    for i, orders in enumerate(data["line_orders"].values):
+        mark = "" if bool(data["resolved"][i]) else " *"
+        cells = (" / ".join(_newtons(value) for value in amplitude[:, i, m]) for m in meshes)
+        rows.append((_combination(orders, names) + mark, f"{float(data['line_frequency'][i]):.3f}", *cells))
+    header = ("line", "[Hz]", *(f"{data['mesh'].values[m]} [N]" for m in meshes))
+    notes = [
+        ", ".join(f"{names[b]}: {name}" for b, name in enumerate(data["base"].values)),
+        f"amplitudes of the mesh forces after {float(data.attrs['settle']):g} s, peak values; frequencies at "
+        "the mean speed",
+    ]
+    if len(variants) > 1:
+        notes.append(f"in every cell: {' / '.join(variants)}")
+    if not data["resolved"].values.all():
+        notes.append("*: the record is too short to part this line from a neighbour")
+    return Block("Spectrum", header, tuple(rows), tuple(notes))
+
+
+def _newtons(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.4g}" if value >= 0.1 else "0"
+
+
+def _combination(orders, names) -> str:
+    """A line as the sum of base frequencies, the largest first: ``f1 - 2 t``."""
+    terms = ""
+    for base in sorted(
+        np.flatnonzero(orders), key=lambda base: (orders[base] < 0, names[base][0] == "t", -base)
+    ):
+        count, name = int(orders[base]), names[base]
+        size = name if abs(count) == 1 else f"{abs(count)} {name}"
+        terms += f" {'-' if count < 0 else '+'} {size}" if terms else size
+    return terms
