@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.solvers.entries import checked_numbers
 from femgear.system import MechanicalSystem
 
 
@@ -46,7 +47,12 @@ def gear_pair(
     CaseError
         Inertias or radii that are not positive, a damping that is negative, numbers that are not finite.
     """
-    inertia, radius = (np.array(pair, float) for pair in (inertia, base_radius))
+    inertia, radius = (
+        checked_numbers(pair, name, code="E-GEAR-PAIR", unit=unit).copy()
+        for pair, name, unit in ((inertia, "inertia", "kg m^2"), (base_radius, "base_radius", "m"))
+    )
+    torque = checked_numbers(torque, "torque", code="E-GEAR-PAIR", unit="N m").item()
+    mesh_damping = checked_numbers(mesh_damping, "mesh_damping", code="E-GEAR-PAIR", unit="N s/m").item()
     for name, pair, unit in (("inertia", inertia, "kg m^2"), ("base_radius", radius, "m")):
         if pair.shape != (2,) or not np.all(np.isfinite(pair)) or np.any(pair <= 0.0):
             raise CaseError(

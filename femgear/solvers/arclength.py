@@ -99,19 +99,24 @@ def curve_points(
         try:
             segment, special, h = _step(curve, point, min(h, options.largest), bounds, options)
         except LostError as lost:
-            return Ending(False, False, f"lost after parameter = {point.z[-1] * curve.unit:.9g}: {lost}")
+            return Ending(False, False, f"lost after {_where(curve, point)}: {lost}")
         events = [*special, (segment.length, segment.last)]
         events, closed = _closing(segment, first, events, count)
         for _, end in _until_end(segment, events, bounds):
             yield end
             count += 1
             if end.kind == "end":
-                return Ending(False, True, f"end of the range at {end.z[-1] * curve.unit:.9g}")
+                return Ending(False, True, f"end of the range at {_where(curve, end)}")
         if closed:
             return Ending(True, True, "closed loop")
         point = segment.last
-    where = f"parameter = {point.z[-1] * curve.unit:.9g}"
+    where = _where(curve, point)
     return Ending(False, False, f"stopped at {where} after {count} points: raise max_points")
+
+
+def _where(curve: ScaledCurve, point: CurvePoint) -> str:
+    """The parameter of a point in words."""
+    return curve.told(float(point.z[-1] * curve.unit))
 
 
 def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: StepOptions):

@@ -15,6 +15,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.bifurcation import Segment
 from femgear.solvers.continuation import Curve, StepOptions, continue_curve, scaled_curve, switch_branch
 from femgear.solvers.corrector import correct
+from femgear.solvers.entries import checked_numbers, checked_tolerance
 from femgear.solvers.harmonic_balance import harmonic_balance
 from femgear.solvers.hill import require_period
 from femgear.solvers.nonlinear import NonlinearSystem
@@ -186,6 +187,7 @@ def frequency_response_curve(
     ConvergenceError
         No solution at the start.
     """
+    tolerance, frequency = checked_tolerance(tolerance), _ends(frequency, "frequency", "rad/s")
     balance = harmonic_balance(
         problem, harmonics=harmonics, orders=orders, samples=samples, reduction=reduction
     )
@@ -238,6 +240,7 @@ def parameter_curve(
     harmonics, orders, start, start_at, stability, tolerance, radius, samples, scale, options
         As for :func:`frequency_response_curve`. The derivative by the parameter is taken by differences.
     """
+    tolerance, parameter = checked_tolerance(tolerance), _ends(parameter, "parameter", "")
     if not np.all(np.isfinite(parameter)) or min(parameter) == max(parameter):
         raise CaseError(
             f"a range of parameters {tuple(parameter)}", code="E-RANGE", limit="two different ones"
@@ -246,7 +249,8 @@ def parameter_curve(
         require_period(frequency)
     begin = parameter[0] if start_at is None else start_at
     balance = harmonic_balance(family(begin), harmonics=harmonics, orders=orders, samples=samples)
-    omega = tuple(np.atleast_1d(np.asarray(frequency, float)).tolist())
+    held = checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s")
+    omega = tuple(np.atleast_1d(held).tolist())
     radius = stability if radius is None else radius
     route = FamilyRoute(family, balance, omega, (min(parameter), max(parameter)), samples, radius)
     return _follow(route, parameter, start, start_at, stability, tolerance, scale, options)
@@ -270,7 +274,11 @@ def crossing_branches(
     ConvergenceError
         The branch point is not simple.
     """
-    curves = switch_branch(branch.route.evaluate, branch.curve, index, limits=branch.limits, options=options)
+    tolerance = checked_tolerance(tolerance)
+    curves = switch_branch(
+        branch.route.evaluate, branch.curve, index, limits=branch.limits, options=options,
+        told=branch.route.told,
+    )  # fmt: skip
     return tuple(_branch(branch.route, curve, branch.limits, stability, tolerance) for curve in curves)
 
 
@@ -319,25 +327,36 @@ def branch_maximum(
     return best
 
 
+def _ends(value, key: str, unit: str) -> tuple[float, float]:
+    """Two ends of a range."""
+    ends = checked_numbers(value, key, code="E-RANGE", unit=unit)
+    if ends.shape != (2,):
+        raise CaseError(
+            f"a range of shape {ends.shape}", code="E-RANGE", key=key, limit="(first, last)",
+            remedy="give the first and the last value",
+        )  # fmt: skip
+    return float(ends[0]), float(ends[1])
+
+
 def _follow(route, ends, start, start_at, stability, tolerance, scale, options) -> Branch:
     """The branch of a route between two ends of its parameter."""
     limits = (float(min(ends)), float(max(ends)))
     begin = float(ends[0]) if start_at is None else float(start_at)
     if not limits[0] <= begin <= limits[1]:
         raise CaseError(
-            f"the start at {begin:.6g} lies outside the range", code="E-RANGE", key="start_at",
+            f"the start at {route.told(begin)} lies outside the range", code="E-RANGE", key="start_at",
             limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
         )  # fmt: skip
     first = route.first(begin, start)
     if not first.converged:
         raise ConvergenceError(
-            f"no periodic solution found at the start {begin:.6g}: {first.message}", code="E-START",
+            f"no periodic solution found at the start, {route.told(begin)}: {first.message}", code="E-START",
             remedy="give a start, or start where the response is nearly linear",
         )  # fmt: skip
     size = max(route.scale, float(np.abs(first.deflection).max())) if scale is None else scale
     curve = continue_curve(
         route.evaluate, route.unknowns(first.deflection), begin, limits=limits, scale=size,
-        direction=1 if ends[1] > ends[0] else -1, options=options,
+        direction=1 if ends[1] > ends[0] else -1, options=options, told=route.told,
     )  # fmt: skip
     return _branch(route, curve, limits, stability, tolerance)
 

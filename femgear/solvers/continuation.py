@@ -16,7 +16,7 @@ import numpy as np
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.arclength import Ending, StepOptions, curve_points
 from femgear.solvers.bifurcation import crossing_tangent
-from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, correct
+from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, correct, told_value
 
 __all__ = [
     "Curve",
@@ -82,6 +82,7 @@ def continue_curve(
     unit: float | None = None,
     direction: int = 1,
     options: StepOptions | None = None,
+    told: Callable[[float], str] = told_value,
 ) -> Curve:
     """Follow the curve through a solution until it leaves the range of the parameter or closes.
 
@@ -102,6 +103,8 @@ def continue_curve(
     direction : int
         +1 starts towards larger parameters, -1 towards smaller ones.
     options : StepOptions, optional
+    told : callable
+        The parameter as text with its name and unit, for messages.
 
     Returns
     -------
@@ -114,13 +117,15 @@ def continue_curve(
     ConvergenceError
         No solution near the start.
     """
-    curve = scaled_curve(evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options)
+    curve = scaled_curve(
+        evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, told=told
+    )
     first = start_point(curve, start, parameter, limits=limits, direction=direction)
     return collect(curve, first, limits=limits, options=options)
 
 
 def scaled_curve(
-    evaluate, start, parameter: float, *, limits, scale=1.0, unit=None, options=None
+    evaluate, start, parameter: float, *, limits, scale=1.0, unit=None, options=None, told=told_value
 ) -> ScaledCurve:
     """The equations with their scales, checked; arguments as for :func:`continue_curve`."""
     options = options or StepOptions()
@@ -129,7 +134,7 @@ def scaled_curve(
     scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
         raise CaseError("the scales of a curve must be positive", code="E-SCALE", limit="> 0")
-    curve = ScaledCurve(evaluate, scale, float(unit), options.tolerance, options.max_iterations)
+    curve = ScaledCurve(evaluate, scale, float(unit), options.tolerance, options.max_iterations, told=told)
     return _with_rows(curve, curve.scaled(start, parameter))
 
 
@@ -161,7 +166,7 @@ def start_point(curve: ScaledCurve, start, parameter: float, *, limits, directio
     """Corrected point at the parameter; the tangent goes with ``direction``."""
     if not limits[0] <= parameter <= limits[1]:
         raise CaseError(
-            f"the start at {parameter:.6g} lies outside the range", code="E-RANGE",
+            f"the start at {curve.told(parameter)} lies outside the range", code="E-RANGE",
             limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
         )  # fmt: skip
     axis = np.zeros(len(curve.scale) + 1)
@@ -170,7 +175,7 @@ def start_point(curve: ScaledCurve, start, parameter: float, *, limits, directio
         return correct(curve, curve.scaled(start, parameter), axis, along=np.sign(direction) * axis)
     except LostError as error:
         raise ConvergenceError(
-            f"no solution found near the start at {parameter:.6g}: {error}", code="E-START",
+            f"no solution found near the start at {curve.told(parameter)}: {error}", code="E-START",
             remedy="give a better start, or start away from a limit point",
         ) from error  # fmt: skip
 
@@ -206,7 +211,13 @@ def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options=None) -> C
 
 
 def switch_branch(
-    evaluate: Callable, known: Curve, index: int, *, limits, options: StepOptions | None = None
+    evaluate: Callable,
+    known: Curve,
+    index: int,
+    *,
+    limits,
+    options: StepOptions | None = None,
+    told: Callable[[float], str] = told_value,
 ) -> tuple[Curve, Curve]:
     """The curve that crosses a known one in a branch point, in both directions from there.
 
@@ -217,7 +228,7 @@ def switch_branch(
     known : Curve
     index : int
         Of the branch point among the points of the known curve, one of ``known.branch_points``.
-    limits, options
+    limits, options, told
         As for :func:`continue_curve`.
 
     Raises
@@ -235,7 +246,7 @@ def switch_branch(
     start = known.points[index]
     curve = scaled_curve(
         evaluate, start, known.parameter[index], limits=limits, scale=known.scale, unit=known.unit,
-        options=options,
+        options=options, told=told,
     )  # fmt: skip
     z = curve.scaled(start, known.parameter[index])
     _, derivative = curve.equations(z)
@@ -244,7 +255,7 @@ def switch_branch(
         tangent = crossing_tangent(curve, point)
     except LostError as error:
         raise ConvergenceError(
-            f"no other curve found at {known.parameter[index]:.6g}: {error}", code="E-BRANCH",
+            f"no other curve found at {told(float(known.parameter[index]))}: {error}", code="E-BRANCH",
             remedy="disturb the symmetry of the system a little",
         ) from error  # fmt: skip
     sides = (replace(point, tangent=sign * tangent) for sign in (1.0, -1.0))

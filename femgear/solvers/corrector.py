@@ -18,6 +18,11 @@ class LostError(Exception):
     """A correction that did not succeed; the reason is its text."""
 
 
+def told_value(parameter: float) -> str:
+    """A parameter without a name or a unit of its own, in words."""
+    return f"parameter = {parameter:.9g}"
+
+
 @dataclass(frozen=True)
 class ScaledCurve:
     """``F(u, parameter)`` in the unknowns ``z = (u / scale, parameter / unit)``.
@@ -35,6 +40,8 @@ class ScaledCurve:
     max_iterations : int
     rows : (n,) array or float
         Typical sizes of the rows of the scaled derivative, constant so that no singularity is divided away.
+    told : callable
+        Parameter -> text, for messages.
     """
 
     evaluate: Callable
@@ -43,6 +50,7 @@ class ScaledCurve:
     tolerance: float
     max_iterations: int
     rows: np.ndarray | float = 1.0
+    told: Callable[[float], str] = told_value
 
     def scaled(self, u, parameter: float) -> np.ndarray:
         """``z`` (n + 1,)."""

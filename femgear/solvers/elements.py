@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.solvers.entries import checked_numbers
 from femgear.solvers.series import FourierSeries, StepSeries, constant, series_of
 from femgear.system import MeshExcitation
 
@@ -82,7 +83,7 @@ class GearMeshes:
 
     def __post_init__(self):
         columns = _columns(self.columns, 1)
-        backlash = np.broadcast_to(np.asarray(self.backlash, float), len(columns)).copy()
+        backlash = np.broadcast_to(_numbers(self.backlash, "backlash", "E-BACKLASH"), len(columns)).copy()
         object.__setattr__(self, "columns", columns)
         object.__setattr__(self, "backlash", backlash)
         for name in ("deflection", "force"):
@@ -94,11 +95,13 @@ class GearMeshes:
                 f"backlash of {backlash.min():.4g} m", code="E-BACKLASH", limit="0 m or more, or infinite"
             )
         for name in ("stiffness", "deflection", "force"):
-            if len(getattr(self, name).mean) != len(columns):
+            series = getattr(self, name)
+            if not hasattr(series, "mean") or len(np.atleast_1d(series.mean)) != len(columns):
+                count = len(np.atleast_1d(series.mean)) if hasattr(series, "mean") else "no"
                 raise CaseError(
-                    f"{len(getattr(self, name).mean)} series of the mesh {name} for {len(columns)} meshes",
-                    code="E-SHAPE",
-                )
+                    f"{count} series of the mesh {name} for {len(columns)} meshes", code="E-SHAPE", key=name,
+                    remedy="give FourierSeries([[mean, ...], ...]) or StepSeries, one row a mesh",
+                )  # fmt: skip
         if self.separates:
             _check_pressing(self.stiffness)
 
@@ -186,7 +189,7 @@ class RadialBearings:
         columns = _columns(self.columns, 2)
         object.__setattr__(self, "columns", columns)
         for name in ("stiffness", "clearance"):
-            value = np.broadcast_to(np.asarray(getattr(self, name), float), len(columns)).copy()
+            value = np.broadcast_to(_numbers(getattr(self, name), name), len(columns)).copy()
             if not np.all(np.isfinite(value)) or np.any(value < 0.0):
                 raise CaseError(f"bearing {name} of {value.min():.4g}", code="E-BEARING", limit="0 or more")
             object.__setattr__(self, name, value)
@@ -256,7 +259,7 @@ class PolynomialSprings:
 
     def __post_init__(self):
         columns = _columns(self.columns, 1)
-        table = np.atleast_2d(np.array(self.coefficients, float))
+        table = np.atleast_2d(_numbers(self.coefficients, "coefficients"))
         if not np.all(np.isfinite(table)):
             raise CaseError(
                 f"coefficients {table.tolist()}", code="E-FINITE", key="coefficients", limit="finite numbers"
@@ -306,7 +309,7 @@ class PiecewiseSprings:
 
     def __post_init__(self):
         columns = _columns(self.columns, 1)
-        breaks, slopes = np.atleast_1d(np.array(self.breaks, float)), np.array(self.slopes, float)
+        breaks, slopes = np.atleast_1d(_numbers(self.breaks, "breaks")), _numbers(self.slopes, "slopes")
         if not (np.all(np.isfinite(breaks)) and np.all(np.isfinite(slopes))):
             raise CaseError(
                 f"breaks {breaks.tolist()} with slopes {slopes.tolist()}",
@@ -373,6 +376,12 @@ def _columns(columns, width: int) -> np.ndarray:
     return array
 
 
+def _numbers(value, key: str, code: str = "E-SHAPE") -> np.ndarray:
+    """A copy of the numbers, without text."""
+    return checked_numbers(value, key, code=code, unit="").copy()
+
+
 def _positive(name: str, value: float) -> None:
+    value = _numbers(value, name, "E-SMOOTHING")
     if not (np.isfinite(value) and value >= 0.0):
         raise CaseError(f"{name} of {value} m", code="E-SMOOTHING", limit="0 m or more")

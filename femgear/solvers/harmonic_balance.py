@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.solvers.entries import checked_count, checked_numbers, checked_tolerance
 from femgear.solvers.harmonic_equations import HarmonicBalance, harmonic_balance, reduced
 from femgear.solvers.harmonic_newton import embed, newton
 from femgear.solvers.hill import judged
@@ -78,11 +79,8 @@ def solve_harmonic_balance(
         problem, harmonics=harmonics, orders=orders, samples=samples, reduction=reduction
     )
     frequency = _checked_frequency(balance, frequency)
-    if not 0.0 < tolerance < 1.0 or max_iterations < 1:
-        raise CaseError(
-            f"tolerance {tolerance} and {max_iterations} iterations", code="E-TOLERANCE",
-            limit="between 0 and 1, at least one iteration",
-        )  # fmt: skip
+    tolerance = checked_tolerance(tolerance)
+    max_iterations = checked_count(max_iterations, "max_iterations", code="E-TOLERANCE")
     found = newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
     if start is None and not found.converged:
         found = embed(balance, frequency, found, tolerance, max_iterations)
@@ -103,7 +101,7 @@ def with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSo
 
 def _checked_frequency(balance: HarmonicBalance, frequency) -> np.ndarray:
     """Base frequencies (n_bases,), finite and not negative."""
-    frequency = np.atleast_1d(np.asarray(frequency, float))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
     if frequency.shape != balance.orders.shape[1:]:
         raise CaseError(
             f"{frequency.size} base frequencies for lines of {balance.orders.shape[1]}", code="E-FREQUENCY"
@@ -154,7 +152,11 @@ def adapt_harmonics(
     PeriodicSolution
         The message says when the largest number did not suffice, and where it did not converge.
     """
-    if not 0.0 < tail < 1.0 or not 3 <= harmonics <= max_harmonics:
+    harmonics = checked_count(harmonics, "harmonics", code="E-HARMONICS")
+    max_harmonics = checked_count(max_harmonics, "max_harmonics", code="E-HARMONICS")
+    if not 0.0 < checked_numbers(tail, "tail", code="E-HARMONICS", unit="") < 1.0 or not (
+        3 <= harmonics <= max_harmonics
+    ):
         raise CaseError(
             f"tail {tail} with {harmonics} to {max_harmonics} harmonics", code="E-HARMONICS",
             limit="a tail between 0 and 1, at least three harmonics",
@@ -221,7 +223,7 @@ def _start(balance: HarmonicBalance, frequency, start) -> np.ndarray:
             elif mirror in known:
                 lines[:, number] = start.deflection[:, known[mirror]].conj()
     else:
-        lines = np.asarray(start, complex)
+        lines = checked_numbers(start, "start", code="E-START", unit="m", kind=complex)
     if lines.shape != shape or not np.all(np.isfinite(lines)):
         raise CaseError(
             f"a start of shape {lines.shape}", code="E-START", limit=f"finite lines of shape {shape}"

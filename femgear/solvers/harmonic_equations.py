@@ -22,7 +22,9 @@ from femgear.solvers.aft import (
     sample_counts,
 )
 from femgear.solvers.elements import Element
+from femgear.solvers.entries import checked_count
 from femgear.solvers.lines import checked_lines, harmonic_lines, line_tail
+from femgear.solvers.mean_load import relative_residual, uncarried_note
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.receptance import Reduction, reduce_problem, source_columns
@@ -68,6 +70,8 @@ class HarmonicBalance:
         Amplitudes of the load columns of the reduction.
     scale : float
         Typical deflection [m]: the largest static one, or a length of the elements where there is none.
+    longest : float
+        Largest length that an element names [m].
     """
 
     problem: NonlinearSystem
@@ -78,6 +82,7 @@ class HarmonicBalance:
     pairs: np.ndarray
     source: np.ndarray
     scale: float
+    longest: float
 
     @property
     def size(self) -> int:
@@ -191,13 +196,23 @@ class HarmonicBalance:
             receptance = self.receptance(frequency)[0]
         if "residual" not in what_happened:
             error = self.unknowns(self.residual(lines, forces, receptance))
-            what_happened["residual"] = relative_residual(error, y, self.scale)
+            what_happened["residual"] = relative_residual(self, error, y)
         if radius:
             many = self.size > MANY
             what_happened["spectral_radius"] = (
                 self.spectral_radius(y, frequency) if many else self._radius(forces, receptance)
             )
         told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
+        note = uncarried_note(
+            self,
+            lines,
+            lambda: self.residual(lines, forces, self.receptance(frequency)[0]),
+            told["converged"],
+        )
+        if note:
+            # the whole mean load is out of balance, whatever its ratio to a deflection that runs away
+            told |= {"converged": False, "message": f"Not converged: {note}."}
+            told["residual"] = max(told["residual"], 1.0)
         force = forces.lines + self.reduction.reference[:, None] * lines
         return PeriodicSolution(
             frequency, self.orders, lines, force, tail=line_tail(lines, self.orders), **told
@@ -241,6 +256,7 @@ def harmonic_balance(
     if (harmonics is None) == (orders is None):
         raise CaseError("give the number of harmonics or the lines", code="E-LINES", limit="one of the two")
     if orders is None:
+        harmonics = checked_count(harmonics, "harmonics", code="E-HARMONICS", least=0)
         _check_harmonics(problem, harmonics)
         orders = harmonic_lines(harmonics, problem.bases)
     orders = checked_lines(orders)
@@ -261,8 +277,10 @@ def harmonic_balance(
     source = source_columns(problem, orders)
     grid = phase_grid(orders, samples or sample_counts(problem, orders))
     elements = tuple(on_grid(element, grid.theta) for element in problem.elements)
-    scale = _typical_deflection(problem, reduction, source)
-    return HarmonicBalance(problem, orders, reduction, grid, elements, coupled_pairs(elements), source, scale)
+    longest = _longest(problem)
+    scale = _typical_deflection(reduction, source) or longest or 1.0
+    pairs = coupled_pairs(elements)
+    return HarmonicBalance(problem, orders, reduction, grid, elements, pairs, source, scale, longest)
 
 
 def reduced(problem: NonlinearSystem) -> Reduction:
@@ -281,14 +299,14 @@ def reduced(problem: NonlinearSystem) -> Reduction:
         if error.code != "E-RIGID-MODE" or total[column] > _NO_STIFFNESS * total.max():
             raise
         raise ConvergenceError(
-            f"{_element_name(problem, column)} has no linear stiffness, and nothing else holds the motion "
+            f"{element_name(problem, column)} has no linear stiffness, and nothing else holds the motion "
             "that strains it", code="E-RIGID-MODE", limit="a stiffness at rest, or a reference in its place",
             remedy="where it stiffens with the deflection pass reduction=reduce_problem(problem, "
             "reference=stiffness of every column at the expected amplitude [N/m]); else give it a stiffness",
         ) from error  # fmt: skip
 
 
-def _element_name(problem: NonlinearSystem, column: int) -> str:
+def element_name(problem: NonlinearSystem, column: int) -> str:
     """Kind and number of the first element on a column: "bearing 1"."""
     kinds = {"GearMeshes": "mesh", "RadialBearings": "bearing", "PolynomialSprings": "spring"}
     count: dict[str, int] = {}
@@ -313,16 +331,18 @@ def _check_harmonics(problem: NonlinearSystem, harmonics: int) -> None:
             )  # fmt: skip
 
 
-def _typical_deflection(problem, reduction, source) -> float:
-    """Largest static deflection; else the largest length that an element names; else one metre."""
+def _typical_deflection(reduction, source) -> float:
+    """Largest static deflection [m] under the loads; zero without them."""
     loads = reduction.static[:, len(reduction.reference) :]
-    static = np.abs(loads @ source).max(initial=0.0)
-    if static > 0.0:
-        return float(static)
+    return float(np.abs(loads @ source).max(initial=0.0))
+
+
+def _longest(problem) -> float:
+    """Largest finite length that an element names [m]; zero without one."""
     names = ("backlash", "clearance", "breaks", "smoothing")
     lengths = [np.ravel(getattr(e, name)) for e in problem.elements for name in names if hasattr(e, name)]
     sizes = np.abs(np.concatenate([*lengths, np.zeros(1)]))
-    return float(sizes[np.isfinite(sizes)].max()) or 1.0
+    return float(sizes[np.isfinite(sizes)].max())
 
 
 def largest_modulus(matrix: np.ndarray) -> float:
@@ -341,8 +361,3 @@ def largest_modulus(matrix: np.ndarray) -> float:
     except linalg.ArpackError:
         values = np.linalg.eigvals(matrix)
     return float(np.abs(values).max())
-
-
-def relative_residual(error, y, scale) -> float:
-    """Largest violation relative to the largest deflection."""
-    return float(np.abs(error).max() / max(np.abs(y).max(), 1e-9 * scale))

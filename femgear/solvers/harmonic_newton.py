@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.solvers.harmonic_equations import MANY, HarmonicBalance, relative_residual
+from femgear.solvers.harmonic_equations import MANY, HarmonicBalance
 from femgear.solvers.harmonic_krylov import LineTangent, linearised
+from femgear.solvers.mean_load import relative_residual
 from femgear.solvers.periodic import PeriodicSolution
 
 # Shortest step of the line search and the decrease that it asks for (Dennis and Schnabel, 1983, 6.3); full
@@ -22,7 +23,7 @@ def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterati
     receptance = balance.receptance(frequency)[0]
     evaluate = linearised if balance.size > MANY else _with_matrix
     error, tangent = evaluate(balance, receptance, y)
-    history, trouble, forced = [relative_residual(error, y, balance.scale)], "", 0
+    history, trouble, forced = [relative_residual(balance, error, y)], "", 0
     while not history[-1] <= tolerance and len(history) <= max_iterations:
         try:
             step = -_newton_step(balance, receptance, y, error, tangent)
@@ -42,7 +43,7 @@ def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterati
                 break
             trial, tangent = evaluate(balance, receptance, y + step)
         y, error = y + share * step, trial
-        history.append(relative_residual(error, y, balance.scale))
+        history.append(relative_residual(balance, error, y))
     converged, steps = bool(history[-1] <= tolerance), len(history) - 1 + bool(trouble)
     return balance.solution(
         y, frequency, converged=converged, residual=history[-1], iterations=steps, factorisations=steps,

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.entries import checked_numbers, checked_tolerance
 from femgear.solvers.floquet import monodromy
 from femgear.solvers.nonlinear import NonlinearSystem, element_forces
 from femgear.solvers.periodic import PeriodicSolution
@@ -81,19 +82,20 @@ def floquet_verdicts(
     Raises
     ------
     CaseError
-        An unknown method.
+        An unknown method, a tolerance that is not between 0 and 1 (E-TOLERANCE).
     ConvergenceError
         Modes left out that are too flexible.
 
     Notes
     -----
-    Free motions that no element and no damping feels (rotation of a free train) have the multiplier one and
-    are left out.
+    The position of a free motion (rotation of a free train) has the multiplier one and is left out; so is
+    its velocity where no damping feels it. Where one does, its multiplier ``exp(-c period)`` counts.
     """
     if method not in ("monodromy", "hill"):
         raise CaseError(
             f"stability by {method!r}", code="E-METHOD", key="method", limit='"monodromy" or "hill"'
         )
+    tolerance = checked_tolerance(tolerance)
     frame = frame_of(problem, modes=modes)
     out = [_not_covered(solution) or _too_long(frame, solution) for solution in solutions]
     covered = [i for i, verdict in enumerate(out) if verdict is None]
@@ -159,7 +161,7 @@ def require_period(frequency) -> None:
     CaseError
         The only base frequency is zero (E-FREQUENCY).
     """
-    frequency = np.atleast_1d(np.asarray(frequency, float))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
     if frequency.size == 1 and frequency.ravel()[0] == 0.0:
         raise CaseError(
             "stability needs a period, and the base frequency is zero", code="E-FREQUENCY", key="frequency",
@@ -200,7 +202,7 @@ def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[Fl
         )  # fmt: skip
         values = np.linalg.eigvals(moved.matrix)
         for i, multipliers, error in zip(rest, values, moved.error):
-            out[i] = verdict_of(multipliers, period[i], "splitting", float(error), tolerance)
+            out[i] = verdict_of(multipliers, period[i], "splitting", float(error), tolerance, **_free(frame))
     return out
 
 
@@ -232,7 +234,7 @@ def _exact_verdict(frame: Frame, period: float, inner, pieces) -> FloquetVerdict
     both = np.concatenate([np.ones(len(frame.square)), np.full(len(frame.square), unit)])
     matrices = frame.state_matrices(frame.kappa(pieces)) * both / both[:, None]
     multipliers = np.linalg.eigvals(monodromy(matrices, durations))
-    return verdict_of(multipliers, period, "exact exponentials", 0.0, np.inf)
+    return verdict_of(multipliers, period, "exact exponentials", 0.0, np.inf, **_free(frame))
 
 
 def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int | None) -> FloquetVerdict:
@@ -245,7 +247,12 @@ def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int |
     kappa = frame.kappa(tangents_of(problem, [solution])(fraction, np.array([0]))[0])
     exponents = hill_exponents(frame, kappa, omega, harmonics=count)
     period = 2.0 * np.pi / omega
-    return verdict_of(np.exp(exponents * period), period, "Hill", np.nan, np.inf)
+    return verdict_of(np.exp(exponents * period), period, "Hill", np.nan, np.inf, **_free(frame))
+
+
+def _free(frame: Frame) -> dict:
+    """What the verdict has to know of free motions."""
+    return {"positions": frame.positions, "velocities": frame.positions, "drift": frame.drift}
 
 
 def hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:

@@ -82,7 +82,8 @@ def verdict_of_monodromy(
     """Verdict of a monodromy matrix in (q, v / rate).
 
     Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
-    rounding splits; they are left out (as `hill.floquet_verdicts` does).
+    rounding splits; they are left out (as `hill.floquet_verdicts` does). Of those that damping feels the
+    position has the multiplier one and is left out, the velocity counts.
 
     Parameters
     ----------
@@ -95,18 +96,22 @@ def verdict_of_monodromy(
     trivial : int
         Multipliers one of a free vibration, its phase and its amplitude, which are left out too.
     """
-    values = np.linalg.eigvals(_without_free_motions(problem, monodromy))
-    if trivial:
-        values = values[np.argsort(np.abs(values - 1.0), kind="stable")[trivial:]]
-    found = verdict_of(values, period, "shooting", error, np.inf)
+    matrix, positions = _without_free_motions(problem, monodromy)
+    values = np.linalg.eigvals(matrix)
+    found = verdict_of(
+        values, period, "shooting", error, np.inf, positions=trivial + positions, velocities=positions
+    )
     if trivial:
         note = f", without {trivial} of phase{' and amplitude' if trivial > 1 else ''} that are one"
         found = replace(found, message=found.message + note)
     return found
 
 
-def _without_free_motions(problem: NonlinearSystem, monodromy: np.ndarray) -> np.ndarray:
-    """The monodromy matrix on the motions that are orthogonal in mass to those that nothing feels."""
+def _without_free_motions(problem: NonlinearSystem, monodromy: np.ndarray) -> tuple[np.ndarray, int]:
+    """The monodromy matrix on the motions that are orthogonal in mass to those that nothing feels.
+
+    With it the number of free motions left in it, whose velocities damping feels.
+    """
     from scipy import linalg
 
     system, n = problem.system, len(problem.system.M)
@@ -117,13 +122,16 @@ def _without_free_motions(problem: NonlinearSystem, monodromy: np.ndarray) -> np
         rows = linalg.solve_triangular(root, rows.T, lower=True).T
         return rows / (np.abs(rows).max(initial=0.0) or 1.0)
 
-    felt = [system.K, system.K.T, problem.damping, problem.damping.T, system.W.T]
-    _, size, right = np.linalg.svd(np.vstack([carried(rows) for rows in felt]))
+    held = np.vstack([carried(rows) for rows in (system.K, system.W.T)])
+    damped = [carried(rows) for rows in (system.K.T, problem.damping, problem.damping.T)]
+    _, size, right = np.linalg.svd(np.vstack([held, *damped]))
     rank = int(np.sum(size > _FREE * size[0])) if len(size) else 0
+    size = np.linalg.svd(held, compute_uv=False)
+    positions = rank - int(np.sum(size > _FREE * size.max(initial=0.0)))
     if rank == n:
-        return monodromy
+        return monodromy, positions
     moving = right[:rank]
     # q = L^-T z and z = L^T q with M = L L^T; the moving part of z is closed in itself
     back = linalg.solve_triangular(root, moving.T, lower=True, trans="T")
     there, here = np.kron(np.eye(2), moving @ root.T), np.kron(np.eye(2), back)
-    return there @ monodromy @ here
+    return there @ monodromy @ here, positions

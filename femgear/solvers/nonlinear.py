@@ -8,6 +8,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.elements import Element
+from femgear.solvers.entries import checked_numbers
 from femgear.solvers.series import phase_of
 from femgear.system import MechanicalSystem
 
@@ -28,7 +29,7 @@ class HarmonicForce:
     orders: tuple[int, ...] = (1,)
 
     def __post_init__(self):
-        force = np.array(self.force, complex)
+        force = checked_numbers(self.force, "force", code="E-SHAPE", unit="N", kind=complex).copy()
         force.setflags(write=False)
         object.__setattr__(self, "force", force)
 
@@ -103,7 +104,7 @@ def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
     CaseError
         Not a list of finite numbers, or one too long (E-FREQUENCY).
     """
-    frequency = np.atleast_1d(np.asarray(frequency, float))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
     if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
         raise CaseError("base frequencies must be finite numbers", code="E-FREQUENCY", key="frequency")
     if len(frequency) > problem.bases:

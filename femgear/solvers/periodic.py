@@ -29,7 +29,8 @@ class PeriodicSolution:
         Forces of the elements [N].
     converged : bool
     residual : float
-        Largest violation of the harmonic equations relative to the largest deflection.
+        Largest violation of the harmonic equations relative to the largest deflection, of which a mean that
+        runs away counts up to a million times the static one; one where nothing carries the mean load.
     iterations : int
     factorisations : int
         Matrices factorised on the way.

@@ -12,8 +12,9 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.adaptive import flow, trajectory
+from femgear.solvers.entries import checked_numbers, checked_tolerance
 from femgear.solvers.initial_state import checked_start, motion_scale
-from femgear.solvers.nonlinear import NonlinearSystem
+from femgear.solvers.nonlinear import NonlinearSystem, checked_bases
 from femgear.solvers.strobe import strobe
 
 # Instants inside a step of the integrator at which crossings are looked for.
@@ -157,7 +158,8 @@ def surface_section(
         As for `solve_transient`.
     """
     n = len(problem.system.M)
-    row = np.asarray(row, float)
+    row = checked_numbers(row, "row", code="E-SECTION", unit="")
+    tolerance, frequency = checked_tolerance(tolerance), checked_bases(problem, frequency)
     if row.shape != (2 * n,) or direction not in (-1, 0, 1) or not 0.0 <= begin < end:
         raise CaseError(
             f"a section by {row.shape} numbers in direction {direction}", code="E-SECTION",
@@ -208,7 +210,8 @@ def bifurcation_diagram(
     CaseError
         No values or some that are not finite (E-VALUES), a start that does not fit (E-START).
     """
-    parameters = np.atleast_1d(np.asarray(parameters, float))
+    tolerance = checked_tolerance(tolerance)
+    parameters = np.atleast_1d(checked_numbers(parameters, "parameters", code="E-VALUES", unit=""))
     if parameters.ndim != 1 or not len(parameters) or not np.all(np.isfinite(parameters)):
         raise CaseError(
             f"a bifurcation diagram over parameters of shape {parameters.shape}", code="E-VALUES",

@@ -154,7 +154,11 @@ def _modes_with_loads(problem, reference, count, max_frequency) -> tuple[Mechani
         problem.system, C=np.zeros_like(problem.system.C), gyroscopic=None,
         load=problem.system.load + sum(steady),
     )  # fmt: skip
-    modes = solve_modes(bare, reference, damping_ratio=0.0, count=count, max_frequency=max_frequency)
+    try:
+        modes = solve_modes(bare, reference, damping_ratio=0.0, count=count, max_frequency=max_frequency)
+    except ConvergenceError as error:
+        _tell_of_the_speed(problem, error)
+        raise
     loads = [bare.load]
     for force in problem.forces:
         loads += [force.force.real, force.force.imag]
@@ -164,6 +168,17 @@ def _modes_with_loads(problem, reference, count, max_frequency) -> tuple[Mechani
     rows[: len(reference) + 1, modes.frequency == 0.0] = 0.0
     stiffness = np.concatenate([reference, np.zeros(len(loads))])
     return system, replace(modes, mesh_stiffness=stiffness, mesh_deflection=rows)
+
+
+def _tell_of_the_speed(problem: NonlinearSystem, error: ConvergenceError) -> None:
+    """Raise a negative stiffness again with a remedy for systems that turn: K may hold centripetal terms."""
+    if error.code != "E-STIFFNESS" or problem.system.gyroscopic is None:
+        return
+    raise ConvergenceError(
+        error.message + ", in a system that turns", code=error.code,
+        remedy="where K holds centripetal terms (-speed^2) the speed is above a critical one: lower the "
+        "speed or leave those terms out; else check the signs of supports, couplings and mesh directions",
+    ) from error  # fmt: skip
 
 
 def respond(reduction: Reduction, outputs, omega, inputs) -> np.ndarray:

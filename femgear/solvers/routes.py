@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from femgear.solvers.corrector import told_value
 from femgear.solvers.harmonic_balance import HarmonicBalance, harmonic_balance, solve_harmonic_balance
 from femgear.solvers.hill import judged
 from femgear.solvers.lines import coincidence_note
@@ -23,6 +24,8 @@ class Route(Protocol):
 
     @property
     def scale(self) -> float: ...
+
+    def told(self, parameter: float) -> str: ...
 
     def evaluate(self, y, parameter: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
 
@@ -50,6 +53,10 @@ class FrequencyRoute:
     def scale(self) -> float:
         """Typical deflection [m]."""
         return self.balance.scale
+
+    def told(self, parameter: float) -> str:
+        """The varied frequency in words."""
+        return f"frequency {parameter:.6g} rad/s ({parameter / (2.0 * np.pi):.6g} Hz)"
 
     def frequency(self, parameter: float) -> np.ndarray:
         """All base frequencies (n_bases,) [rad/s]."""
@@ -102,6 +109,10 @@ class FamilyRoute:
     def scale(self) -> float:
         """Typical deflection [m], the larger one of both ends."""
         return max(self.balance_at(parameter).scale for parameter in self.limits)
+
+    def told(self, parameter: float) -> str:
+        """The parameter in words."""
+        return told_value(parameter)
 
     def balance_at(self, parameter: float) -> HarmonicBalance:
         """The equations; modes are computed again only where masses, stiffnesses or loads change."""

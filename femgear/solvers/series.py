@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.solvers.entries import checked_numbers
 from femgear.solvers.harmonics import harmonics_of
 
 
@@ -26,7 +27,13 @@ class FourierSeries:
     orders: tuple[int, ...] = (1,)
 
     def __post_init__(self):
-        amplitudes = np.atleast_2d(np.array(self.amplitudes, complex))
+        given = checked_numbers(self.amplitudes, "amplitudes", code="E-SHAPE", unit="", kind=complex)
+        amplitudes = np.atleast_2d(given.copy())
+        if amplitudes.ndim != 2 or not amplitudes.size:
+            raise CaseError(
+                f"amplitudes of shape {amplitudes.shape}", code="E-SHAPE", key="amplitudes",
+                limit="one row of harmonics a coefficient",
+            )  # fmt: skip
         if not np.all(np.isfinite(amplitudes)):
             raise CaseError("a Fourier series holds numbers that are not finite", code="E-FINITE")
         amplitudes.setflags(write=False)
@@ -64,17 +71,21 @@ class StepSeries:
     orders: tuple[int, ...] = (1,)
 
     def __post_init__(self):
-        values, breaks = np.atleast_2d(np.array(self.values, float)), np.array(self.breaks, float)
-        if (
-            values.shape[1] != len(breaks)
-            or breaks[0] != 0.0
-            or np.any(np.diff(breaks) <= 0)
-            or breaks[-1] >= 1
-        ):
+        values, breaks = (
+            checked_numbers(getattr(self, name), name, code="E-SHAPE", unit="").copy()
+            for name in ("values", "breaks")
+        )
+        values = np.atleast_2d(values)
+        fits = values.ndim == 2 and breaks.ndim == 1 and len(breaks) == values.shape[1] > 0
+        if not fits or breaks[0] != 0.0 or not np.all(np.diff(breaks) > 0.0) or not breaks[-1] < 1.0:
             raise CaseError(
-                f"{values.shape[1]} values with breaks {breaks.tolist()}", code="E-SHAPE",
+                f"values of shape {values.shape} with breaks {breaks.tolist()}", code="E-SHAPE", key="breaks",
                 limit="one value a break; breaks ascend from 0 to below 1",
+                remedy="values come first, one row a coefficient, then the fractions of the period at which "
+                "they start, such as StepSeries([[1.0, 2.0]], [0.0, 0.5])",
             )  # fmt: skip
+        if not np.all(np.isfinite(values)):
+            raise CaseError("a step series holds numbers that are not finite", code="E-FINITE", key="values")
         for name, array in (("values", values), ("breaks", breaks)):
             array.setflags(write=False)
             object.__setattr__(self, name, array)

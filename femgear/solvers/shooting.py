@@ -15,6 +15,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.adaptive import Flow, flow, trajectory
+from femgear.solvers.entries import checked_count, checked_numbers, checked_tolerance
 from femgear.solvers.harmonics import harmonics_of
 from femgear.solvers.initial_state import checked_start, motion_scale
 from femgear.solvers.lines import line_tail
@@ -133,15 +134,16 @@ def solve_shooting(
     ------
     CaseError
         Frequencies without the common period or more of them than the problem has (E-FREQUENCY), numbers
-        out of range, a start that does not fit (E-START).
+        out of range (tolerances: E-TOLERANCE), a start that does not fit (E-START).
     """
     frequency = checked_bases(problem, frequency)
+    tolerance, integration = checked_tolerance(tolerance), checked_tolerance(integration, "integration")
+    max_iterations = checked_count(max_iterations, "max_iterations", code="E-TOLERANCE")
     period = common_period(frequency, periods)
-    if segments < 1 or harmonics < 1 or samples < 4 * harmonics:
-        raise CaseError(
-            f"{segments} segments, {harmonics} harmonics, {samples} samples", code="E-SHOOTING",
-            limit="a segment and a harmonic or more, four samples a harmonic or more",
-        )  # fmt: skip
+    segments = checked_count(segments, "segments", code="E-SHOOTING")
+    if harmonics < 1 or samples < 4 * harmonics:
+        limit = "a harmonic or more, four samples a harmonic or more"
+        raise CaseError(f"{harmonics} harmonics, {samples} samples", code="E-SHOOTING", limit=limit)
     start = checked_start(problem, _settled(problem, frequency, period, settle) if start is None else start)
     moving = flow(problem, frequency, variational=True)
     unknowns = _guess(moving, start, period, segments, integration, events)
@@ -150,7 +152,7 @@ def solve_shooting(
     for _ in range(max_iterations + 1):
         ends, maps = _shoot(moving, unknowns, period, options)
         defect = ends - np.roll(unknowns, -1, axis=0)
-        size = max(_size(moving, unknowns), np.finfo(float).tiny)
+        size = max(_size(unknowns), np.finfo(float).tiny)
         history.append(float(np.abs(defect).max() / size))
         if history[-1] <= tolerance or len(history) > max_iterations:
             break
@@ -205,6 +207,8 @@ def solve_free_vibration(
     CaseError
         Forces, a period or a ``fixed`` out of range (E-SHOOTING), a start that does not fit (E-START).
     """
+    tolerance, integration = checked_tolerance(tolerance), checked_tolerance(integration, "integration")
+    period = checked_numbers(period, "period", code="E-SHOOTING", unit="s").item()
     if problem.forces or not (np.isfinite(period) and period > 0.0):
         raise CaseError(
             f"free vibration with {len(problem.forces)} harmonic forces and a period of {period} s",
@@ -212,9 +216,8 @@ def solve_free_vibration(
         )  # fmt: skip
     n = len(problem.system.M)
     if not 0 <= fixed < n:
-        raise CaseError(
-            f"degree of freedom {fixed} fixed", code="E-SHOOTING", key="fixed", limit=f"0 to {n - 1}"
-        )
+        told = f"degree of freedom {fixed} fixed"
+        raise CaseError(told, code="E-SHOOTING", key="fixed", limit=f"0 to {n - 1}")
     if start is None:
         raise CaseError(
             "a free vibration without a start", code="E-START", key="start",
@@ -229,7 +232,7 @@ def solve_free_vibration(
     for _ in range(max_iterations + 1):
         ends, maps = _shoot(moving, y[None], period, options)
         defect = ends[0] - y
-        history.append(float(np.abs(defect).max() / _size(moving, y[None])))
+        history.append(float(np.abs(defect).max() / _size(y)))
         if history[-1] <= tolerance or len(history) > max_iterations:
             break
         slope = _derivative(moving, ends[0], period)
@@ -331,8 +334,8 @@ def _closer(moving: Flow, y, period, free, update, before, options):
     return tried, longer
 
 
-def _size(moving: Flow, unknowns) -> float:
-    return float(np.abs(unknowns).max())
+def _size(state) -> float:
+    return float(np.abs(state).max())
 
 
 def _derivative(moving: Flow, y, time):

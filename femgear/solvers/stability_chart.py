@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.entries import checked_numbers, checked_tolerance
 from femgear.solvers.hill import loss_of
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.series import FourierSeries, StepSeries, series_of
@@ -83,7 +84,9 @@ def stability_chart(
     ConvergenceError
         Modes left out of a modal basis are too flexible.
     """
-    frequency, depth = np.atleast_1d(np.asarray(frequency, float)), np.atleast_1d(np.asarray(depth, float))
+    tolerance = checked_tolerance(tolerance)
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    depth = np.atleast_1d(checked_numbers(depth, "depth", code="E-CHART", unit=""))
     frame, series, breaks = _prepared(system, stiffness, harmonics)
     f, d = (grid.ravel() for grid in np.meshgrid(frequency, depth, indexing="ij"))
     multiplier, error = _largest(frame, series, breaks, f, d, tolerance)
@@ -127,6 +130,7 @@ def stability_boundary(
 
     if (frequency is None) == (depth is None):
         raise CaseError("hold the frequency or the depth", code="E-CHART", limit="exactly one of the two")
+    tolerance = checked_tolerance(tolerance)
     frame, series, breaks = _prepared(system, stiffness, harmonics)
 
     def growth(value: float) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.entries import checked_count, checked_numbers
 from femgear.solvers.initial_state import checked_start
 from femgear.solvers.marching import Law, Marched, march
 from femgear.solvers.nonlinear import NonlinearSystem
@@ -81,7 +82,7 @@ def strobe(
     """
     from femgear.solvers.tabulated import tabulated_law
 
-    frequency = np.atleast_1d(np.asarray(frequency, float))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
     period = common_period(frequency, periods)
     if not 4 <= steps <= _MOST_STEPS:
         raise CaseError(f"{steps} steps in a period", code="E-STEP", key="steps", limit=f"4 to {_MOST_STEPS}")
@@ -96,7 +97,8 @@ def strobe(
 
 def common_period(frequency, periods: int) -> float:
     """``periods`` periods of the first base frequency [s]; all others must repeat then."""
-    if periods < 1 or not np.all(np.isfinite(frequency)) or not frequency[0] > 0.0:
+    periods = checked_count(periods, "periods", code="E-FREQUENCY")
+    if not np.all(np.isfinite(frequency)) or not frequency[0] > 0.0:
         raise CaseError(
             f"{periods} periods of {frequency.tolist()} rad/s", code="E-FREQUENCY", key="frequency",
             limit="one period or more of a positive frequency",

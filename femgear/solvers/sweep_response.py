@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.solvers.entries import checked_count, checked_numbers, checked_tolerance
 from femgear.solvers.harmonics import harmonics_of
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.strobe import Strobe, strobe
@@ -93,11 +94,14 @@ def sweep_response(
     Raises
     ------
     CaseError
-        No frequencies or some that are not positive, numbers out of range, a start that does not fit.
+        No frequencies or some that are not positive, numbers out of range (E-TOLERANCE: a tolerance that is
+        not between 0 and 1), a start that does not fit.
     ConvergenceError
         A step whose column equations do not converge.
     """
-    frequencies = np.atleast_1d(np.asarray(frequencies, float))
+    tolerance = checked_tolerance(tolerance)
+    checked_count(harmonics, "harmonics", code="E-HARMONICS", least=0)
+    frequencies = np.atleast_1d(checked_numbers(frequencies, "frequencies", code="E-FREQUENCY", unit="rad/s"))
     valid = frequencies.ndim == 1 and len(frequencies) and np.all(np.isfinite(frequencies))
     if not valid or np.any(frequencies <= 0.0) or not 1 <= least <= most:
         raise CaseError(
@@ -121,7 +125,8 @@ def sweep_response(
 
 def sweep_up_and_down(problem, frequencies, **options) -> tuple[SweepResponse, SweepResponse]:
     """A sweep over ascending frequencies and, from its end, back; arguments as for `sweep_response`."""
-    frequencies = np.sort(np.asarray(frequencies, float))
+    given = checked_numbers(frequencies, "frequencies", code="E-FREQUENCY", unit="rad/s")
+    frequencies = np.sort(np.atleast_1d(given))
     up = sweep_response(problem, frequencies, **options)
     options["start"] = up.displacement[-1], up.velocity[-1]
     return up, sweep_response(problem, frequencies[::-1], **options)

@@ -10,6 +10,7 @@ from femgear.errors import CaseError
 from femgear.solvers import adaptive
 from femgear.solvers.drift import drift_note
 from femgear.solvers.elements import GearMeshes, PiecewiseSprings
+from femgear.solvers.entries import checked_numbers, checked_tolerance
 from femgear.solvers.initial_state import checked_start, motion_scale
 from femgear.solvers.marching import march_times
 from femgear.solvers.modal_steps import modal_scheme
@@ -144,6 +145,8 @@ def solve_transient(
         A mass matrix that is not positive definite, an adaptive integrator that gives up.
     """
     times = _checked_times(times)
+    if tolerance is not None:
+        tolerance = checked_tolerance(tolerance)
     q, v = checked_start(problem, start)
     frequency = checked_bases(problem, frequency)
     if method in adaptive.METHODS:
@@ -220,6 +223,7 @@ def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
     if step is None:
         fastest = max(highest, np.abs(frequency).max(initial=0.0))
         step = 2.0 * np.pi / fastest / _STEPS_A_PERIOD if fastest else span / 100.0
+    step = checked_numbers(step, "step", code="E-STEP", unit="s").item()
     if not (np.isfinite(step) and step > 0.0):
         raise CaseError(f"a time step of {step} s", code="E-STEP", key="step", limit="above 0 s")
     number = max(1, int(np.ceil(span / step * (1.0 - 1e-12))))
@@ -367,7 +371,7 @@ def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
 
 
 def _checked_times(times) -> np.ndarray:
-    times = np.array(times, float)
+    times = checked_numbers(times, "times", code="E-TIMES", unit="s").copy()
     if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
         raise CaseError(
             "instants must be finite and ascend", code="E-TIMES", key="times", limit="two instants or more"

@@ -7,7 +7,7 @@ states at once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,6 +23,8 @@ _MOST_HALVED = 320_000
 # Eigenvalues this small relative to the largest one, and rows relative to theirs, are zero.
 _RIGID = 1e-11
 _UNMOVED = 1e-9
+# Damping of a free motion, relative to the largest entry, that is rounding.
+_UNDAMPED = 1e-10
 # Distances of the Gauss points from the middle of a step of unit length.
 _GAUSS = 0.5 / np.sqrt(3.0)
 
@@ -43,6 +45,12 @@ class Frame:
         Stiffness of the columns that the modes contain [N/m].
     residual : (n_c, n_c) array
         Static flexibility of the modes left out [m/N].
+    positions : int
+        Modes kept whose position nothing feels, their velocity a damping that couples them to others; each
+        has one multiplier one.
+    drift : (r,) array
+        Decay of the velocities of free motions left out that a damping of their own slows down, or drives
+        where it is negative [1/s].
     """
 
     square: np.ndarray
@@ -50,6 +58,8 @@ class Frame:
     rows: np.ndarray
     reference: np.ndarray
     residual: np.ndarray
+    positions: int = 0
+    drift: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def diagonal(self) -> bool:
@@ -92,7 +102,8 @@ class Frame:
 def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
     """Modes of a problem about its reference stiffness, lowest first.
 
-    Free motions that no column and no damping feels are left out; their multipliers are one.
+    Free motions that no column and no coupling of the damping feels are left out: the multipliers of their
+    positions are one, those of their velocities follow from `Frame.drift`.
 
     Parameters
     ----------
@@ -114,13 +125,18 @@ def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
     rows, damping = system.W.T @ shape, shape.T @ problem.damping @ shape
     square = np.where(np.abs(square) <= _RIGID * np.abs(square).max(), 0.0, square)
     felt = np.abs(rows).max(axis=0, initial=0.0) > _UNMOVED * np.abs(rows).max(initial=0.0)
-    coupled = np.abs(damping - np.diag(np.diag(damping))).max(axis=0) > 1e-12 * np.abs(damping).max()
+    shared = np.abs(damping - np.diag(np.diag(damping))).max(axis=0)
+    # the rounding of a free motion is no damping
+    coupled = shared > np.where((square != 0.0) | felt, 1e-12, _UNDAMPED) * np.abs(damping).max()
     moving = (square != 0.0) | felt | coupled
+    positions = int(np.count_nonzero(coupled & (square == 0.0) & ~felt))
+    rates = np.diag(damping)
+    drift = rates[~moving & (np.abs(rates) > _UNDAMPED * np.abs(damping).max())]
     square, rows, damping = square[moving], rows[:, moving], damping[np.ix_(moving, moving)]
     residual = np.zeros((len(rows), len(rows)))
     if not all_modes:
         residual = _residual(problem, stiffness, shape[:, ~moving], rows, square)
-    return Frame(square, damping, rows, reference, residual)
+    return Frame(square, damping, rows, reference, residual, positions, drift)
 
 
 def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:

@@ -10,6 +10,8 @@ import numpy as np
 _CIRCLE = 1e-6
 # A multiplier is real when its imaginary part is smaller than this share of it.
 _REAL = 1e-7
+# Distance of a real multiplier from one that integration cannot tell.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,9 @@ class FloquetVerdict:
     exponents : (m,) complex array
         ``log(multiplier) / period`` [1/s].
     stable : bool or None
-        None where the method does not cover the solution, its period is too long for the fastest mode, or
-        the error leaves the question open.
+        None where the method does not cover the solution, its period is too long for the fastest mode, the
+        error leaves the question open, or the largest multiplier is +1 or -1 to 1e-6: on the border, where
+        the linear equations do not decide. Complex pairs on the circle (no damping) do not grow: stable.
     loss : str
         ``""`` when stable; how the largest multiplier leaves the unit circle: ``"fold"`` (through +1: limit
         point, pitchfork, transcritical), ``"flip"`` (through -1) or ``"Neimark-Sacker"`` (complex pair).
@@ -49,7 +52,17 @@ def open_verdict(reason: str) -> FloquetVerdict:
     return FloquetVerdict(np.zeros(0, complex), np.zeros(0, complex), None, "", "", reason, np.nan)
 
 
-def verdict_of(multipliers, period: float, method: str, error: float, tolerance: float) -> FloquetVerdict:
+def verdict_of(
+    multipliers,
+    period: float,
+    method: str,
+    error: float,
+    tolerance: float,
+    *,
+    positions: int = 0,
+    velocities: int = 0,
+    drift=(),
+) -> FloquetVerdict:
     """Verdict on the multipliers of one period.
 
     Parameters
@@ -60,8 +73,20 @@ def verdict_of(multipliers, period: float, method: str, error: float, tolerance:
     method : str
     error, tolerance : float
         Estimated and allowed relative error of the monodromy matrix.
+    positions : int
+        Free positions among the multipliers: as many as are one, the nearest to it are left out.
+    velocities : int
+        Velocities of free motions among the multipliers: a slow decay of theirs is not the border.
+    drift : (r,) array
+        Rates [1/s] at which the velocities of free motions decay, or grow where they are negative; their
+        multipliers ``exp(-rate period)`` are added.
     """
     multipliers = np.asarray(multipliers, complex)
+    multipliers = multipliers[np.argsort(np.abs(multipliers - 1.0), kind="stable")[positions:]]
+    border = _on_border(multipliers, velocities)
+    with np.errstate(over="ignore"):
+        decay = np.exp(-np.asarray(drift, float) * period)
+    multipliers = np.concatenate([multipliers, decay])
     size = np.abs(multipliers)
     # of a complex pair the one with positive imaginary part first, whatever rounding does to the moduli
     rounded = np.round(size / max(size.max(initial=0.0), 1e-300), 9)
@@ -74,11 +99,28 @@ def verdict_of(multipliers, period: float, method: str, error: float, tolerance:
     if error > tolerance and abs(largest - 1.0) <= max(10.0 * error, _CIRCLE):
         stable = None
         message += f", undecided: error of the monodromy matrix {error:.1e}, aimed at {tolerance:.1e}"
+    if stable and border is not None:
+        stable = None
+        message += (
+            f", on the border: the multiplier {border.real:+.6g} is on the unit circle to {_CIRCLE:.0e}"
+        )
     loss = "" if stable is not False else loss_of(multipliers[0])
     outside = int(np.sum(np.abs(multipliers) > 1.0 + _CIRCLE))
     if loss:
         message += f" ({loss}); {outside} outside the unit circle"
     return FloquetVerdict(multipliers, exponents, stable, loss, method, message, error)
+
+
+def _on_border(multipliers: np.ndarray, velocities: int) -> complex | None:
+    """A multiplier that is +1 or -1 to the accuracy of the unit circle, if there is one.
+
+    Multipliers are sorted by their distance from one; of free motions with damping the velocities are among
+    the first, inside the circle by more than rounding.
+    """
+    near = np.minimum(np.abs(multipliers - 1.0), np.abs(multipliers + 1.0)) <= _CIRCLE
+    slow = np.flatnonzero(near & (np.abs(multipliers) < 1.0 - _ROUNDING) & (multipliers.real > 0.0))
+    near[slow[:velocities]] = False
+    return multipliers[np.argmax(near)] if np.any(near) else None
 
 
 def loss_of(multiplier: complex) -> str:

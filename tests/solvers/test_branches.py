@@ -246,3 +246,16 @@ def test_refusals():
         frequency_response_curve(duffing(), (1.0, 1.2), harmonics=3, start_at=1.3)
     with pytest.raises(CaseError, match="E-RANGE"):
         parameter_curve(duffing, (0.1, 0.1), 1.2, harmonics=3)
+
+
+def test_messages_name_the_frequency_and_its_unit(eleven):
+    """1.5 rad/s are 0.238732 Hz; a parameter without a unit keeps its bare value."""
+    assert eleven.message == "end of the range at frequency 1.5 rad/s (0.238732 Hz)"
+    few = frequency_response_curve(duffing(), (0.8, 1.5), harmonics=3, options=StepOptions(max_points=5))
+    last = few.parameter[-1]
+    where = f"stopped at frequency {last:.6g} rad/s ({last / (2 * np.pi):.6g} Hz) after 5 points"
+    assert few.message == where + ": raise max_points"
+    bare = parameter_curve(duffing, (0.1, 0.2), 0.9, harmonics=3, stability=False)
+    assert bare.message == "end of the range at parameter = 0.2"
+    with pytest.raises(CaseError, match="frequency 2 rad/s"):
+        frequency_response_curve(duffing(), (0.8, 1.5), harmonics=3, start_at=2.0)

@@ -117,7 +117,7 @@ def test_load_that_nothing_holds_is_refused():
 
 def test_open_mesh_is_refused():
     system = pair()
-    with pytest.raises(ConvergenceError, match="strains mesh 1"):
+    with pytest.raises(ConvergenceError, match="strains column 1 of W"):
         solve_modes(system, [0.0], damping_ratio=0.05)
 
 
@@ -180,5 +180,5 @@ def test_load_on_a_part_that_the_rigid_mode_leaves_at_rest():
 def test_weak_strain_of_a_rigid_mode_is_still_refused():
     """A column that takes a millionth of the free motion is strained, and without stiffness it is refused."""
     system = replace(pair(), W=np.array([[1.0, 1e-6], [1.0, 0.0]]))
-    with pytest.raises(ConvergenceError, match="strains mesh 2"):
+    with pytest.raises(ConvergenceError, match="strains column 2 of W"):
         solve_modes(system, [30.0, 0.0], damping_ratio=0.05)
