@@ -6,6 +6,9 @@ from time import process_time
 import numpy as np
 import pytest
 
+# seconds of the core: the wall clock counts what else runs on it
+pytestmark = pytest.mark.benchmark(timer=process_time)
+
 MINUTE = "Wind turbine drivetrain, 36 dof"
 LIMIT = 60.0
 """Seconds of one core that a minute at 20 kHz may take."""
@@ -52,16 +55,13 @@ def medians():
 def test_a_minute_at_20_khz(benchmark):
     benchmark.group = MINUTE
     model()
-    begin = process_time()
-    found = benchmark.pedantic(run, args=(15, 60.0), rounds=1)
-    cpu = process_time() - begin
+    found = benchmark.pedantic(run, args=(15, 60.0), kwargs={"every": 20, "lowpass": True}, rounds=1)
     assert found.ledger.error < 1e-6 and found.momentum < 1e-6
-    note = f"{found.steps} steps, 15 terms of the mesh stiffness; energy balance {found.ledger.error:.0e}; "
-    note += f"{cpu:.0f} s of the core"
-    benchmark.extra_info.update(title="average acceleration, 60 s at 20 kHz", note=note, limit=None)
+    note = f"{found.steps} steps, 15 terms of the mesh stiffness, records low-passed to 1 kHz; "
+    note += f"energy balance {found.ledger.error:.0e}; time of the process"
+    benchmark.extra_info.update(title="average acceleration, 60 s at 20 kHz", note=note, limit=LIMIT)
     if benchmark.stats is not None:
-        # seconds of the core: the wall clock counts what else runs on it
-        assert cpu < LIMIT
+        assert benchmark.stats.stats.median < LIMIT
 
 
 def test_settled_by_lines(benchmark, medians):

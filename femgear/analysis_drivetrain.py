@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 _SPEEDS, _FASTEST, _HIGHEST, _MOST_BRANCHES = 21, 10.0 / 3.0, 2.5, 40
 # Orders are read off up to this share of the record rate: beyond it the interpolation takes more than 1.4 %.
 _ORDERS = 0.25
+# Slower instants, over the mean speed, would need records of endless length over a turn.
+_SLOWEST = 0.05
 
 
 @dataclass(frozen=True)
@@ -169,10 +171,11 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
     speed = float(first.spin_speed[late].mean())
     turns = float(np.ptp(first.spin[late])) / (2.0 * np.pi)
     slowest = min(float(run.spin_speed[late].min()) for run in transient.runs.values())
-    if not slowest > 0.0:
+    if not slowest > _SLOWEST * speed:
         raise CaseError(
-            "the first body stops or turns back: there are no orders", code="E-SPECTRUM",
-            key="operation.torque", remedy="give torques that keep it turning",
+            "the first body nearly stops or turns back: there are no orders", code="E-SPECTRUM",
+            key="operation.torque", limit=f"never slower than {_SLOWEST:.0%} of its mean speed",
+            remedy="give torques that keep it turning, or write --only transient",
         )  # fmt: skip
     lines = mesh_lines(transient.models[BENDING])
     per_turn = int(np.ceil(2.0 * np.pi * case.record_rate / slowest))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from femgear.case_drivetrain import build_drivetrain, refuse_drivetrain
+from femgear.case_drivetrain import build_drivetrain, is_drivetrain, refuse_drivetrain
 from femgear.case_flanks import flank_form
 from femgear.case_floating import check_floating
 from femgear.case_shafts import with_shafts
@@ -347,7 +347,7 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
             remedy="update femgear",
             file=name,
         )
-    if "model" in data:
+    if is_drivetrain(data):
         return build_drivetrain(data, text, name, numbered=numbered)
     lines = text if numbered else ""
     files = embed_profiles(data, name)

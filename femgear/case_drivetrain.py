@@ -34,7 +34,7 @@ def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True)
     """
     lines = text if numbered else ""
     if data.get("model") != MODEL:
-        raise combine([_unknown_model(data["model"])], lines, name)
+        raise combine([_unknown_model(data.get("model"))], lines, name)
     files = embed_torques(data, name)
     if files:
         text = tomlfile.write(data)
@@ -58,7 +58,17 @@ def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True)
     return case
 
 
+def is_drivetrain(data: dict) -> bool:
+    """Whether tables name a model, or have bodies, of which planetary sets have none."""
+    return "model" in data or isinstance(data.get("body"), list)
+
+
 def _unknown_model(value: object) -> CaseError:
+    if value is None:
+        remedy = f'write model = "{MODEL}" before the first table'
+        return CaseError(
+            "a file with bodies needs its model", code="E-KEY-MISSING", key="model", remedy=remedy
+        )
     if not isinstance(value, str):
         return CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", key="model", value=value)
     near = difflib.get_close_matches(value.lower(), [MODEL], n=1, cutoff=0.6)

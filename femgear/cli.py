@@ -242,10 +242,12 @@ def sweep(
         First and last speed of the input, for mesh forces and the housing.
     """
     from femgear.case import read_case
+    from femgear.case_drivetrain import refuse_drivetrain
     from femgear.optimisation import sweep_into
     from femgear.run import grid_cache
 
     data = read_case(case)
+    refuse_drivetrain(data)
     with _Progress() as progress:
         options = {"speeds": speeds, "cache": grid_cache(), "progress": progress}
         found, names = sweep_into(data, output, over=over, of=of, **options)

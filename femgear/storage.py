@@ -28,8 +28,6 @@ from femgear.storage_manifest import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.casefile.drivetrain import DrivetrainCase
-
 __all__ = [
     "MANIFEST",
     "Manifest",
@@ -49,10 +47,8 @@ __all__ = [
     "write_text",
 ]
 STAGES = ("static", "stress", "modes", "dynamics", "housing", "branch", "response", "transient", "spectrum")
-CASE = "case.toml"
-LOCK = ".lock"
-RUNNING = ".running"
-FINISHED = ".finished"
+CASE, LOCK = "case.toml", ".lock"
+RUNNING, FINISHED = ".running", ".finished"
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,7 @@ class Results:
     manifest: Manifest
 
     @cached_property
-    def case(self) -> Case | DrivetrainCase:
+    def case(self) -> Case:
         """The case as run."""
         return read_case(self._checked(CASE))
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.models.drivetrain_record import PASS_BAND
 from femgear.summary_block import Block
 
 if TYPE_CHECKING:
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 RPM = math.pi / 30
 _SHOWN = 16
+# Average acceleration lowers a frequency by (2 pi / steps)^2 / 12: 0.4 %, and 1.5 % at the second harmonic.
+_STEPS = 30
 # The step rule keeps the energy exactly: more is rounding that grew, or a motion that runs away.
 _BALANCE = 1e-6
 
@@ -39,8 +42,27 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
         _shafts(model),
         _stages(case, model),
         _operation(case, model),
-        Block("Warnings", notes=case.notices or ("none",)),
+        Block("Warnings", notes=(*case.notices, *_rates(case, model)) or ("none",)),
     )
+
+
+def _rates(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
+    """Steps and records that are too slow for the highest mesh frequency."""
+    bases = np.unique(model.mesh_base)
+    hertz = model.frequencies(case.operation.speed)[bases] / (2.0 * np.pi)
+    if not len(hertz):
+        return
+    name, top = model.bases[bases[np.argmax(hertz)]], float(hertz.max())
+    if case.simulation.rate < _STEPS * top:
+        yield (
+            f"[W-RATE] simulation.rate: {case.simulation.rate / top:.3g} steps a period of the {name} "
+            f"({top:.4g} Hz) shift and damp it; take {_STEPS} or more"
+        )
+    if 0.5 * PASS_BAND * case.record_rate < top:
+        yield (
+            f"[W-RECORD] simulation.record: records of {case.record_rate:g} Hz end at "
+            f"{0.5 * PASS_BAND * case.record_rate:g} Hz, below the {name} ({top:.4g} Hz)"
+        )
 
 
 def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
@@ -204,7 +226,7 @@ def describe_spectrum(data: xr.Dataset) -> Block:
 
 
 def _newtons(value: float) -> str:
-    return "-" if np.isnan(value) else f"{value:.4g}" if value >= 0.1 else "0"
+    return "-" if np.isnan(value) else f"{value:.4g}" if value >= 0.1 else "< 0.1"
 
 
 def _combination(orders, names) -> str:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The wind turbine drivetrain of 36 dof: transient, spectra, side bands, modes, sensitivity."""
+"""A drivetrain from its case file: transient, spectra, side bands, modes, contact loss, sensitivity."""
 
 from __future__ import annotations
 
@@ -7,116 +7,118 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 from cyclopts import Parameter
-from drivetrain_figures import draw_all
+from drivetrain_figures import backlash_figure, sensitivity_figure, with_balance
 from script_tools import Progress, print_table, ready_folder, run_script, say_files, write_csv
 
-from femgear.errors import CaseError
+PAPER = Path(__file__).resolve().parents[1] / "cases" / "wind_turbine_drivetrain.toml"
+STAGES = ("planetary", "gear 1-2", "gear 2-3")
 
 
 def main(
+    case: Path = PAPER,
+    /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/drivetrain"),
-    duration: float = 60.0,
-    rate: float = 20_000.0,
+    duration: str | None = None,
+    rate: str | None = None,
     balanced: bool = False,
-    rotor_torque: Path | None = None,
-    generator_torque: Path | None = None,
-    modes: int = 4,
+    torsional: bool = True,
+    modes: int | None = None,
     sensitivity: bool = True,
 ) -> None:
-    """Integrate the drivetrain with and without bending; tables, pictures, a CSV file.
+    """Integrate a drivetrain with and without bending; tables, pictures, a CSV file.
 
     Parameters
     ----------
+    case
+        TOML case file with model = "drivetrain"; the published wind turbine set when left out.
     output
         Folder of the results.
     duration
-        Of the transient [s].
+        Of the transient, such as "60 s". Default: as the case says. The spectra leave out three tenths.
     rate
-        Steps a second.
+        Steps, such as "20 kHz". Default: as the case says.
     balanced
-        The generator takes the whole torque, so that the speed stays; otherwise 30 % of it, as in the paper.
-    rotor_torque, generator_torque
-        CSV files, time [s] and torque [N m] after one line of heads, instead of the constant torques.
+        The torque that is a share of the others takes all of it, so that the speed stays.
+    torsional
+        The same chain without bending beside it.
     modes
-        Pictures of that many elastic modes; 0 draws none.
+        Pictures of that many elastic modes. Default: as the case says.
     sensitivity
-        Whether to vary the assumed inputs.
+        Whether to vary the assumed inputs of the published set.
     """
-    from femgear.models.drivetrain import drivetrain_model
-    from femgear.models.drivetrain_march import march_drivetrain
-    from femgear.models.drivetrain_torque import constant_torques, read_torque_csv
-    from femgear.models.drivetrain_torsional import torsional_model
-    from femgear.models.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
+    from femgear.analysis_drivetrain import solve_drivetrain_modes, solve_spectrum, solve_transient_run
+    from femgear.case import read_case, with_value
+    from femgear.case_drivetrain import need_drivetrain
+    from femgear.pictures_drivetrain import write_drivetrain_pictures
+    from femgear.plots import save_figure
+    from femgear.summary_drivetrain import describe_drivetrain, describe_spectrum, describe_transient
 
-    if not (duration >= 4.0 and rate >= 1000.0) or modes < 0:
-        raise CaseError(
-            f"{duration} s at {rate} steps a second, {modes} modes", code="E-RANGE",
-            limit="4 s or more, 1000 steps a second or more, 0 modes or more",
-        )  # fmt: skip
-    torques = {t.body: t for t in constant_torques(paper_torques(balanced=balanced))}
-    for body, path in (("rotor", rotor_torque), ("generator", generator_torque)):
-        if path is not None:
-            torques[body] = read_torque_csv(path, body)
-    train = wind_turbine_drivetrain()
-    models = {"torsional": torsional_model(train), "with bending": drivetrain_model(train)}
-    folder = ready_folder(output)
+    data, paper = need_drivetrain(read_case(case)), read_case(PAPER)
+    if duration is not None:
+        data = with_value(with_value(data, "simulation.settle", None), "simulation.duration", duration)
+    if rate is not None:
+        data = with_value(data, "simulation.rate", rate)
+    if modes is not None:
+        data = with_value(data, "simulation.modes", modes)
+    data = with_value(data, "simulation.torsional", torsional)
+    balance = with_balance(data)
+    data = balance if balanced else data
+    blocks = describe_drivetrain(data)  # refuse before the folder is touched
+    folder, figures = ready_folder(output), {}
     with Progress() as progress:
-        runs = {}
-        for text, model in models.items():
-            progress(f"integration, {text}")
-            runs[text] = march_drivetrain(
-                model,
-                list(torques.values()),
-                duration=duration,
-                step=1.0 / rate,
-                speed=PRINTED.speed,
-                start="zero",
-            )
-            progress(f"integration, {text}", 1.0)
-        names = draw_all(folder, models, runs, modes=modes, vary=sensitivity, progress=progress)
-    _tables(models, runs)
-    run = runs["with bending"]
-    every = max(1, round(rate * 1e-3))
-    columns = (run.time, run.spin_speed, *run.force.T)
-    write_csv(
-        folder / "forces.csv",
-        ("time [s]", "rotor speed [rad/s]", *(f"{mesh} [N]" for mesh in run.meshes)),
-        (tuple(float(c[i]) for c in columns) for i in range(0, len(run.time), every)),
-    )
+        found = {"modes": solve_drivetrain_modes(data)}
+        found["transient"] = solve_transient_run(data, progress=progress)
+        found["spectrum"] = solve_spectrum(data, found["transient"])
+        sets = {name: stage.dataset() for name, stage in found.items()}
+        names = write_drivetrain_pictures(folder, data, sets, progress=progress)
+        figures["backlash"] = backlash_figure(balance, found["modes"].model)
+        if sensitivity and _is_paper(data, paper):
+            figures["sensitivity"] = sensitivity_figure(progress)
+    for name, figure in figures.items():
+        if figure is not None:
+            save_figure(figure, folder / f"{name}.png")
+            names.append(f"{name}.png")
+    blocks = [block for block in blocks if block.rows]
+    for block in (*blocks, describe_transient(sets["transient"]), describe_spectrum(sets["spectrum"])):
+        print_table(block.title, block.header, block.rows)
+        for note in block.notes:
+            print(f"  {note}")
+    if _is_paper(data, paper):
+        _kinematics()
+    _write_forces(folder, sets["transient"])
     say_files(folder, [*names, "forces.csv"])
 
 
-def _tables(models, runs):
+def _is_paper(data, paper) -> bool:
+    """Whether the chain is the published one, whatever is done with it."""
+    return all(
+        getattr(data, part) == getattr(paper, part)
+        for part in ("body", "shaft", "parallel", "planetary", "bearing", "gravity")
+    )
+
+
+def _kinematics() -> None:
+    """Mesh lines of two choices of tooth numbers beside the printed ones."""
     from femgear.models.wind_turbine_drivetrain import PRINTED, RADII_TEETH, line_teeth, ratio_of_radii
 
     rows = []
     for text, teeth in (("nearest to the lines", line_teeth()), ("module 5 mm", RADII_TEETH)):
-        for stage, line, error in zip(("planetary", "gear 1-2", "gear 2-3"), teeth.lines(), teeth.mismatch()):
-            printed = PRINTED.lines[("planetary", "gear 1-2", "gear 2-3").index(stage)]
+        for stage, printed, line, error in zip(STAGES, PRINTED.lines, teeth.lines(), teeth.mismatch()):
             rows.append((f"{text}: {stage}", f"{printed:g}", f"{line:.2f}", f"{100 * error:+.2f} %"))
     print_table("Mesh lines [Hz]", ("teeth", "printed", "ours", "mismatch"), rows)
     print(f"ratio of the radii {ratio_of_radii():.3f}, printed {PRINTED.ratio}")
-    rows = []
-    for text, run in runs.items():
-        rows += [
-            (
-                f"{text}: {mesh}",
-                f"{f.mean():.0f}",
-                f"{f.min():.0f}",
-                f"{f.max():.0f}",
-                f"{100 * np.mean(f < 0):.1f}",
-            )
-            for mesh, f in zip(run.meshes, run.force.T)
-        ]
-    print_table("Mesh forces [N]", ("mesh", "mean", "smallest", "largest", "negative [% of time]"), rows)
-    rows = [
-        (text, f"{r.ledger.error:.1e}", f"{r.momentum:.1e}", f"{r.drift:.1e}", f"{len(models[text].rigid)}")
-        for text, r in runs.items()
-    ]
-    print_table("Balances", ("model", "energy [1]", "momentum [1]", "drift [rad]", "dof"), rows)
+
+
+def _write_forces(folder: Path, transient) -> None:
+    """Low-passed records with bending: time, speed of the first body, mesh forces."""
+    meshes = [f"{mesh} [N]" for mesh in transient["mesh"].values]
+    header = ("time [s]", f"{transient['body'].values[0]} speed [rad/s]", *meshes)
+    columns = (
+        transient["time"].values, transient["speed"].values[0, :, 0], *transient["mesh_force"].values[0].T,
+    )  # fmt: skip
+    write_csv(folder / "forces.csv", header, (tuple(map(float, row)) for row in zip(*columns)))
 
 
 if __name__ == "__main__":

@@ -50,6 +50,7 @@ def main(
         Positions over one mesh period.
     """
     from femgear import planetary_set, read_case
+    from femgear.case_drivetrain import refuse_drivetrain
     from femgear.casefile.units import LENGTH, TORQUE, to_si
     from femgear.design.basis import design_basis, sun_torque
     from femgear.design.relief import harris_map, loads_back, relief_starts, with_tip_relief
@@ -58,6 +59,7 @@ def main(
     from femgear.run import grid_cache
 
     data = read_case(case)
+    refuse_drivetrain(data)
     if not 4 <= positions <= 2048:
         raise CaseError("too few or too many positions", code="E-RANGE", key="--positions", value=positions)
     amounts = [_checked(to_si(text, LENGTH), text, data.sun.module) for text in relief]

@@ -59,6 +59,7 @@ def main(
         Positions over one mesh period.
     """
     from femgear import planetary_set, read_case
+    from femgear.case_drivetrain import refuse_drivetrain
     from femgear.casefile.units import LENGTH, TORQUE, to_si
     from femgear.design.basis import design_basis, relief_snippet, sun_torque
     from femgear.design.relief import loads_back
@@ -68,6 +69,7 @@ def main(
     from femgear.run import grid_cache
 
     data = read_case(case)
+    refuse_drivetrain(data)
     _check_counts(points, positions)
     design = data.operation.torque if torque is None else to_si(torque, TORQUE)
     others = [to_si(text, TORQUE) for text in also] or [0.5 * design, 1.5 * design]

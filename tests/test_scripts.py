@@ -19,6 +19,7 @@ SCRIPTS = (
     "tip_relief_design.py",
     "pin_error_load_sharing.py",
     "optimise.py",
+    "drivetrain.py",
 )
 # of published sets, without a case file
 SET_SCRIPTS = (
@@ -27,7 +28,6 @@ SET_SCRIPTS = (
     "bearing_clearance.py",
     "planet_phasing.py",
     "multistage.py",
-    "drivetrain.py",
 )
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 
@@ -389,7 +389,20 @@ def test_multistage_writes_its_tables_and_figures(tmp_path):
 
 
 def test_drivetrain_writes_spectra_and_pictures(tmp_path):
-    settings = ["--duration", "4", "--rate", "4000", "--modes", "0", "--no-sensitivity"]
+    settings = ["--duration", "3 s", "--rate", "4 kHz", "--modes", "0", "--balanced", "--no-sensitivity"]
     done = run("drivetrain.py", *settings, "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert {path.suffix for path in tmp_path.iterdir()} >= {".csv", ".png"}
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names >= {"forces.csv", "transient_forces.png", "mesh_force_spectrum.png", "backlash.png"}
+    assert "ratio of the radii 34.654" in done.stdout
+    forces = table(tmp_path / "forces.csv")
+    assert len(forces["time [s]"]) == 3001 and np.ptp(forces["rotor speed [rad/s]"]) < 1e-2
+
+
+def test_drivetrain_takes_a_case_of_its_own(tmp_path):
+    own = ROOT / "cases" / "own_chain.toml"
+    done = run("drivetrain.py", own, "--duration", "0.2 s", "--modes", "0", "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "pinion-wheel" in done.stdout and "ratio of the radii" not in done.stdout
+    done = run("drivetrain.py", CASE, "-o", tmp_path / "none", folder=tmp_path)
+    assert done.returncode == 2 and "E-MODEL" in done.stderr and not (tmp_path / "none").exists()

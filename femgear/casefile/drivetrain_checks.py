@@ -220,11 +220,13 @@ def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
                 value=stage.planets,
                 limit=f"a divisor of ring_teeth + sun_teeth = {both}",
             )
+        yield from _neighbours(stage, key, 2.0 * math.pi / stage.planets)
         return
     if any(b <= a for a, b in pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi - 1e-9:
         yield CaseError(
             "the planet angles do not ascend within one turn", code="E-RANGE", key=f"{key}.planet_angles"
         )
+    yield from _neighbours(stage, key, min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi))))
     steps = [(angle - angles[0]) * both / (2.0 * math.pi) for angle in angles]
     if any(abs(step - round(step)) > 1e-3 for step in steps):
         yield CaseError(
@@ -232,6 +234,21 @@ def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
             code="E-ASSEMBLY",
             key=f"{key}.planet_angles",
             limit=f"whole multiples of 360 deg / {both} from one another",
+        )
+
+
+def _neighbours(stage: PlanetarySection, key: str, apart: float) -> Iterator[CaseError]:
+    """Pitch circles of neighbouring planets must not overlap; sizes by the teeth."""
+    share = (stage.ring_teeth - stage.sun_teeth) / (stage.ring_teeth + stage.sun_teeth)
+    if share > 0.0 and math.sin(0.5 * min(apart, math.pi)) <= share:
+        most = math.degrees(2.0 * math.asin(share))
+        yield CaseError(
+            "neighbouring planets overlap",
+            code="E-NEIGHBOURS",
+            key=f"{key}.{'planets' if stage.planet_angles is None else 'planet_angles'}",
+            value=f"{math.degrees(apart):.4g} deg from one to the next",
+            limit=f"more than {most:.4g} deg",
+            remedy="take fewer planets, or smaller ones",
         )
 
 

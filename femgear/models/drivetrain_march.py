@@ -189,8 +189,10 @@ class _Spin:
         self.share = np.array([column @ model.rigid for column in columns])
         kept = [c - carried * (s / self.inertia if separate else 0.0) for c, s in zip(columns, self.share)]
         self.directions = np.column_stack([model.system.load, *kept])
-        series = FourierSeries(model.stiffness)
-        self.table = np.array(series.at(2.0 * np.pi * np.arange(_TABLE + 1)[:, None] / _TABLE))
+        self.table = np.zeros((_TABLE + 1, 0))
+        if len(model.meshes):
+            phase = 2.0 * np.pi * np.arange(_TABLE + 1)[:, None] / _TABLE
+            self.table = np.array(FourierSeries(model.stiffness).at(phase))
 
     def block(self, first, count) -> _Block:
         times = self.step * np.arange(first, first + count + 1)

@@ -253,6 +253,10 @@ def test_tilted_and_helical_mesh_by_virtual_work():
     )
 
 
+# inside a shaft that has no elements
+NOWHERE = ChainBearing("rotor", 1e8, other="carrier", station=1)
+
+
 @pytest.mark.parametrize(
     ("make", "code"),
     [
@@ -266,6 +270,7 @@ def test_tilted_and_helical_mesh_by_virtual_work():
         (lambda: ChainBearing("a", math.inf, offset=0.1), "E-DRIVETRAIN"),
         (lambda: replace(TRAIN, shafts=TRAIN.shafts[1:]), "E-DRIVETRAIN"),
         (lambda: replace(TRAIN, bearings=(ChainBearing("b", 1.0),)), "E-DRIVETRAIN"),
+        (lambda: drivetrain_model(replace(TRAIN, bearings=(NOWHERE,))), "E-DRIVETRAIN"),
         (lambda: replace(TRAIN, bodies=TRAIN.bodies + TRAIN.bodies[:1]), "E-DRIVETRAIN"),
         (lambda: replace(TRAIN.planetary[0], sun_radius=0.0), "E-DRIVETRAIN"),
         (lambda: gear_set(planet_angles=(0.0, 7.0)), "E-DRIVETRAIN"),

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femgear.errors import CaseError
 from femgear.models.drivetrain import (
     balanced_torque,
     drivetrain_model,
@@ -18,7 +17,7 @@ from femgear.models.drivetrain_data import (
 )
 from femgear.models.drivetrain_march import march_drivetrain
 from femgear.models.drivetrain_spectra import averaged_spectrum, order_spectrum
-from femgear.models.drivetrain_torque import TorqueHistory, constant_torques, read_torque_csv
+from femgear.models.drivetrain_torque import TorqueHistory, constant_torques
 from femgear.models.drivetrain_torsional import torsional_model
 from femgear.models.wind_turbine_drivetrain import (
     PRINTED,
@@ -181,16 +180,3 @@ def test_order_tracking_through_a_run_up():
     tracked = order_spectrum(signal, angle, resolution=0.25, per_turn=64)
     assert tracked.near(7.0, 0.01) == pytest.approx(1.0, rel=1e-4)
     assert averaged_spectrum(signal, 1e-3, resolution=0.25).amplitude.max() < 0.5
-
-
-def test_torques_from_a_file(tmp_path):
-    path = tmp_path / "torque.csv"
-    path.write_text("time [s],torque [kN m]\n0,15\n1,16.5\n3,12\n")
-    found = read_torque_csv(path, "rotor", factor=1e3)
-    assert found.at([-1.0, 0.5, 2.0, 9.0]) == pytest.approx([15e3, 15.75e3, 14.25e3, 12e3])
-    for text in ("t,T\n0,1\n0,2\n", "t,T\n0,one\n", "t,T\n", "t,T\n0,1,2\n", "t,T\n0,nan\n"):
-        path.write_text(text)
-        with pytest.raises(CaseError, match="E-TORQUE"):
-            read_torque_csv(path, "rotor")
-    with pytest.raises(CaseError, match="E-TORQUE"):
-        read_torque_csv(tmp_path / "missing.csv", "rotor")
