@@ -78,7 +78,7 @@ def section_stiffness(case: Case, gears: PlanetarySet, *, cache: Path | None = N
     virtual, helix = virtual_gears(case, gears), case.helical.helix_angle
     single = replace(gears, planet_angles=gears.planet_angles[:1])
     beta_b = math.atan(math.tan(helix) * math.cos(gears.sun.pressure_angle))
-    load = _line_load(case, gears)
+    load = line_load(case, gears)
     transverse, normal = (_pair_stiffness(case, one, load, cache) for one in (single, virtual))
     teeth = tuple(gear.teeth for gear in (virtual.sun, virtual.planet, virtual.ring))
     return SectionStiffness(teeth, transverse, normal, beta_b)
@@ -166,7 +166,7 @@ def shared_load(record: MeshExcitation) -> MeshExcitation:
     )
 
 
-def _line_load(case: Case, gears: PlanetarySet) -> float:
+def line_load(case: Case, gears: PlanetarySet) -> float:
     """Load a width of each sun mesh in the transverse section, which is that a length of contact line [N/m].
 
     ``F_n / (b / cos beta_b)`` with ``F_n = F_t / cos beta_b``.

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.analysis import Progress, StaticResult
-from femgear.analysis_planar_checks import check_planar_case
+from femgear.analysis_planar_checks import (
+    bounded_branch,
+    check_branch_damping,
+    check_planar_case,
+    check_response_damping,
+    check_response_motions,
+    check_smoothing,
+    end_of_branch,
+)
 from femgear.case import Case, planetary_set
 from femgear.casefile.planar import output_member
 from femgear.threads import one_blas_thread
@@ -51,6 +59,7 @@ class BranchResult:
     branch: Branch
     lines: tuple[MotionLines, ...]
     sense: int
+    ending: str
 
     def dataset(self) -> xr.Dataset:
         """Contents of branch.nc."""
@@ -112,17 +121,23 @@ def solve_branch(
 ) -> BranchResult:
     """Periodic responses to the weight, past limit points, with a Floquet verdict at each.
 
-    Mesh stiffnesses are constant: the given ones, or the mean of the static solution's.
+    Mesh stiffnesses are constant: the given ones, or the mean of the static solution's. The branch ends
+    before motions that the model of small displacements does not hold for.
 
     Raises
     ------
-    CaseError, ConvergenceError
+    CaseError
+        What `check_planar_case` refuses, a range over an undamped natural frequency (E-RESONANCE).
+    ConvergenceError
+        No response at the start, or one that moves too far (E-MOTION).
     """
     from femgear.models.planar_response import judged_branch, motion_lines, weight_curve
 
     gears, wanted = planetary_set(case), case.planar.branch
     check_planar_case(case, gears)
     model = planar_model(case, gears, static)
+    check_smoothing(case, gears, model)
+    check_branch_damping(case, model)
     branch = weight_curve(
         model.problem,
         (wanted.start, wanted.to),
@@ -131,6 +146,7 @@ def solve_branch(
         radius=True,
         max_points=wanted.points,
     )
+    branch, lines = bounded_branch(branch, (motion_lines(model, one) for one in branch.solutions), gears)
     if wanted.stability:
         steps = (
             None
@@ -138,8 +154,8 @@ def solve_branch(
             else lambda done, total: progress("branch", 0.3 * total + 0.7 * done, total)
         )
         branch = judged_branch(model.problem, branch, progress=steps)
-    lines = tuple(motion_lines(model, one) for one in branch.solutions)
-    return BranchResult(gears, model, branch, lines, carrier_sense(case, gears))
+    ending = end_of_branch(branch, wanted)
+    return BranchResult(gears, model, branch, lines, carrier_sense(case, gears), ending)
 
 
 @one_blas_thread()
@@ -151,6 +167,9 @@ def solve_planar_response(
     Raises
     ------
     CaseError
+        What `check_planar_case` refuses, a line on an undamped natural frequency (E-RESONANCE).
+    ConvergenceError
+        Speeds without a solution, or with one that moves too far (E-MOTION).
     """
     from femgear.gears import speeds
     from femgear.models.planar_response import motion_lines
@@ -167,7 +186,9 @@ def solve_planar_response(
         if model is None or case.planar.gyroscopic:
             carrier = speed.carrier if case.planar.gyroscopic else 0.0
             model = planar_model(case, gears, static, mesh_frequency=True, carrier_speed=carrier)
+            check_smoothing(case, gears, model)
         frequency = np.array([abs(speed.carrier), 2.0 * np.pi * speed.mesh_frequency])
+        check_response_damping(case, model, frequency, orders)
         found = None
         options = {"orders": orders, "reduction": model.reduction, "radius": len(orders) < 60}
         if solutions and solutions[-1].converged:
@@ -178,6 +199,7 @@ def solve_planar_response(
         lines.append(motion_lines(model, found))
         if progress is not None:
             progress("response", number + 1, len(turning))
+    check_response_motions(operation.speeds, solutions, lines, gears)
     return PlanarResponseResult(gears, np.array(operation.speeds), turning, tuple(solutions), tuple(lines))
 
 

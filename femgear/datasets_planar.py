@@ -10,10 +10,16 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.analysis_planar import BranchResult, PlanarModesResult, PlanarResponseResult
+    from femgear.solvers.branches import Branch
+    from femgear.solvers.verdict import FloquetVerdict
 
 RPM = np.pi / 30.0
 MEMBERS = ("carrier", "ring", "sun")
 FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
+
+
+# instants of a turn of the weight at which forces are stored
+PHASES = 721
 
 
 def _variable(dims, values, units, long_name):
@@ -76,23 +82,13 @@ def branch_dataset(result: BranchResult) -> xr.Dataset:
     branch, point = result.branch, ("point",)
     hertz = branch.parameter / (2.0 * np.pi)
     known = len(branch.verdicts) > 0
-    nothing = np.full(len(hertz), np.nan)
-    loss = branch.loss if known else [""] * len(hertz)
     folds, crossings = np.zeros((2, len(hertz)), bool)
     folds[branch.folds], crossings[branch.branch_points] = True, True
     carrier = result.sense * branch.parameter
+    stable = np.array([_state(one) for one in branch.verdicts] if known else [-1] * len(hertz))
     variables = {
         "weight_frequency": (point, hertz, "Hz", "frequency of the weight in the carrier frame"),
         "carrier_speed": (point, carrier, "rad/s", "speed of the carrier, counter-clockwise positive"),
-        "stable": (point, branch.stable if known else folds & False, "1", "whether known to be stable"),
-        "largest_multiplier": (
-            point, branch.largest_multiplier if known else nothing, "1", "largest Floquet multiplier",
-        ),
-        "multiplier_distance": (
-            point, [_nearest(verdict) for verdict in branch.verdicts] if known else nothing, "1",
-            "distance of the nearest Floquet multiplier from 1, which is zero at a limit point of the motion",
-        ),
-        "loss": (point, list(loss), "1", "how stability is lost"),
         "fold": (point, folds, "1", "whether the point is a limit point"),
         "branch_point": (point, crossings, "1", "whether another branch crosses"),
         "tail": (point, branch.tail, "1", "share of the amplitude in the upper half of the harmonics"),
@@ -100,25 +96,77 @@ def branch_dataset(result: BranchResult) -> xr.Dataset:
         "residual": (point, branch.residual, "1", "relative residual of the harmonic equations"),
         "converged": (point, branch.converged, "1", "whether the solution satisfies its tolerance"),
     }  # fmt: skip
+    variables |= _stability(branch, stable) | _flank_forces(result, stable)
     variables |= _motions(result.lines, "point", "harmonic")
     coords = _coordinates(result.planetary_set) | {
         "point": _variable(point, np.arange(len(hertz)), "1", "point along the branch"),
         "harmonic": _variable(("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
+        "phase": _variable(("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
     }
-    return xr.Dataset(
+    data = xr.Dataset(
         {name: _variable(*entry) for name, entry in variables.items()},
         coords=coords,
         attrs={
             "title": "periodic responses to the weight",
-            "message": branch.message,
+            "message": result.ending,
             "complete": int(branch.complete),
             "stability": "Floquet multipliers" if known else "not computed",
             "fourier_convention": FOURIER,
         },
     )
+    data["stable"].attrs |= {"flag_values": [1, 0, -1], "flag_meanings": "stable not_stable not_known"}
+    return data
 
 
-def _nearest(verdict) -> float:
+def _stability(branch: Branch, stable: np.ndarray) -> dict[str, tuple]:
+    """Verdicts of all points; open ones where stability was not asked for."""
+    point, known, count = ("point",), len(branch.verdicts) > 0, len(stable)
+    nothing, unsaid = np.full(count, np.nan), [""] * count
+    return {
+        "stable": (point, stable, "1", "stability: 1 stable, 0 not stable, -1 not known"),
+        "stability_note": (
+            point, [_reason(one) for one in branch.verdicts] if known else unsaid, "1",
+            "why stability is not known",
+        ),
+        "largest_multiplier": (
+            point, branch.largest_multiplier if known else nothing, "1", "largest Floquet multiplier",
+        ),
+        "multiplier_distance": (
+            point, [_nearest(verdict) for verdict in branch.verdicts] if known else nothing, "1",
+            "distance of the nearest Floquet multiplier from 1, which is zero at a limit point of the motion",
+        ),
+        "loss": (point, list(branch.loss) if known else unsaid, "1", "how stability is lost"),
+    }  # fmt: skip
+
+
+def _state(verdict: FloquetVerdict) -> int:
+    return -1 if verdict.stable is None else int(verdict.stable)
+
+
+def _reason(verdict: FloquetVerdict) -> str:
+    return verdict.message if verdict.stable is None else ""
+
+
+def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
+    """Forces in time at the points that are drawn, from the laws of the contacts."""
+    from femgear.models.planar_response import flank_forces, fluctuation, shown_points
+
+    rms = np.array([fluctuation(one.member[0, 0]) for one in result.lines])
+    back = np.array([one.back_contact.max() for one in result.lines])
+    points = shown_points(rms, back, stable)
+    theta = np.linspace(0.0, 2.0 * np.pi, PHASES)[:, None]
+    forces = [flank_forces(result.model, result.branch.solutions[point], theta) for point, _ in points]
+    drive, behind = (np.array([one[side].T for one in forces]) for side in (0, 1))
+    shown, dims = ("shown",), ("shown", "mesh", "phase")
+    return {
+        "shown_point": (shown, [point for point, _ in points], "1", "point whose forces are given in time"),
+        "shown_as": (shown, [words for _, words in points], "1", "what the point is"),
+        "drive_force": (dims, drive, "N", "force of the drive flanks in time, from the law of the contact"),
+        "flank_force": (dims, behind, "N", "force of back flanks on their own line in time, from its law"),
+    }
+
+
+def _nearest(verdict: FloquetVerdict) -> float:
     return (
         float(np.abs(verdict.multipliers - 1.0).min(initial=np.inf)) if len(verdict.multipliers) else np.nan
     )
@@ -167,6 +215,7 @@ def response_dataset(result: PlanarResponseResult) -> xr.Dataset:
         attrs={
             "title": "responses to weight and mesh frequency together",
             "message": " ".join(dict.fromkeys(one.message for one in found)),
+            "mesh_lines": int(np.any(orders[:, 1] != 0)),
             "fourier_convention": FOURIER,
         },
     )
@@ -178,6 +227,11 @@ def _motions(lines, along: str, line: str) -> dict[str, tuple]:
 
     found, out = stacked(lines), {}
     member, mesh = (along, "member", "axis"), (along, "mesh")
+    out["force_tail"] = (
+        (along,), found["force_tail"], "1",
+        "share of the fluctuating force in the upper half of the lines, of the kind of mesh with more of it",
+    )  # fmt: skip
+    out["motion"] = ((along,), found["motion"], "m", "farthest that a member's centre moves from its place")
     out["rms"] = (member, fluctuation(found["member"]), "m", "displacement about its mean, r.m.s.")
     for name, key, dims, units, words in (
         ("displacement", "member", (*member, line), "m", "displacement in the carrier frame"),

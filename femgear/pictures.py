@@ -89,19 +89,15 @@ def _dynamics_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
     from femgear import plots
 
     dynamics, static = data["dynamics"], data.get("static")
-    helical = dynamics.attrs.get("model") == "helical"
-    if helical:
-        # static.nc holds the spur gears of the transverse section
-        static = data["modes"].rename(helical_ste="ste")
-    figures = {
-        "dynamic_transmission_error": plots.transmission_error_period(dynamics, static),
-        "dynamic_spectrum": plots.transmission_error_spectrum(dynamics),
-    }
-    if helical:
-        from femgear.plots.helical_results import mesh_force_spectra
+    figures = {"dynamic_spectrum": plots.transmission_error_spectrum(dynamics)}
+    if dynamics.attrs.get("model") == "helical":
+        from femgear.plots.helical_results import mesh_force_spectra, transmission_errors
 
+        # static.nc holds the spur gears of the transverse section
+        figures["dynamic_transmission_error"] = transmission_errors(dynamics, data["modes"])
         figures["mesh_force_spectra"] = mesh_force_spectra(dynamics, data["modes"])
     else:
+        figures["dynamic_transmission_error"] = plots.transmission_error_period(dynamics, static)
         figures["ring_static_deflection"] = plots.ring_mean_deflection(dynamics, gears)
     if dynamics.sizes["speed"] > 3:
         figures["speed_sweep"] = plots.speed_sweep(dynamics)

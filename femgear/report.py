@@ -16,7 +16,7 @@ from femgear.report_captions import SECTIONS, caption_of, comparisons
 from femgear.storage import Results, open_results
 from femgear.summary import Block, describe, describe_results
 from femgear.summary_drivetrain import transient_warnings
-from femgear.summary_planar import published_modes
+from femgear.summary_planar import planar_verdicts, published_modes
 
 _LARGEST_PICTURE = 8_000_000  # bytes
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
@@ -134,15 +134,10 @@ def _warnings(warnings) -> str:
 
 def _verdicts(results: Results) -> Iterator[str]:
     """What the solvers say against their own results."""
-    if "branch" in results.stages:
-        data = results.branch
-        if not bool(data.attrs["complete"]):
-            yield f"the branch did not reach the end of its range: {data.attrs['message']}"
-        if (count := int((~data["converged"].values.astype(bool)).sum())) > 0:
-            yield f"{count} points of the branch did not converge"
-    if "response" in results.stages and not results.response["converged"].values.all():
-        wrong = results.response["speed"].values[~results.response["converged"].values.astype(bool)]
-        yield f"no response found at {', '.join(f'{value:.6g}' for value in wrong[:8])} rpm"
+    branch, response = (
+        getattr(results, stage) if stage in results.stages else None for stage in ("branch", "response")
+    )
+    yield from planar_verdicts(branch, response)
     if "transient" in results.stages:
         yield from transient_warnings(results.transient)
     if "dynamics" not in results.stages:
@@ -151,7 +146,7 @@ def _verdicts(results: Results) -> Iterator[str]:
     speed = data["speed"].values
     for bad, text in (
         (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),
-        (np.abs(data["floquet_multiplier"].values) >= 1.0, "the periodic solution is unstable at"),
+        (~data["stable"].values.astype(bool), "the periodic solution is unstable at"),
     ):
         if bad.any():
             shown = ", ".join(f"{value:.6g}" for value in speed[bad][:8])

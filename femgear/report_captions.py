@@ -88,8 +88,8 @@ CAPTIONS = (
         "spatial_mode_shapes",
         "Modes",
         "Mode shapes of the helical set with mean mesh stiffness, from the front and, below, from the side, "
-        "where bodies tilt and move along the axis; small motions are drawn larger by the factor given. At "
-        "rest in grey.",
+        "where bodies tilt and move along the axis. Motions of the side view are drawn at the scale of the "
+        "front view times the factor given. At rest in grey.",
     ),
     (
         "mesh_phasing",
@@ -128,7 +128,7 @@ CAPTIONS = (
         "speed_sweep",
         "Dynamics",
         "Fluctuation of the transmission error over the speed, and the verdicts on the solution: the "
-        "fixed point contracts below 1, the motion is stable below 1.",
+        "fixed point contracts below 1, the motion is stable up to 1.",
     ),
     (
         "mesh_force_spectra",
@@ -216,33 +216,31 @@ CAPTIONS = (
         "weight_response",
         "Response to the weight",
         "Displacement of carrier, ring and sun over the frequency of the weight in the carrier frame, r.m.s. "
-        "about the mean. Drawn through: stable by Floquet's theory; dashed: not; circles: limit points, "
-        "those that corners of the tooth contact split drawn as one.",
+        "about the mean. Circles: limit points, those that corners of the tooth contact split drawn as one.",
     ),
     (
         "carrier_orbit",
         "Response to the weight",
-        "Path of the carrier's centre in the carrier frame during one turn of the weight against it: at the "
-        "start of the branch, at the last response before back flanks touch, and at the largest stable one.",
+        "Path of the carrier's centre in the carrier frame during one turn of the weight against it, at the "
+        "responses that the legend names.",
     ),
     (
         "planet_bearing_forces",
         "Response to the weight",
         "Force between every planet and its pin during one turn of the weight against the carrier, at the "
-        "largest stable response.",
+        "response that the title names.",
     ),
     (
         "wedged_teeth",
         "Response to the weight",
-        "Forces of both flanks of the meshes of planet 1 during one turn of the weight, at the largest "
-        "stable response. Where both flanks of a mesh carry at once its teeth are wedged. The forces are "
-        "drawn from their harmonics, so that they ring about zero beside a short contact.",
+        "Forces of both flanks of the meshes of planet 1 during one turn of the weight, at the response that "
+        "the title names. Where both flanks of a mesh carry at once its teeth are wedged.",
     ),
     (
         "tooth_contact",
         "Response to the weight",
         "State of both flanks of the meshes of planet 1 over the frequency of the weight: 1 in contact all "
-        "the time, 0 never; dashed where the response is not stable.",
+        "the time, 0 never.",
     ),
     (
         "response_orbit",
@@ -253,19 +251,19 @@ CAPTIONS = (
     (
         "response_bearing_forces",
         "Weight and mesh frequency",
-        "Force between every planet and its pin during one turn of the carrier ({}): weight and meshing "
-        "together.",
+        "Force between every planet and its pin during one turn of the carrier ({}).",
     ),
     (
         "response_mesh_forces",
         "Weight and mesh frequency",
-        "Mesh forces of planet 1 during one turn of the carrier, and during six mesh periods ({}).",
+        "Mesh forces of planet 1 during one turn of the carrier ({}), and during six mesh periods where the "
+        "mesh stiffness varies. They are drawn from their lines.",
     ),
     (
         "response_spectrum",
         "Weight and mesh frequency",
         "Lines of a mesh force and of the carrier's displacement ({}): multiples of the weight's frequency, "
-        "and of the mesh frequency with their side bands.",
+        "and of the mesh frequency with their side bands where the mesh stiffness varies.",
     ),
     (
         "contact_over_speed",
@@ -296,8 +294,27 @@ def caption_of(stem: str) -> tuple[int, str, str]:
     return len(CAPTIONS), "Other pictures", re.sub("[_-]+", " ", stem)
 
 
+_BY_STABILITY = ("weight_response", "tooth_contact")
+_OF_RESPONSE = (
+    "response_orbit", "response_bearing_forces", "response_mesh_forces", "response_spectrum",
+    "contact_over_speed",
+)  # fmt: skip
+_OF_SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "tooth_loads")
+
+
 def comparisons(case: Case, stem: str) -> Iterator[str]:
-    """What the case file says of a picture beside a published one."""
+    """What the case file adds to a caption: how to read the picture of this case, and published ones."""
+    planar = case.planar
+    if case.helical is not None and stem in _OF_SPUR_TEETH:
+        yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
+    if planar is not None and stem in _BY_STABILITY and planar.branch is not None:
+        yield (
+            "Drawn through: stable by Floquet's theory; dashed: not stable; dotted: not known."
+            if planar.branch.stability
+            else "Stability was not computed: everything is drawn through."
+        )
+    if planar is not None and planar.mesh_stiffness is not None and stem.startswith(_OF_RESPONSE):
+        yield "The mesh stiffness of this case is constant: the weight alone varies, at no mesh frequency."
     for entry in case.planar.published if case.planar is not None else ():
         if entry.figure is not None and (stem == entry.figure or stem.startswith(f"{entry.figure}_")):
             yield f"Beside {entry.source}: {entry.comparison}"

@@ -153,7 +153,8 @@ def _branch_verdict(result) -> dict:
         "points": len(branch.parameter),
         "folds": len(branch.folds),
         "residual": float(np.max(branch.residual)),
-        "message": branch.message,
+        "message": result.ending,
+        **_truncation(branch.solutions, result.lines),
     }
 
 
@@ -161,7 +162,15 @@ def _response_verdict(result) -> dict:
     return {
         "converged": all(one.converged for one in result.solutions),
         "residual": max(one.residual for one in result.solutions),
-        "tail": max(one.tail for one in result.solutions),
+        **_truncation(result.solutions, result.lines),
+    }
+
+
+def _truncation(solutions, lines) -> dict:
+    """Largest shares of the amplitude in the upper half of the lines."""
+    return {
+        "tail": float(max(one.tail for one in solutions)),
+        "force_tail": float(max(one.force_tail for one in lines)),
     }
 
 
@@ -176,6 +185,11 @@ def _needs_helical_static(case: Case) -> tuple[str, ...]:
 def _nothing_excites(case: Case) -> str:
     given = case.helical.mesh_stiffness is not None
     return "a given helical.mesh_stiffness does not vary: nothing excites the set" if given else ""
+
+
+def _takes_the_place(case: Case) -> str:
+    given = case.helical.mesh_stiffness is not None
+    return "a given helical.mesh_stiffness takes the place of the static solution" if given else ""
 
 
 def _lacks(section: str) -> Callable[[Case], str]:
@@ -269,7 +283,7 @@ HELICAL = {
     "static": Stage(
         compute=_helical("solve_helical_static", cached=True, shows=True),
         verdict=_static_verdict,
-        wanted=lambda case: bool(_needs_helical_static(case)),
+        possible=_takes_the_place,
     ),
     "modes": Stage(
         compute=_helical("solve_helical_modes", after="static", cached=True),

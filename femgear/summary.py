@@ -21,7 +21,7 @@ from femgear.summary_drivetrain import (
     describe_spectrum,
     describe_transient,
 )
-from femgear.summary_helical import describe_helical
+from femgear.summary_helical import describe_helical, describe_helical_static
 from femgear.summary_phasing import describe_phasing
 from femgear.summary_planar import describe_branch, describe_planar, describe_response
 from femgear.summary_stress import describe_stress
@@ -200,6 +200,9 @@ def describe_results(results: Results) -> tuple[Block, ...]:
     }
     if isinstance(results.case, DrivetrainCase):
         describe["modes"] = describe_drivetrain_modes
+    elif results.case.helical is not None:
+        modes = results.modes if "modes" in results.stages else None
+        describe["static"] = lambda data: describe_helical_static(data, modes)
     blocks = [describe[stage](getattr(results, stage)) for stage in results.stages]
     timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
     return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
@@ -293,7 +296,7 @@ def _dynamics(data: xr.Dataset) -> Block:
     )
     notes = (
         "DTE rms: the largest of all meshes, without its mean; iterations, radius: of the fixed point,",
-        "which contracts below 1; Floquet: largest multiplier, stable below 1",
+        "which contracts below 1; Floquet: largest multiplier, stable up to 1 (exactly 1 without damping)",
         f"{int(data.converged.sum())} of {len(stable)} speeds converged, {int(stable.sum())} stable",
     )
     return Block("Dynamics", header, rows, notes)

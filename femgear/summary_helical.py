@@ -6,12 +6,16 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from femgear.gears import involute
 from femgear.gears.helix import virtual_teeth
 from femgear.models.helical_data import contact_ratios
 from femgear.summary_block import Block
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from femgear.case import Case
     from femgear.gears import PlanetarySet
 
@@ -96,3 +100,39 @@ def _model(case: Case, s: PlanetarySet) -> tuple[str, ...]:
     slices = "one slice" if helical.slices == 1 else f"{helical.slices} slices"
     points = helical.contact_points.replace("_", " ")
     return text, f"{slices} over the face width; forces act at the {points}"
+
+
+def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None) -> Block:
+    """Numbers of static.nc, which holds spur gears, and beside them those of the helical meshes.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        Contents of static.nc of a helical case.
+    modes : xarray.Dataset, optional
+        Contents of modes.nc, which has stiffness and transmission error of the helical meshes.
+    """
+    sources = [("spur", static["ste"], static["mesh_stiffness"])]
+    if modes is not None and "helical_ste" in modes:
+        sources.insert(0, ("helical", modes["helical_ste"], modes["helical_stiffness"]))
+    header, columns = ["mesh"], [[str(name) for name in static["mesh"].values]]
+    for name, *pair in sources:
+        for values, short, factor, unit in zip(pair, ("STE", "k"), (1e6, 1e-6), ("um", "N/um")):
+            values = factor * values.values
+            header += [f"{name} {short} mean [{unit}]", "p-p"]
+            columns += [
+                [f"{v:.4g}" for v in values.mean(axis=1)],
+                [f"{v:.4g}" for v in np.ptp(values, axis=1)],
+            ]
+    header.append("spur force [N]")
+    columns.append([f"{v:.3f}" for v in static["mesh_force"].values.mean(axis=1)])
+    share = static["load_share"].values
+    notes = [
+        "spur: transverse spur section, whose gears the slices come from; all along its line of action",
+        f"load share of a planet in the transverse spur section {share.min():.4f} to {share.max():.4f} "
+        f"(equal: {1 / static.sizes['planet']:.4f}); contact: {static.attrs.get('contact', 'unknown')}",
+    ]
+    if static.attrs.get("mesh_periods", 1) > 1:
+        notes.append(str(static.attrs["period"]))
+    notes += [f"[{text.strip()}" for text in str(static.attrs.get("warnings", "")).split("[") if text]
+    return Block("Static", tuple(header), tuple(zip(*columns)), tuple(notes))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from femgear.gears import PlanetarySet
 
 HARMONICS = 6
-DISTANCE, TOLERANCE = 2, 0.02
+DISTANCE, TOLERANCE = 3, 0.02
 ROWS = 8
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,12 @@ if TYPE_CHECKING:
 _MANY = 8
 # distance of a multiplier from 1 at a limit point beyond which harmonics are missing
 _TRUNCATED = 0.2
+# share of the energy in the upper half of the lines beyond which it is said, as in the spectral stage, and
+# share of the amplitude beyond which forces are wrong
+_ENERGY, _WRONG = 1e-6, 0.05
+# smoothing over mean compression that is said: the force is then wrong by (0.05 / 2)^2, 0.06 %
+_SMOOTH = 0.05
+_STABLE = {1: "yes", 0: "no", -1: "not known"}
 
 
 def describe_planar(case: Case, planetary: PlanetarySet) -> Block:
@@ -35,6 +42,7 @@ def describe_planar(case: Case, planetary: PlanetarySet) -> Block:
     notes.append(f"the torque on the {case.operation.input} is taken up by {held}")
     if planar.gravity is not None:
         notes.append(f"weight {planar.gravity.acceleration:.6g} m/s^2; {_sense(case)}")
+    notes.append(_smoothing(case, planetary))
     return Block("Planar model", _BODIES, tuple(_bodies(case)), tuple(notes))
 
 
@@ -69,6 +77,23 @@ def _play(case: Case, planetary: PlanetarySet) -> str:
     return f"play along the line of action {text} um, back flanks {own}"
 
 
+def _smoothing(case: Case, planetary: PlanetarySet) -> str:
+    """Length over which contact sets in, beside the mean compression where the stiffness is given."""
+    from femgear.gears import torques
+
+    given, smoothing = case.planar.mesh_stiffness, case.planar.smoothing
+    text = f"contact sets in over {smoothing * 1e6:.6g} um"
+    if given is None:
+        return text
+    torque = torques(planetary, member=case.operation.input, torque=case.operation.torque).sun
+    force = abs(torque) / (planetary.n_planets * planetary.sun.base_radius)
+    compression = force / max(given.sun_planet, given.planet_ring)
+    text += f", {smoothing / compression:.2g} of the mean compression {compression * 1e6:.4g} um"
+    if smoothing <= _SMOOTH * compression:
+        return text
+    return f"[W-SMOOTHING] {text}: lower planar.smoothing where teeth part or wedge"
+
+
 def _sense(case: Case) -> str:
     """How torque and turning of the carrier belong together."""
     operation = case.operation
@@ -85,7 +110,7 @@ def describe_branch(data: xr.Dataset) -> Block:
 
     hertz, rms = data["weight_frequency"].values, data["rms"].values
     known = data.attrs["stability"] != "not computed"
-    stable = data["stable"].values.astype(bool)
+    stable = data["stable"].values
     chosen = {0: "start", len(hertz) - 1: "end"}
     chosen |= {int(point): "fold" for point in merged_folds(hertz, data["fold"].values)}
     chosen[int(np.argmax(rms[:, 0, 0]))] = "largest carrier x"
@@ -99,7 +124,7 @@ def describe_branch(data: xr.Dataset) -> Block:
                 chosen[point],
                 *(f"{1e6 * rms[point, member, 0]:.3f}" for member in range(3)),
                 f"{back:.3f}",
-                ("yes" if stable[point] else "no") if known else "-",
+                _STABLE[int(stable[point])] if known else "-",
             )
         )
     header = (
@@ -107,12 +132,72 @@ def describe_branch(data: xr.Dataset) -> Block:
         "stable",
     )  # fmt: skip
     notes = [
-        f"{len(hertz)} points, {data.attrs['message']!s}; largest tail {float(data['tail'].max()):.2g}",
+        f"{len(hertz)} points; {data.attrs['message']!s}",
         "back contact: largest share of the cycle in which back flanks touch",
     ]
-    notes += [f"not stable: {text}" for text in _unstable(data)] if known else ["stability was not computed"]
+    notes += _verdicts(data) if known else ["stability was not computed"]
     notes += _truncation(data) if known else []
+    notes += [_tails(data), *tail_warnings(data, "planar.branch.harmonics")]
     return Block("Response to the weight", header, tuple(rows), tuple(notes))
+
+
+def _tails(data: xr.Dataset) -> str:
+    tail, force = (float(data[name].max()) for name in ("tail", "force_tail"))
+    return (
+        f"tail, share of the amplitude in the upper half of the lines: up to {tail:.2g} of the deflections, "
+        f"{force:.2g} of the mesh forces"
+    )
+
+
+def tail_warnings(data: xr.Dataset, key: str) -> tuple[str, ...]:
+    """What truncation of the lines does to branch.nc or response.nc, in sentences.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    key : str
+        Entry of the case file to raise.
+    """
+    tail, force = data["tail"].values, data["force_tail"].values
+    worst = np.maximum(tail, force)
+    if (wrong := worst > _WRONG).any():
+        return (
+            f"[W-TAIL] {_where(data, wrong)}: {worst.max():.2g} of the amplitude lies in the upper half of "
+            f"the lines ({tail.max():.2g} of the deflections, {force.max():.2g} of the mesh forces): forces "
+            f"and contact shares of this response are not to be trusted, raise {key}",
+        )
+    if (cut := worst**2 > _ENERGY).any():
+        return (
+            f"{_where(data, cut)}: {worst.max() ** 2:.2g} of the energy of deflections or mesh forces lies "
+            f"in the upper half of the lines; {key} says how many there are",
+        )
+    return ()
+
+
+def _where(data: xr.Dataset, bad: np.ndarray) -> str:
+    """Points or speeds, in words."""
+    if "weight_frequency" in data:
+        hertz = data["weight_frequency"].values[bad]
+        return f"{len(hertz)} of {len(bad)} points, {hertz.min():.4g} to {hertz.max():.4g} Hz"
+    listed = ", ".join(f"{value:.6g}" for value in data["speed"].values[bad][:_MANY])
+    return f"{np.count_nonzero(bad)} of {len(bad)} speeds, {listed} rpm"
+
+
+def planar_verdicts(branch: xr.Dataset | None, response: xr.Dataset | None) -> Iterator[str]:
+    """What speaks against results of a planar case, for the head of the report."""
+    if branch is not None:
+        if not bool(branch.attrs["complete"]):
+            yield f"the branch of the response to the weight: {branch.attrs['message']!s}"
+        yield from tail_warnings(branch, "planar.branch.harmonics")
+    if response is not None:
+        yield from tail_warnings(response, response_key(response))
+
+
+def response_key(data: xr.Dataset) -> str:
+    """Entries of the case file that hold the lines of response.nc."""
+    if not data.attrs["mesh_lines"]:
+        return "planar.response.carrier_harmonics"
+    return "planar.response.carrier_harmonics, side_bands or dynamics.response_harmonics"
 
 
 def _truncation(data: xr.Dataset) -> Iterator[str]:
@@ -128,14 +213,17 @@ def _truncation(data: xr.Dataset) -> Iterator[str]:
             )
 
 
-def _unstable(data: xr.Dataset) -> Iterator[str]:
-    """Parts of the branch that are not stable, in words."""
-    stable, hertz = data["stable"].values.astype(bool), data["weight_frequency"].values
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], stable, [True]]).astype(int)))
-    for first, last in zip(edges[::2], edges[1::2]):
-        losses = [str(text) for text in data["loss"].values[first:last]]
-        kinds = ", ".join(text or "open" for text in dict.fromkeys(losses))
-        yield f"{hertz[first]:.3f} to {hertz[last - 1]:.3f} Hz along the branch ({kinds})"
+def _verdicts(data: xr.Dataset) -> Iterator[str]:
+    """Parts of the branch that are not stable, or not known to be, in words."""
+    stable, hertz = data["stable"].values, data["weight_frequency"].values
+    edges = np.flatnonzero(np.diff(stable, prepend=stable[0] + 5, append=stable[-1] + 5))
+    for first, last in pairwise(edges):
+        state, what = stable[first], data["stability_note" if stable[first] < 0 else "loss"]
+        if state == 1:
+            continue
+        reasons = ", ".join(dict.fromkeys(str(text) for text in what.values[first:last]))
+        span = f"{hertz[first]:.3f} to {hertz[last - 1]:.3f} Hz along the branch"
+        yield f"not stable: {span} ({reasons})" if state == 0 else f"not determined: {span} ({reasons})"
 
 
 def describe_response(data: xr.Dataset) -> Block:
@@ -156,17 +244,17 @@ def describe_response(data: xr.Dataset) -> Block:
                 f"{float(one.drive_contact.min()):.3f}",
                 f"{float(one.back_contact.max()):.3f}",
                 f"{float(one['tail']):.2g}",
-                "yes" if bool(one.converged) else "NO",
+                f"{float(one['force_tail']):.2g}",
             )
         )
     header = (
         "speed [rpm]", "mesh [Hz]", "carrier x rms [um]", "mesh force rms [kN]", "drive contact",
-        "back contact", "tail", "converged",
+        "back contact", "tail", "force tail",
     )  # fmt: skip
     notes = [
-        f"{data.sizes['line']} lines of weight and mesh frequency; mesh force: the largest fluctuation of "
+        f"{data.sizes['line']} {_kind_of_lines(data)}; mesh force: the largest fluctuation of "
         "all meshes; contact: least share of the time of the drive flanks, largest of the back flanks",
-        "stability of responses with two base frequencies is not covered",
+        "the stability of these responses is not computed",
     ]
     hertz = np.sort(np.abs(data["frequency"].values), axis=1)
     if np.any(np.diff(hertz, axis=1) <= 1e-9 * hertz.max()):
@@ -174,7 +262,14 @@ def describe_response(data: xr.Dataset) -> Block:
             "some lines have one frequency: planar.response.carrier_harmonics or side_bands reach from the "
             "weight to the mesh frequency; r.m.s. values count such lines apart"
         )
+    notes += tail_warnings(data, response_key(data))
     return Block("Weight and mesh frequency", header, tuple(rows), tuple(notes))
+
+
+def _kind_of_lines(data: xr.Dataset) -> str:
+    if data.attrs["mesh_lines"]:
+        return "lines of weight and mesh frequency"
+    return "lines of the weight alone: a constant mesh stiffness leaves none of the mesh frequency"
 
 
 def published_modes(case: Case, data: xr.Dataset) -> Block | None:

@@ -25,7 +25,7 @@ def main(
     harmonics: int = 5,
     backlash: str = "150 um",
     frequencies: int = 8,
-    points: int = 13,
+    points: int = 25,
 ) -> None:
     """Resonance curves of the ring of set A (NREL/CP-5000-55355) and maps of the tooth contact.
 
@@ -67,7 +67,7 @@ def main(
         progress("contact maps", 1)
     save_figure(_map_figure(found, play), folder / "tooth_contact.png")
     # stability is not asked for here
-    drawn = [(text, hertz, rms, np.ones(len(rms), bool)) for text, hertz, rms, _ in curves]
+    drawn = [(text, hertz, rms, np.ones(len(rms), int)) for text, hertz, rms, _ in curves]
     save_figure(response_branches(drawn, quantity="ring x, r.m.s."), folder / "ring_resonance.png")
     rows = [(text, float(f), float(r)) for text, hertz, rms, _ in curves for f, r in zip(hertz, rms)]
     write_csv(folder / "ring_resonance.csv", ("clearance", "frequency [Hz]", "ring x r.m.s. [m]"), rows)
@@ -112,10 +112,24 @@ def _print(curves, found, play):
     rows = [(text, f"{hertz:.2f}", f"{1e6 * size:.1f}", end) for text, _, _, (hertz, size, end) in curves]
     header = ("bearing", "ring resonance [Hz]", "ring x r.m.s. [um]", "end of the branch")
     print_table("Resonance of the ring", header, rows)
-    ratio = wedging_onset(found) / play
-    print(
-        "back flanks touch from clearance / play =", ", ".join(f"{value:.2f}" for value in np.unique(ratio))
-    )
+    missing = np.isnan(found.back[..., 0])
+    if missing.any():
+        print(
+            f"{np.count_nonzero(missing)} of {missing.size} cells of the maps not converged: grey, left out"
+        )
+    known = wedging_onset(found)
+    # an onset is one where the clearance below it is known not to touch
+    sure = [
+        i for i, value in enumerate(known)
+        if np.isfinite(value) and not missing[i, : np.searchsorted(found.clearance, value)].any()
+    ]  # fmt: skip
+    for i in np.setdiff1d(np.flatnonzero(np.isfinite(known)), sure):
+        print(f"at {found.frequency[i]:.3g} Hz where back flanks begin to touch is not known")
+    ratio, step = np.unique(np.round(known[sure] / play, 6)), np.diff(found.clearance)[0] / play
+    if len(ratio):
+        text = ", ".join(f"{value:.3g}" for value in ratio)
+        note = f"(steps of {step:.3g}, {len(sure)} frequencies)"
+        print(f"back flanks touch from clearance / play = {text} {note}")
 
 
 if __name__ == "__main__":

@@ -89,8 +89,13 @@ def _figure(found, train):
     for number, values in enumerate(found.frequency.T):
         ax.plot(speed, values, label=f"mode {number + 1}", **line_style(number))
     top = 1.1 * found.frequency.max()
-    for order in found.orders:
-        ax.plot(speed, order * found.speed / (2.0 * np.pi), color=GREY, linewidth=0.8, label="excitation")
+    for number, order in enumerate(found.orders):
+        teeth = RING_TEETH[train]
+        text = "weight, carrier speed" if order == 1.0 else f"mesh frequency × {order / teeth:g}"
+        ax.plot(
+            speed, order * found.speed / (2.0 * np.pi), color=GREY, linewidth=1.0, label=text,
+            linestyle=(0, (6, 2) + (1, 2) * number),
+        )  # fmt: skip
     for one in found.critical:
         ax.plot(one.speed / RPM, one.frequency, "ko", markersize=4)
     ax.set_ylim(0.0, top)

@@ -98,8 +98,9 @@ def _follow(problem, limits, harmonics, stability):
 
     branch = weight_branch(problem, limits, harmonics=harmonics, stability=stability)
     rms = member_rms(problem, branch.solutions, "carrier")[:, 0]
-    # without multipliers nothing is known: drawn as stable, said so in the table
-    stable = branch.stable if stability else np.ones(len(rms), bool)
+    # 1 stable, 0 not, -1 not known
+    known = [one.stable for one in branch.verdicts] if stability else [None] * len(rms)
+    stable = np.array([-1 if one is None else int(one) for one in known])
     return branch, branch.parameter / (2.0 * np.pi), rms, stable
 
 

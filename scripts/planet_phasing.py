@@ -14,6 +14,7 @@ from script_tools import print_table, ready_folder, run_script, say_files, write
 from femgear.errors import CaseError
 
 # four equal planets near the published 30/20/70
+MOST_HARMONICS = 100
 TYPES = {"in-phase": (28, 22, 72), "counter-phased": (30, 20, 70), "sequentially phased": (29, 21, 71)}
 
 
@@ -46,7 +47,7 @@ def main(
     convention
         Phases of turning teeth, or as printed in Eq. (6) of the paper.
     harmonics
-        Harmonics of the mesh frequency.
+        Harmonics of the mesh frequency, up to 100.
     distance
         Largest change of each tooth number.
     tolerance
@@ -58,18 +59,21 @@ def main(
     from femgear.gears.checks import feasible_angles
     from femgear.gears.phasing import mesh_phasing, standard_lag
     from femgear.gears.phasing_tables import phasing_table
-    from femgear.gears.tooth_choice import neighbouring_teeth
+    from femgear.gears.tooth_choice import check_teeth, neighbouring_teeth
     from femgear.plots import save_figure
     from femgear.plots.phasing import mesh_force_spectra, phase_diagram, resultant_chart
 
-    if points < 2 or harmonics < 1:
+    if points < 2 or not 1 <= harmonics <= MOST_HARMONICS:
         raise CaseError(
-            f"{points} frequencies, {harmonics} harmonics", code="E-RANGE", limit="2 frequencies, 1 harmonic"
-        )
+            f"{points} frequencies, {harmonics} harmonics", code="E-RANGE",
+            limit=f"2 frequencies or more, 1 to {MOST_HARMONICS} harmonics",
+        )  # fmt: skip
     planets = len(angle) or planets
-    choices = neighbouring_teeth(sun, planet, ring, planets, distance=distance, ratio_tolerance=tolerance)
     psi = tuple(np.radians(angle)) or feasible_angles(sun + ring, equal_planet_angles(planets))
     phasing = mesh_phasing(sun, ring, psi, convention=convention, lag=standard_lag(planet))
+    for remark in check_teeth(phasing, planet):
+        print(f"remark: {remark}")
+    choices = neighbouring_teeth(sun, planet, ring, planets, distance=distance, ratio_tolerance=tolerance)
     table = phasing_table(phasing, range(1, harmonics + 1))
     folder = ready_folder(output)
     header, rows = _phasing_rows(table)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from femgear.analysis_planar import planar_data, planar_model
-from femgear.analysis_planar_checks import check_planar_case
+from femgear.analysis_planar_checks import check_planar_case, check_smoothing, mean_compression
 from femgear.case import parse_case, planetary_set, read_case, to_toml, with_value
 from femgear.errors import CaseError
 from femgear.gears import check_set
@@ -152,7 +152,8 @@ def test_everything_wrong_is_reported_at_once_with_its_line(tmp_path):
 
 def test_keys_without_effect_are_said(pgb):
     assert pgb.notices == (
-        "static, dynamics.mesh_harmonics have no effect while planar.mesh_stiffness is given",
+        "static, dynamics.mesh_harmonics, planar.response.side_bands have no effect while "
+        "planar.mesh_stiffness is given",
     )
     more = with_value(pgb, "housing.points", 60)
     more = with_value(more, "ring.foundation_radial", "1e10 N/m^3")
@@ -192,3 +193,42 @@ def test_the_sense_of_torque_and_turning_is_that_of_the_operation(pgb, input_, t
     load = problem.system.load[problem.system.dofs.index("carrier: u")]
     turning = problem.forces[0].orders[0]
     assert np.sign(load * turning) == (1 if words == "with" else -1)
+
+
+def test_one_wrong_damping_ratio_is_one_problem(pgb):
+    error = refused(pgb, "planar.damping_ratios", [1.0])
+    assert [problem.key for problem in error.problems] == ["planar.damping_ratios[0]"]
+
+
+def test_a_response_in_which_nothing_varies_is_said(pgb):
+    plain = with_value(with_value(pgb, "planar.branch", None), "planar.gravity", None)
+    assert any("nothing varies in time" in note and "no weight" in note for note in plain.notices)
+    assert not any("nothing varies" in note for note in pgb.notices)
+    still = with_value(with_value(pgb, "planar.branch", None), "planar.reaction", "output")
+    still = with_value(with_value(still, "operation.input", "sun"), "operation.fixed", "carrier")
+    assert any("nothing varies in time" in note and "stands" in note for note in still.notices)
+    # with the stiffness of teeth the meshing itself excites
+    teeth = with_value(with_value(plain, "planar.mesh_stiffness", None), "planar.gravity", None)
+    assert not any("nothing varies" in note for note in teeth.notices)
+
+
+def test_smoothing_is_bound_by_play_and_compression(pgb):
+    gears = planetary_set(pgb)
+    model = planar_model(pgb, gears)
+    # rigid gears share the torque of the sun: force / stiffness of the stiffer mesh
+    force = 180e3 / (1 + 68 / 16) / 3 / gears.sun.base_radius
+    assert mean_compression(model) == pytest.approx(force / 5.29e9, rel=1e-3)
+    check_smoothing(pgb, gears, model)
+    narrow = with_value(pgb, "planar.line_backlash", "4 um")
+    for base, value, words in ((pgb, "22 um", "mean compression"), (narrow, "3 um", "half the play")):
+        case = with_value(base, "planar.smoothing", value)
+        with pytest.raises(CaseError, match=words) as info:
+            check_smoothing(case, gears, planar_model(case, gears))
+        assert info.value.code == "E-RANGE"
+    notes = [
+        note
+        for block in describe_case(with_value(pgb, "planar.smoothing", "2 um"), gears)
+        for note in block.notes
+    ]
+    assert any("[W-SMOOTHING]" in note for note in notes)
+    assert not any("[W-SMOOTHING]" in note for block in describe_case(pgb, gears) for note in block.notes)

@@ -15,9 +15,11 @@ from femgear.case import parse_case, planetary_set, read_case, to_toml, with_val
 from femgear.casefile import tomlfile
 from femgear.errors import CaseError
 from femgear.gears.iso6336 import mesh_stiffness_method_b
+from femgear.plots.helical_results import alike_lines, transmission_errors
 from femgear.run import grid_cache, run_case
 from femgear.run_stages import stages_of
 from femgear.storage import open_results, run_folder
+from femgear.summary_helical import describe_helical_static
 from femgear.system import MeshExcitation
 from femgear.validation.helical import PHASINGS, TABLE_4
 
@@ -27,11 +29,11 @@ STIFF = {
     "sun.support_stiffness": "1e15 N/m",
     "carrier.support_stiffness": "1e15 N/m",
     "planet.bearing_stiffness": "1e15 N/m",
-    "helical.ring.support_stiffness": "1e15 N/m",
+    "helical.ring.support_stiffness": "1e14 N/m",
     "helical.ring.torsional_stiffness": None,
-    "helical.carrier.torsional_stiffness": "1e15 N m/rad",
-    **{f"helical.{body}.axial_stiffness": "1e15 N/m" for body in ("sun", "ring", "carrier", "planet")},
-    **{f"helical.{body}.tilt_stiffness": "1e15 N m/rad" for body in ("sun", "ring", "carrier", "planet")},
+    "helical.carrier.torsional_stiffness": "1e13 N m/rad",
+    **{f"helical.{body}.axial_stiffness": "1e14 N/m" for body in ("sun", "ring", "carrier", "planet")},
+    **{f"helical.{body}.tilt_stiffness": "1e13 N m/rad" for body in ("sun", "ring", "carrier", "planet")},
 }
 
 
@@ -98,13 +100,22 @@ def over_a_period(values, positions):
 def test_natural_frequencies_are_those_of_the_paper(given):
     found = solve_helical_modes(given).dataset()
     phasing, hertz = found["phasing"].values.astype(str), found["frequency"].values
+    for key, (printed, _) in TABLE_4.items():
+        here = hertz[(phasing == PHASINGS[key]) & (hertz > 0.0) & (hertz < 15e3)]
+        here = here[::2] if key == "SP" else here
+        np.testing.assert_allclose(here, printed, rtol=0.0025 if key == "SP" else 3e-4)
+    assert "helical_stiffness" not in found
+
+
+def test_natural_frequencies_with_the_contact_points_of_the_paper(given):
+    found = solve_helical_modes(with_value(given, "helical.contact_points", "base_circles")).dataset()
+    phasing, hertz = found["phasing"].values.astype(str), found["frequency"].values
     for key, (printed, precise) in TABLE_4.items():
         here = hertz[(phasing == PHASINGS[key]) & (hertz > 0.0) & (hertz < 15e3)]
         here = here[::2] if key == "SP" else here
         np.testing.assert_allclose(here, printed, rtol=0.0025 if key == "SP" else 3e-4)
         # the independent computation has the pressure angle rounded to 21.34 deg
         np.testing.assert_allclose(here, precise, rtol=5e-5)
-    assert "helical_stiffness" not in found
 
 
 def test_shapes_are_motions_in_space(given):
@@ -231,7 +242,10 @@ def test_forces_and_moments_balance_at_every_harmonic_of_rest(results):
     assert abs(axial.sum()) < 1e-6 * np.abs(axial).max()
     # thrust of sun and ring tilts a planet on its pin by the pressure of both, a base radius apart
     tilt = data["pin_moment_real"].sel(harmonic=0, direction="tangential").values
-    assert np.ptp(tilt) < 1e-3 * np.abs(tilt).max() and np.abs(tilt).min() > 1.0
+    assert np.ptp(tilt) < 1e-3 * np.abs(tilt).max()
+    thrust = np.abs(axial).max() / 4
+    # the pitch points stand at 2/5 of the centre distance from the planet's centre
+    np.testing.assert_allclose(np.abs(tilt).mean(), 2 * 0.4 * distance * thrust, rtol=1e-6)
     np.testing.assert_allclose(lines(data, "slice_force").sum(axis=1), lines(data, "mesh_force"))
 
 
@@ -281,6 +295,8 @@ def test_a_run_computes_all_stages_and_shows_them(results):
     )
     assert {f"{name}.png" for name in wanted} <= figures
     assert page.count("<figure>") == len(figures) and "Other pictures" not in page
+    # four captions, each of them a text beside the picture too
+    assert page.count("Transverse spur section") == 8
     for words in ("from the side", "overlap ratio", "virtual gears 37/25/87", "Mesh forces of planet 1"):
         assert words in page
     assert cli.main(["report", str(results.folder)]) == 0
@@ -308,12 +324,50 @@ def test_results_page_names_every_variable(results):
 def test_stages_of_helical_cases(coarse, given, tmp_path, capsys):
     assert stages_of(coarse) == ("static", "modes", "dynamics") and stages_of(given) == ("modes",)
     assert stages_of(coarse, "modes") == ("static", "modes")
-    for case, stage in ((coarse, "housing"), (coarse, "stress"), (given, "dynamics"), (coarse, "branch")):
+    for case, stage in ((coarse, "housing"), (coarse, "stress"), (given, "dynamics"), (given, "static")):
         with pytest.raises(CaseError, match="E-STAGE"):
             stages_of(case, stage)
+    with pytest.raises(CaseError, match="E-STAGE"):
+        stages_of(coarse, "branch")
     path = tmp_path / "case.toml"
     path.write_text(to_toml(given), encoding="utf-8")
     assert cli.main(["run", str(path), "-o", str(tmp_path / "out"), "--no-pictures"]) == 0
     assert open_results(tmp_path / "out").stages == ("modes",)
     assert cli.main(["run", str(path), "-o", str(tmp_path / "no"), "--only", "dynamics"]) == 2
     assert "nothing excites" in capsys.readouterr().err and not (tmp_path / "no").exists()
+
+
+def test_static_table_has_the_helical_meshes_beside_the_spur_section(results):
+    block = describe_helical_static(results.static, results.modes)
+    assert block.title == "Static" and "transverse spur section" in block.notes[0]
+    assert not any("p max" in text for text in block.header) and len(block.rows) == 8
+    row = dict(zip(block.header, block.rows[0]))
+    for name, data, entry in (("helical", results.modes, "helical"), ("spur", results.static, "mesh")):
+        mean = data[f"{entry}_stiffness"].values[0].mean() / 1e6
+        assert float(row[f"{name} k mean [N/um]"]) == pytest.approx(mean, rel=1e-3)
+    alone = describe_helical_static(results.static)
+    assert not any("helical" in text for text in alone.header)
+    assert len(alone.header) == len(alone.rows[0])
+
+
+def test_curves_that_agree_are_drawn_once():
+    names = [*(f"sun-planet {n}" for n in (1, 2, 3, 4)), *(f"planet {n}-ring" for n in (1, 2, 3, 4))]
+    one, other = np.sin(np.arange(9.0)), np.cos(np.arange(9.0))
+    lines = alike_lines(names, [one, other, one, other, one, one, one, one])
+    assert lines == [
+        ("sun-planet 1, sun-planet 3 (identical)", 0),
+        ("sun-planet 2, sun-planet 4 (identical)", 1),
+        ("all planet-ring meshes (identical)", 4),
+    ]
+    lines = alike_lines(names, np.diag(np.arange(1.0, 9.0)))
+    assert lines == [(name, row) for row, name in enumerate(names)]
+
+
+def test_eight_meshes_have_eight_styles(results):
+    dynamics = results.dynamics.copy(deep=True)
+    scale = np.arange(1.0, 9.0)[None, :, None]
+    for part in ("real", "imag"):
+        dynamics[f"dte_{part}"] = dynamics[f"dte_{part}"] * scale
+    ax = transmission_errors(dynamics, results.modes).axes[0]
+    drawn = [line for line in ax.get_lines() if line.get_label().startswith("dynamic")]
+    assert len(drawn) == 8 == len({(line.get_color(), line.get_linestyle()) for line in drawn})

@@ -12,16 +12,20 @@ from femgear import run_stages as stages_module
 from femgear.analysis import solve_static
 from femgear.analysis_planar import planar_model, solve_branch, solve_planar_modes, solve_planar_response
 from femgear.case import planetary_set, read_case, to_toml, with_value
-from femgear.errors import CaseError
+from femgear.errors import CaseError, ConvergenceError
 from femgear.models.planar import PlanarTorque, planar_system
 from femgear.models.planar_response import judged_branch, merged_folds, motion_lines
 from femgear.models.wind_turbine import bearing_problem_a, gravity_problem_b
 from femgear.models.wind_turbine_response import member_rms, resonance, weight_branch
+from femgear.plots.planar_results import response_mesh_forces, weight_response
+from femgear.report_captions import comparisons
 from femgear.run import run_case
 from femgear.run_stages import stages_of
 from femgear.solvers.hill import floquet_verdicts
 from femgear.solvers.transient import solve_transient
+from femgear.solvers.verdict import open_verdict
 from femgear.storage import open_results, run_folder
+from femgear.summary_planar import describe_branch, planar_verdicts, tail_warnings
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ("weight_response", "carrier_orbit", "planet_bearing_forces", "tooth_contact", "wedged_teeth")
@@ -307,3 +311,144 @@ def test_weight_and_meshing_together_agree_with_integration(coarse, static):
     error = moved.force[1:] - (wave @ found.force.T).real
     # what is left is the integration's, of second order: 0.6 % with these steps, 0.1 % with 1000 a period
     assert np.sqrt((error**2).mean(axis=0)).max() < 0.01 * moved.force[1:].std(axis=0).max()
+
+
+def test_an_undamped_resonance_is_refused(pgb):
+    bare = changed(pgb, planar__damping_ratios=[0.0], planar__back_flanks=False)
+    over = changed(bare, planar__branch={"from": "35 Hz", "to": "60 Hz", "harmonics": 3, "stability": False})
+    with pytest.raises(CaseError, match=r"40\.76.* Hz has no damping") as info:
+        solve_branch(over)
+    assert info.value.code == "E-RESONANCE" and info.value.exit_code == 2
+    # beside it the response is that of the undamped set
+    beside = changed(
+        bare, planar__branch={"from": "30 Hz", "to": "32 Hz", "harmonics": 3, "stability": False}
+    )
+    assert solve_branch(beside).branch.complete
+    with pytest.raises(CaseError, match="E-RESONANCE"):
+        solve_planar_response(changed(bare, operation__speeds=["2445.665 rpm"]))
+
+
+def test_a_branch_ends_before_motions_that_are_not_small(pgb):
+    faint = changed(
+        pgb, planar__damping_ratios=[1e-4], planar__back_flanks=False,
+        planar__branch={"from": "39 Hz", "to": "45 Hz", "harmonics": 2, "stability": False, "points": 40},
+    )  # fmt: skip
+    found = solve_branch(faint)
+    data, module = found.dataset(), 14e-3
+    assert not data.attrs["complete"] and "more than 28 mm (2 modules)" in data.attrs["message"]
+    assert 20e-3 < data["motion"].values.max() <= 2 * module
+    assert 39.0 < data["weight_frequency"].values[-1] < 40.761
+    # the motion over the mean, of the lines
+    lines = data["displacement_real"].values + 1j * data["displacement_imag"].values
+    assert data["motion"].values.max() == pytest.approx(np.abs(lines[-1]).sum(axis=-1).max(), rel=0.3)
+    with pytest.raises(ConvergenceError, match="E-MOTION") as info:
+        solve_planar_response(changed(faint, operation__speeds=["2445.6 rpm"]))
+    assert info.value.exit_code == 3
+
+
+def test_a_response_that_does_not_converge_is_a_numerical_failure(pgb, monkeypatch, tmp_path, capsys):
+    from femgear.solvers import harmonic_balance
+
+    honest = harmonic_balance.solve_harmonic_balance
+
+    def lost(*arguments, **options):
+        return replace(honest(*arguments, **options), converged=False, message="it wandered off.")
+
+    monkeypatch.setattr(harmonic_balance, "solve_harmonic_balance", lost)
+    path = tmp_path / "case.toml"
+    path.write_text(to_toml(pgb), encoding="utf-8")
+    out = tmp_path / "out"
+    assert cli.main(["run", str(path), "-o", str(out), "--only", "response", "--no-pictures"]) == 3
+    said = capsys.readouterr().err
+    assert "no response at 1 of 1 speeds: 30 rpm" in said and "wandered off" in said
+    with pytest.warns(UserWarning):
+        assert "response" not in open_results(out).stages
+
+
+def test_open_verdicts_are_not_verdicts(pgb):
+    found = solve_branch(pgb)
+    why = "not determined: too many steps"
+    solutions = list(found.branch.solutions)
+    for i in (1, 2):
+        solutions[i] = replace(solutions[i], verdict=open_verdict(why))
+    data = replace(found, branch=replace(found.branch, solutions=tuple(solutions))).dataset()
+    stable = data["stable"].values
+    assert set(stable) == {1, 0, -1} and np.flatnonzero(stable == -1).tolist() == [1, 2]
+    assert data["stable"].attrs["flag_meanings"] == "stable not_stable not_known"
+    notes = describe_branch(data).notes
+    hertz = data["weight_frequency"].values
+    assert f"not determined: {hertz[1]:.3f} to {hertz[2]:.3f} Hz along the branch ({why})" in notes
+    assert not any(note.startswith(f"not stable: {hertz[1]:.3f}") for note in notes)
+    lines = weight_response(data).axes[0].get_lines()
+    dotted = [line.get_xdata() for line in lines if line.get_linestyle() == ":"]
+    assert len(dotted) == 1 and dotted[0].tolist() == hertz[:4].tolist()
+
+
+def test_truncation_is_said(results):
+    """Three harmonics do not carry the forces of teeth that wedge."""
+    data = results.branch
+    force = data["back_force_real"].values + 1j * data["back_force_imag"].values
+    drive = data["mesh_force_real"].values + 1j * data["mesh_force_imag"].values
+    # of the last point: energy of harmonics 2 and 3 in that of 1 to 3, planet-ring meshes
+    energy = (np.abs(force[-1, 3:]) ** 2 + np.abs(drive[-1, 3:]) ** 2).sum(axis=0)
+    assert data["force_tail"].values[-1] >= np.sqrt(energy[2:].sum() / energy[1:].sum()) * (1 - 1e-9)
+    assert data["force_tail"].values.max() > 0.05
+    notes = [note for note in describe_branch(data).notes if "[W-TAIL]" in note]
+    assert len(notes) == 1 and "not to be trusted, raise planar.branch.harmonics" in notes[0]
+    page = (results.folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("[W-TAIL]") == 2
+    assert results.manifest.convergence["branch"]["force_tail"] == data["force_tail"].values.max()
+    assert "came to the end of its range, 37.2 Hz" in data.attrs["message"]
+    few = data.assign(tail=0.0 * data["tail"] + 2e-3, force_tail=0.0 * data["tail"])
+    assert ["4e-06 of the energy" in note for note in tail_warnings(few, "key")] == [True]
+    assert tail_warnings(few.assign(tail=0.4 * few["tail"]), "key") == ()
+
+
+def test_forces_in_time_are_those_of_one_sided_contact(results, pgb):
+    data = results.branch
+    assert data["flank_force"].values.min() >= 0.0 and data["drive_force"].values.min() >= 0.0
+    assert data["shown_as"].values.tolist()[0] == "start"
+    point = int(data["shown_point"].values[-1])
+    # low lines of the forces in time are the lines of the solution
+    for time, lines in (("drive_force", "mesh_force"), ("flank_force", "back_force")):
+        wave = np.fft.rfft(data[time].values[-1, :, :-1], axis=1)[:, :4] / 720 * [1, 2, 2, 2]
+        known = (data[f"{lines}_real"] + 1j * data[f"{lines}_imag"]).values[point]
+        np.testing.assert_allclose(wave, known, atol=2e-3 * np.abs(known).max())
+
+
+def test_captions_say_what_this_case_shows(pgb):
+    stable = " ".join(comparisons(pgb, "weight_response"))
+    assert "dotted: not known" in stable
+    plain = changed(pgb, planar__branch__stability=False)
+    assert "Stability was not computed" in " ".join(comparisons(plain, "tooth_contact"))
+    assert "at no mesh frequency" in " ".join(comparisons(pgb, "response_spectrum_30_rpm"))
+    data = solve_branch(plain).dataset()
+    assert data["stable"].values.tolist() == [-1] * data.sizes["point"]
+    assert data["shown_as"].values[-1] == "largest response"
+    assert {line.get_linestyle() for line in weight_response(data).axes[0].get_lines()} <= {"-", "None"}
+    assert "stability was not computed" in describe_branch(data).notes
+
+
+def test_a_branch_that_ran_out_of_points_says_which_entry_to_raise(pgb):
+    found = solve_branch(
+        changed(
+            pgb,
+            planar__branch={"from": "25 Hz", "to": "45 Hz", "harmonics": 1, "stability": False, "points": 10},
+        )
+    )
+    assert found.ending.startswith("NOT COMPLETE") and "raise planar.branch.points" in found.ending
+    assert "before 45 Hz" in describe_branch(found.dataset()).notes[0]
+    assert any("planar.branch.points" in text for text in planar_verdicts(found.dataset(), None))
+
+
+def test_equal_forces_are_drawn_once(results):
+    figure = response_mesh_forces(results.response, 0)
+    assert len(figure.axes) == 1
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["sun-planet 1 and planet 1-ring: equal"]
+    # as they are
+    lines = results.response["mesh_force_real"].values[0] + 1j * results.response["mesh_force_imag"].values[0]
+    assert np.abs(lines[3] - lines[0])[1:].sum() < 5e-3 * np.abs(lines[0])[1:].sum()
+    apart = results.response.copy(deep=True)
+    apart["mesh_force_real"].values[0, 3, 1] *= 1.1
+    assert len(response_mesh_forces(apart, 0).legends[0].get_texts()) == 2

@@ -40,3 +40,10 @@ def test_published_gearbox():
     harmonics, _ = tables(read_case(CASES / "nrel_pgb.toml"))
     assert len(harmonics.rows) == 6
     assert {len(row) for row in harmonics.rows} == {len(harmonics.header)}
+
+
+def test_neighbours_with_equal_spacing_come_first():
+    _, neighbours = tables(read_case(CASES / "helical_30_20_70.toml"))
+    assert [row[0] for row in neighbours.rows[:2]] == ["31/21/73", "29/19/67"]
+    spacing = [row[3] for row in neighbours.rows]
+    assert spacing[:2] == ["equal", "equal"] and "equal" not in spacing[2:] and len(spacing) == 8

@@ -41,8 +41,8 @@ def _in_transverse_section(error: GeometryError, case: Case) -> None:
     if case.helical is None:
         return
     error.message += " (in the transverse section of the helical gears"
-    if (error.key or "").endswith("profile_shift") or "rack." in (error.key or ""):
-        factor = math.cos(case.helical.helix_angle)
+    factor = math.cos(case.helical.helix_angle)
+    if factor < 0.999 and ((error.key or "").endswith("profile_shift") or "rack." in (error.key or "")):
         error.message += f", whose coefficients are {factor:.6g} times those of the file"
     error.message += ")"
 

@@ -6,7 +6,15 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    model_validator,
+)
 
 from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
 from femgear.casefile.units import (
@@ -57,6 +65,13 @@ def _sentence(value: object) -> str:
             "the comparison must be one printable line", code="E-RANGE", limit="600 printable characters"
         )
     return value
+
+
+def _some(values: tuple) -> tuple:
+    # pydantic's own min_length counts valid entries alone, and would complain twice
+    if not values:
+        raise refuse("there is no entry", code="E-RANGE", limit="1 or more")
+    return values
 
 
 class _Section(BaseModel):
@@ -151,7 +166,7 @@ class PlanarSection(_Section):
     line_backlash: Clearance | None = None
     smoothing: Quantity(LENGTH, 0.0, 1e-3) = SMOOTHING
     back_flanks: StrictBool = False
-    damping_ratios: Annotated[tuple[Ratio, ...], Field(min_length=1, max_length=1000)] | None = None
+    damping_ratios: Annotated[tuple[Ratio, ...], AfterValidator(_some), Field(max_length=1000)] | None = None
     gyroscopic: StrictBool = False
     reaction: Literal["supports", "output"] = "output"
     ring: PlanarRingSection
@@ -286,6 +301,15 @@ def planar_notices(data: dict) -> Iterator[str]:
         yield f"{_listed(unused)} no effect in this planar case"
     if "mesh_stiffness" in planar and (unused := _without_static(data)):
         yield f"{_listed(unused)} no effect while planar.mesh_stiffness is given"
+    if "response" in planar and "mesh_stiffness" in planar:
+        still = "no weight acts" if "gravity" not in planar else ""
+        if data["operation"].get("fixed", "ring") == "carrier":
+            still = "the weight does not turn against a carrier that stands"
+        if still:
+            yield (
+                "planar.response: nothing varies in time, every response is static: planar.mesh_stiffness is "
+                f"constant and {still}"
+            )
     if data["planet"].get("bearing_clearance") and not {"branch", "response"} & planar.keys():
         yield "planet.bearing_clearance has no effect without planar.branch or planar.response"
 
@@ -300,6 +324,7 @@ def _without_static(data: dict) -> list[str]:
     if "response" in data["planar"]:
         keys = ("mesh_harmonics", "response_harmonics")
         unused += [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
+        unused += ["planar.response.side_bands"] if "side_bands" in data["planar"]["response"] else []
     if data["planar"].get("line_backlash") is not None and "backlash" in data["set"]:
         unused.append("set.backlash")
     for name in ("sun", "planet", "ring", "carrier"):

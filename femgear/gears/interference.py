@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 FILLET_TOLERANCE = 1e-4
 """Overlap of a tip corner with a root fillet, in modules, that is warned about instead of refused."""
+# overlap [m] below which there is nothing to warn of
+_SEEN = 1e-9
 
 
 def check_interference(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
@@ -33,7 +35,8 @@ def check_interference(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
             overlap = fillet_overlap(gear, partner, planetary.centre_distance)
             if overlap > FILLET_TOLERANCE * gear.module:
                 _fillet_interference(gear, partner, reach, overlap)
-            warnings.append(_fillet_warning(gear, partner, reach, overlap))
+            if overlap > _SEEN:
+                warnings.append(_fillet_warning(gear, partner, reach, overlap))
     check_passing_tips(planetary.planet, planetary.ring, planetary.centre_distance)
     return tuple(warnings)
 

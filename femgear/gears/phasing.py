@@ -141,8 +141,7 @@ def mesh_phasing(
         Angles at which the planets do not assemble (E-ASSEMBLY, with the nearest that do), no angles
         (E-PLANETS, E-ANGLES), or other numbers that describe no set (E-PHASING).
     """
-    angles = tuple(float(a) for a in planet_angles)
-    check_angles(angles)
+    angles = _angles(planet_angles)
     MeshPhasing(sun_teeth, ring_teeth, (0,), rotation, flank, convention, lag)
     total = sun_teeth + ring_teeth
     places = (np.array(angles) - angles[0]) * total / (2.0 * math.pi)
@@ -151,7 +150,7 @@ def mesh_phasing(
         listing = ", ".join(f"{math.degrees(a):.6f}" for a in feasible_angles(total, angles)[:24])
         raise GeometryError(
             f"{len(angles)} planets between {sun_teeth} and {ring_teeth} teeth miss an assembly position by "
-            f"{missed:.4f} teeth; their phases do not belong to teeth that mesh",
+            f"{missed:.3g} teeth; their phases do not belong to teeth that mesh",
             code="E-ASSEMBLY",
             key="set.planet_angles",
             value=f"{total / len(angles):.6g} teeth a planet",
@@ -160,6 +159,18 @@ def mesh_phasing(
         )
     positions = tuple(int(p) for p in np.round(places))
     return MeshPhasing(sun_teeth, ring_teeth, positions, rotation, flank, convention, lag)
+
+
+def _angles(planet_angles) -> tuple[float, ...]:
+    try:
+        angles = tuple(float(a) for a in planet_angles)
+    except (TypeError, ValueError):
+        raise GeometryError(
+            f"planet angles {planet_angles!r}", code="E-ANGLES", key="set.planet_angles",
+            limit="a sequence of numbers [rad], one a planet", remedy="for instance equal_planet_angles(3)",
+        ) from None  # fmt: skip
+    check_angles(angles)
+    return angles
 
 
 def phasing_of_set(
@@ -187,7 +198,17 @@ def standard_lag(planet_teeth: int) -> float:
 
     Its working flanks are ``z_p / 2 - 1 / 2`` pitches apart: an odd planet touches sun and ring at their
     pitch points at the same time, an even one half a period apart (Parker and Lin, 2004).
+
+    Raises
+    ------
+    GeometryError
+        No whole number of teeth that a gear can have (E-PHASING).
     """
+    if not _whole(planet_teeth) or not TEETH_RANGE[0] <= planet_teeth <= TEETH_RANGE[1]:
+        raise GeometryError(
+            f"the lag of a planet with {planet_teeth!r} teeth", code="E-PHASING", value=planet_teeth,
+            limit=f"a whole number, {TEETH_RANGE[0]} to {TEETH_RANGE[1]}",
+        )  # fmt: skip
     return 0.5 * ((planet_teeth - 1) % 2)
 
 
@@ -262,22 +283,28 @@ def check_harmonics(harmonics) -> np.ndarray:
     return found.astype(np.int64)
 
 
+def _whole(value) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
 def _check(phasing: MeshPhasing) -> None:
     p, problem = phasing, None
     whole = (*p.positions, p.sun_teeth, p.ring_teeth, p.rotation, p.flank)
-    if not all(isinstance(v, int | np.integer) and not isinstance(v, bool) for v in whole):
+    if not all(_whole(value) for value in whole):
         problem = "teeth, positions, rotation and flank must be whole numbers"
     elif not all(TEETH_RANGE[0] <= z <= TEETH_RANGE[1] for z in (p.sun_teeth, p.ring_teeth)):
         problem = (
             f"{p.sun_teeth} sun and {p.ring_teeth} ring teeth, allowed {TEETH_RANGE[0]} to {TEETH_RANGE[1]}"
         )
+    elif p.ring_teeth <= p.sun_teeth:
+        problem = f"a ring of {p.ring_teeth} teeth around a sun of {p.sun_teeth}, allowed: more than the sun"
     elif not p.positions or p.positions[0] != 0 or np.any(np.diff([*p.positions, p.teeth_sum]) <= 0):
         problem = f"positions {p.positions}, which must ascend from 0 to less than {p.teeth_sum}"
     elif p.rotation not in (1, -1) or p.flank not in (1, -1):
         problem = f"rotation {p.rotation} and flank {p.flank}, allowed 1 or -1"
     elif p.convention not in CONVENTIONS:
         problem = f"the convention {p.convention!r}, allowed {' or '.join(CONVENTIONS)}"
-    elif not math.isfinite(p.lag):
-        problem = f"a lag of {p.lag} periods"
+    elif not isinstance(p.lag, int | float | np.number) or not math.isfinite(p.lag):
+        problem = f"a lag of {p.lag!r} periods, allowed: a finite number"
     if problem:
         raise GeometryError(f"mesh phases of {problem}", code="E-PHASING", remedy="see MeshPhasing")

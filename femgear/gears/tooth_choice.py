@@ -13,6 +13,9 @@ from femgear.gears.phasing import KINDS, MeshPhasing, phase_kinds, planet_sums, 
 from femgear.gears.set_limits import equal_planet_angles
 
 DISTANCE_LIMIT = 30
+# Share of the centre distance that profile shifts cannot bridge, and overlap of tips [modules] that no
+# shortened tooth removes.
+_CLOSURE, _OVERLAP = 0.05, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +149,52 @@ def neighbouring_teeth(
     order = np.lexsort((*teeth.T[::-1], np.abs(teeth - wanted).sum(axis=1), np.round(np.abs(change), 12)))
     found = _described(teeth[order], ratio[order], change[order], planets, np.arange(1, harmonics + 1))
     return found.only(found.room > 0.0) if fitting else found
+
+
+def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
+    """Refuse tooth numbers that make no set, and remark on those that shifts must help to one.
+
+    Parameters
+    ----------
+    phasing : MeshPhasing
+        Teeth of sun and ring, and places of the planets.
+    planet_teeth : int
+
+    Returns
+    -------
+    tuple of str
+        Remarks.
+
+    Raises
+    ------
+    GeometryError
+        Centre distances of both meshes that profile shifts cannot make equal (E-CHOICE), planets that
+        overlap (E-NEIGHBOURS).
+    """
+    standard_lag(planet_teeth)
+    sun, ring, found = phasing.sun_teeth, phasing.ring_teeth, []
+    teeth, misfit = f"{sun}/{planet_teeth}/{ring}", ring - sun - 2 * planet_teeth
+    if abs(misfit) > _CLOSURE * (sun + planet_teeth):
+        raise GeometryError(
+            f"{teeth}: z_r - z_s - 2 z_p = {misfit}, more than profile shifts can take up", code="E-CHOICE",
+            key="planet teeth", value=planet_teeth,
+            limit=f"{_CLOSURE:.0%} of z_s + z_p", remedy=f"{(ring - sun) // 2} teeth close this set",
+        )  # fmt: skip
+    if abs(misfit) > 1:
+        found.append(
+            f"z_r - z_s - 2 z_p = {misfit}: profile shifts of about {abs(misfit) / 2:g} times the module"
+        )
+    places = np.array([phasing.positions])
+    room = float(_room(np.array([[sun, planet_teeth, ring]]), places, np.array([sun + ring]))[0])
+    if room < -_OVERLAP:
+        raise GeometryError(
+            f"{phasing.n_planets} planets of {teeth} overlap by {-room:.4g} modules", code="E-NEIGHBOURS",
+            value=phasing.n_planets, limit="room between the tips of neighbours",
+            remedy="use fewer planets, or fewer teeth on the planets",
+        )  # fmt: skip
+    if room <= 0.0:
+        found.append(f"unshifted planets overlap by {-room:.3g} modules")
+    return tuple(found)
 
 
 def _candidates(wanted, distance: int, closure: int) -> np.ndarray:

@@ -77,9 +77,14 @@ def helical_system(data: HelicalSet, *, torque: PlanarTorque | None = None) -> M
     Raises
     ------
     CaseError
-        A torque on a held member (E-MECHANISM).
+        A torque on a held member, or a set that cannot move at all (E-MECHANISM).
     """
     T = free_motions(data)
+    if not T.shape[1]:
+        raise CaseError(
+            "infinite stiffnesses hold every motion of the set", code="E-MECHANISM",
+            remedy="give the support or the bearing of a body finite stiffnesses",
+        )  # fmt: skip
     names = np.array(helical_dofs(data.n_planets))[_kept(data)]
     return MechanicalSystem(
         M=(T.T * body_masses(data).ravel()) @ T,

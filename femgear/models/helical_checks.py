@@ -13,16 +13,18 @@ if TYPE_CHECKING:
     from femgear.models.helical_data import HelicalBody, HelicalSet, HelicalSupport
 
 CONTACT_POINTS = ("pitch_point", "base_circles")
+# Rounded numbers miss each other by less than 1 %, other distances or angles than those of the gears by more.
+LARGEST_CLOSURE = 0.1
 DIRECTIONS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}
 
 
 def check_body(name: str, body: HelicalBody) -> None:
     """Refuse a mass, inertia or support (E-HELICAL)."""
     for entry, unit in (("mass", "kg"), ("inertia", "kg m^2"), ("diametral_inertia", "kg m^2")):
-        value = getattr(body, entry)
+        value = numbers(f"{name}.{entry}", getattr(body, entry), 0)
         if not (math.isfinite(value) and value > 0.0):
             _refuse(f"{name}.{entry}", value, unit, "finite and above 0")
-    _check_support(f"{name}.support", body.support)
+    check_support(f"{name}.support", body.support, count=0)
     if name == "planet" and np.any(body.support.stiffness):
         _refuse("planet.support", "a planet", "", "none", remedy="give planet_bearing of the set")
 
@@ -30,16 +32,16 @@ def check_body(name: str, body: HelicalBody) -> None:
 def check_set(data: HelicalSet) -> None:
     """Refuse radii, angles, stiffnesses, slices and contact points (E-HELICAL)."""
     for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
-        value = getattr(data, name)
+        value = numbers(name, getattr(data, name), 0)
         if not (math.isfinite(value) and value > 0.0):
             _refuse(name, value, "m", "finite and above 0")
     if data.ring_radius <= data.planet_radius:
         _refuse("ring_radius", data.ring_radius, "m", f"above the {data.planet_radius} m of the planets")
     for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
-        value = getattr(data, name)
+        value = numbers(name, getattr(data, name), 0)
         if not 0.0 < value < 0.5 * math.pi:
             _refuse(name, value, "rad", "between 0 and pi/2", remedy="give radians")
-    if not abs(data.base_helix_angle) < 0.5 * math.pi:
+    if not abs(numbers("base_helix_angle", data.base_helix_angle, 0)) < 0.5 * math.pi:
         allowed = "between -pi/2 and pi/2"
         _refuse("base_helix_angle", data.base_helix_angle, "rad", allowed, remedy="give radians")
     for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
@@ -49,16 +51,32 @@ def check_set(data: HelicalSet) -> None:
         wrong = ~np.isfinite(values) | (values < 0.0)
         if np.any(wrong):
             _refuse(name, values[wrong][0], "N/m", "finite, 0 or more")
-    _check_support("planet_bearing", data.planet_bearing, count=data.n_planets)
+    check_support("planet_bearing", data.planet_bearing, count=data.n_planets)
     _check_angles(data.planet_angles)
     _check_contact(data)
+    _check_closure(data)
 
 
-def _check_support(key: str, support: HelicalSupport, *, count: int | None = None) -> None:
-    allowed = "one number" if count is None else f"one number, or {count}"
+def numbers(key: str, values, dimensions: int | None = None) -> np.ndarray:
+    """Values as an array of floats, of so many dimensions where they are given (E-HELICAL)."""
+    try:
+        found = np.array(values, float)
+    except (TypeError, ValueError):
+        _refuse(key, repr(values), "", "a number" if dimensions == 0 else "numbers")
+    if dimensions is not None and found.ndim != dimensions:
+        _refuse(key, f"{found.size} values", "", "one number")
+    return found
+
+
+def check_support(key: str, support: HelicalSupport, *, count: int | None = None) -> None:
+    """Refuse stiffnesses of a support (E-HELICAL): of `count` planets, of one body (0), of either (None)."""
+    allowed = f"one number, or {count}" if count else "one number"
+    # what is no support has none of its stiffnesses
+    if not all(hasattr(support, entry) for entry in DIRECTIONS):
+        _refuse(key, repr(support), "", "a HelicalSupport")
     for entry, unit in DIRECTIONS.items():
-        values = np.asarray(getattr(support, entry), float)
-        if values.ndim and values.shape != (count,):
+        values = numbers(f"{key}.{entry}", getattr(support, entry))
+        if count is not None and values.ndim and values.shape != (count,):
             _refuse(f"{key}.{entry}", f"{values.size} values", "", allowed)
         if not np.all(values >= 0.0):
             _refuse(f"{key}.{entry}", values.min(), unit, "0 or more, or infinite")
@@ -73,6 +91,16 @@ def _check_contact(data: HelicalSet) -> None:
         _refuse("face_width", data.face_width, "m", "finite, 0 or more")
     if data.slices > 1 and not data.face_width:
         _refuse("face_width", data.face_width, "m", "above 0 for several slices")
+
+
+def _check_closure(data: HelicalSet) -> None:
+    worst = max(data.closure, key=abs)
+    if abs(worst) > LARGEST_CLOSURE:
+        _refuse(
+            "centre_distance", data.centre_distance, "m",
+            f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {LARGEST_CLOSURE:.0%}",
+            remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
+        )  # fmt: skip
 
 
 def _check_angles(angles: np.ndarray) -> None:

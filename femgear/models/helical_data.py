@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.gears import involute
-from femgear.models.helical_checks import check_body, check_set
+from femgear.models.helical_checks import check_body, check_set, check_support, numbers
 from femgear.models.planar_data import CENTRAL, member_radius
 
 if TYPE_CHECKING:
@@ -31,12 +31,20 @@ class HelicalSupport:
     Notes
     -----
     As `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
+
+    Raises
+    ------
+    CaseError
+        Stiffnesses that are no numbers, negative or NaN (E-HELICAL).
     """
 
     radial: float | np.ndarray = 0.0
     axial: float | np.ndarray = 0.0
     tilt: float | np.ndarray = 0.0
     torsional: float | np.ndarray = 0.0
+
+    def __post_init__(self):
+        check_support("support", self)
 
     @property
     def stiffness(self) -> np.ndarray:
@@ -59,12 +67,20 @@ class HelicalBody:
         About the axes in the plane through its centre [kg m^2].
     support : HelicalSupport
         To the housing.
+
+    Raises
+    ------
+    CaseError
+        Mass or inertias that are not finite and above 0 (E-HELICAL).
     """
 
     mass: float
     inertia: float
     diametral_inertia: float
     support: HelicalSupport = field(default_factory=HelicalSupport)
+
+    def __post_init__(self):
+        check_body("body", self)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,8 +121,9 @@ class HelicalSet:
     Raises
     ------
     CaseError
-        Numbers that no set can have, or planet angles that are none, unordered or span more than a turn
-        (E-HELICAL).
+        Numbers that no set can have, planet angles that are none, unordered or span more than a turn, or
+        radii, centre distance and pressure angles that miss each other by more than 10 % (E-HELICAL).
+        `closure` tells by how much they do.
     """
 
     sun: HelicalBody
@@ -129,10 +146,10 @@ class HelicalSet:
     face_width: float = 0.0
 
     def __post_init__(self):
-        angles = np.atleast_1d(np.array(self.planet_angles, float))
+        angles = np.atleast_1d(numbers("planet_angles", self.planet_angles))
         arrays = {"planet_angles": angles}
         for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
-            value = np.array(getattr(self, name), float)
+            value = numbers(name, getattr(self, name))
             arrays[name] = np.full(len(angles), value) if value.ndim == 0 else value
         for name, array in arrays.items():
             array.setflags(write=False)
@@ -154,6 +171,18 @@ class HelicalSet:
     def column_stiffness(self) -> np.ndarray:
         """Mean stiffness of the 2N S columns of ``W`` [N/m], the slices of a mesh side by side."""
         return self.per_column(self.mesh_stiffness) / self.slices
+
+    @property
+    def closure(self) -> tuple[float, float]:
+        """``(r_s + r_p) / (a cos alpha_sp) - 1`` and ``(r_r - r_p) / (a cos alpha_pr) - 1``.
+
+        Zero where radii, centre distance and pressure angles belong to one set of gears.
+        """
+        a = self.centre_distance
+        return (
+            (self.sun_radius + self.planet_radius) / (a * math.cos(self.pressure_angle_sun_planet)) - 1.0,
+            (self.ring_radius - self.planet_radius) / (a * math.cos(self.pressure_angle_planet_ring)) - 1.0,
+        )
 
     @property
     def slice_heights(self) -> np.ndarray:

@@ -60,14 +60,15 @@ def modal_error_response(
         [m]; of one case the result has a first axis of length one. For phases phi_j as fractions of the mesh
         period, ``k_j(tau) = k(tau + phi_j)``, it is ``e_h exp(2 pi i h phi_j)``, see `phased_errors`.
     harmonics : (H,) int array, optional
-        1 to H when not given.
+        Whole numbers from 1; 1 to H when not given.
     outputs : (n_outputs, n) array, optional
         ``L``, such as the rows of `spring_loads`; none when not given.
 
     Raises
     ------
     CaseError
-        Errors or harmonics that do not fit (E-SHAPE), frequencies that are none (E-FREQUENCY).
+        Errors or harmonics that do not fit (E-SHAPE), harmonics or frequencies that are none (E-HARMONICS,
+        E-FREQUENCY).
     ConvergenceError
         An undamped resonance (E-RESONANCE).
     """
@@ -135,7 +136,12 @@ def spring_loads(springs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[
 def _errors(error, harmonics, columns: int) -> tuple[np.ndarray, np.ndarray]:
     error = np.asarray(error, complex)
     error = error[None] if error.ndim == 2 else error
-    harmonics = np.arange(1, error.shape[-1] + 1) if harmonics is None else np.asarray(harmonics)
+    harmonics = np.arange(1, error.shape[-1] + 1) if harmonics is None else np.atleast_1d(harmonics)
+    if harmonics.ndim != 1 or harmonics.dtype.kind not in "iu" or np.any(harmonics < 1):
+        raise CaseError(
+            f"harmonics {harmonics.tolist()} of the mesh frequency", code="E-HARMONICS", key="harmonics",
+            limit="whole numbers from 1", remedy="the mean of a transmission error is a static load",
+        )  # fmt: skip
     if error.shape[1:] != (columns, len(harmonics)) or not np.all(np.isfinite(error)):
         raise CaseError(
             f"transmission errors of shape {error.shape}", code="E-SHAPE",

@@ -15,6 +15,7 @@ from femgear.solvers.continuation import StepOptions
 from femgear.solvers.elements import GearMeshes
 from femgear.solvers.harmonic_balance import displacements
 from femgear.solvers.hill import FloquetVerdict, floquet_verdicts
+from femgear.solvers.lines import line_tail
 from femgear.solvers.nonlinear import NonlinearSystem, element_forces
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.receptance import Reduction, reduce_problem
@@ -24,10 +25,14 @@ _SAME_FOLD = 2e-3
 # deflection [m] that counts as much as the whole range of frequencies along a branch
 _SCALE = 2e-3
 # instants of a period; with two base frequencies of either phase
-_SAMPLES = 720
+_SAMPLES = 2880
 _GRID = (256, 48)
 # relative errors of the monodromy matrices, and solutions judged together
 _COARSE, _FINE, _BATCH = 1e-3, 1e-6, 32
+# fluctuation of a force, relative to its mean, below which there is none: residual of the equations
+_STILL = 1e-6
+# what a curve holds of every point
+_ALONG = ("points", "parameter", "tangent", "iterations", "error")
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +93,13 @@ class MotionLines:
     carrier_bearing : (2, L) complex array
         x and y of the force of the carrier bearing on the carrier [N]; zero without one.
     drive_contact, back_contact : (2N,) arrays
+    motion : float
+        Farthest that the centre of carrier, ring or sun moves from its place [m].
+    approach : float
+        Largest deflection of a mesh [m].
+    force_tail : float
+        Share of the fluctuating force in the upper half of the lines, of the kind of mesh, sun-planet or
+        planet-ring with both flanks, that has more of it; see `femgear.solvers.lines.line_tail`.
     """
 
     member: np.ndarray
@@ -97,6 +109,9 @@ class MotionLines:
     carrier_bearing: np.ndarray
     drive_contact: np.ndarray
     back_contact: np.ndarray
+    motion: float
+    approach: float
+    force_tail: float
 
 
 def weight_curve(
@@ -197,13 +212,56 @@ def motion_lines(model: PlanarModel, solution: PeriodicSolution) -> MotionLines:
     bearing = np.zeros((2, x.shape[1]), complex)
     if model.bearing is not None:
         bearing = -solution.force[groups["carrier bearing"][0]]
+    member, mesh = x[:6].reshape(3, 2, -1), solution.force[groups["meshes"]]
+    wave = np.exp(1j * (_phases(solution.orders) @ solution.orders.T))
+    path = (member @ wave.T).real
+    deflection = (wave @ solution.deflection[groups["meshes"]].T).real
+    kinds = (np.vstack([mesh[part], back[part]]) for part in (slice(0, N), slice(N, 2 * N)))
     return MotionLines(
-        x[:6].reshape(3, 2, -1),
-        solution.force[groups["meshes"]],
+        member,
+        mesh,
         back,
         pin_force,
         bearing,
         *flank_contact(model.problem, solution, N),
+        motion=float(np.hypot(path[:, 0], path[:, 1]).max()),
+        approach=float(deflection.max()),
+        force_tail=max(line_tail(forces, solution.orders, rounding=_STILL) for forces in kinds),
+    )
+
+
+def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (n, 2N) [N] of drive flanks and of back flanks on lines of their own, from the element laws.
+
+    The deflections are those of the solution. Its force lines, cut at the last one, would ring beside a short
+    contact; the law of a one-sided contact does not.
+
+    Parameters
+    ----------
+    model : PlanarModel
+    solution : PeriodicSolution
+    theta : (n, n_bases) array
+        Phases of the base frequencies [rad].
+    """
+    x = (np.exp(1j * (theta @ solution.orders.T)) @ solution.deflection.T).real
+    force, groups = element_forces(model.problem, x, theta)[0], model.groups
+    drive = force[:, groups["meshes"]]
+    return drive, force[:, groups["back flanks"]] if model.back_flanks else np.zeros_like(drive)
+
+
+def cut_branch(branch: Branch, count: int, message: str) -> Branch:
+    """The first points of a branch, which then did not reach an end of its range."""
+    known = branch.curve
+    curve = replace(
+        known,
+        **{name: getattr(known, name)[:count] for name in _ALONG},
+        **{name: getattr(known, name)[getattr(known, name) < count] for name in ("folds", "branch_points")},
+        closed=False,
+        complete=False,
+        message=message,
+    )
+    return replace(
+        branch, parameter=branch.parameter[:count], solutions=branch.solutions[:count], curve=curve
     )
 
 
@@ -231,7 +289,7 @@ def column_contact(problem: NonlinearSystem, solution: PeriodicSolution) -> np.n
     Columns without a mesh are nan. A mesh with play on one line of action pulls where its back flanks touch.
     A smoothed contact counts as closed beyond half its force scale, the force at the corner itself.
     """
-    theta = _phases(solution.orders.shape[1])
+    theta = _phases(solution.orders)
     x = (np.exp(1j * (theta @ solution.orders.T)) @ solution.deflection.T).real
     force = element_forces(problem, x, theta)[0]
     out = np.full((2, x.shape[1]), np.nan)
@@ -244,11 +302,35 @@ def column_contact(problem: NonlinearSystem, solution: PeriodicSolution) -> np.n
     return out
 
 
-def _phases(bases: int) -> np.ndarray:
-    """Instants (n, bases) [rad] that fill the phases evenly."""
-    counts = (_SAMPLES,) if bases == 1 else _GRID[:bases]
+def _phases(orders: np.ndarray) -> np.ndarray:
+    """Instants (n, bases) [rad] that fill the phases evenly; one phase of a base that no line has."""
+    used = np.any(orders != 0, axis=0)
+    counts = np.where(used, _GRID[: len(used)] if used.sum() > 1 else _SAMPLES, 1)
     axes = [2.0 * np.pi * np.arange(count) / count for count in counts]
     return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
+
+
+def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[tuple[int, str]]:
+    """Points of a branch that are drawn over the phase, in order, and what they are; the last one is the top.
+
+    Parameters
+    ----------
+    rms : (p,) array
+        Amplitude along the branch.
+    back : (p,) array
+        Share of the cycle in which back flanks touch.
+    stable : (p,) int array
+        1 where known to be stable, 0 where known not to be, -1 where not known.
+    """
+    sure = stable == 1
+    top, words = int(np.argmax(rms)), "largest response"
+    if sure.any():
+        top, words = int(np.argmax(np.where(sure, rms, -1.0))), "largest stable response"
+    points = [(0, "start")] if top else []
+    if back[top] > 0.0:
+        free = np.flatnonzero(back[:top] == 0.0)
+        points += [(int(free[-1]), "before back flanks touch")] if len(free) and free[-1] else []
+    return [*points, (top, words)]
 
 
 def fluctuation(lines: np.ndarray) -> np.ndarray:

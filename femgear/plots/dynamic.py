@@ -160,7 +160,7 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
         bottom,
         "input speed [rpm]",
         "magnitude [1]",
-        "the iteration contracts and the motion is stable below 1",
+        "the iteration contracts and the motion is stable up to 1",
     )
     for ax, place in ((top, "outside upper center"), (bottom, "outside lower center")):
         figure.legend(*ax.get_legend_handles_labels(), loc=place, ncols=3, fontsize=SIZE - 1, frameon=False)

@@ -48,7 +48,7 @@ def helical_mode_shapes(
 
     From the front: circles of base radii, for the carrier the circle of planet centres, with a spoke that
     turns. From the side, seen along y: every body as the line of its diameter along x, which tilts about y
-    and moves along z; these small motions are drawn larger by the factor in the title.
+    and moves along z, drawn at the scale of the front view times the factor in the title.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def draw_mode(front, side, data: HelicalSet, moved: np.ndarray, scale: float) ->
     _draw_side(side, data, views[1] * moved)
     times = views[1] / views[0]
     times = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
-    side.set_title(f"from the side, × {times}", fontsize=SIZE - 3, color="0.4")
+    side.set_title(f"from the side, scale × {times}", fontsize=SIZE - 3, color="0.4")
 
 
 def _motions(data: HelicalSet, shape) -> np.ndarray:

@@ -14,10 +14,13 @@ from femgear.plots.style import (
     COLOURS,
     DASHES,
     SIZE,
+    family,
     label,
     legend_below,
+    line_style,
     new_figure,
     periodic,
+    rpm,
 )
 
 if TYPE_CHECKING:
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
     from femgear.gears import PlanetarySet
 
 _MARKS = {"in phase": "o", "counter-phased": "s"}
-_SHOWN, _COLUMNS, _HARMONICS = 12, 4, 4
+_SHOWN, _COLUMNS, _HARMONICS, _SPEEDS = 12, 4, 4, 4
 
 
 @dataclass(frozen=True)
@@ -133,6 +136,76 @@ def helical_mesh_stiffness(modes: xr.Dataset, static: xr.Dataset) -> Figure:
     label(axes[1], "position in the mesh period [1]")
     legend_below(figure, axes[0], columns=2)
     return figure
+
+
+def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
+    """Fluctuation of the dynamic transmission error over one mesh period beside the static one.
+
+    Parameters
+    ----------
+    dynamics, modes : xarray.Dataset
+        Contents of dynamics.nc, of which at most four speeds are drawn, and of modes.nc.
+    """
+    count = dynamics.sizes["speed"]
+    speeds = sorted({round(i) for i in np.linspace(0, count - 1, min(count, _SPEEDS))})
+    rows, columns = -(-len(speeds) // 2), min(len(speeds), 2)
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=1.2 + 3.6 * rows, sharey=True
+    )
+    for ax in axes[len(speeds) :]:
+        figure.delaxes(ax)
+    h, position = dynamics["harmonic"].values, np.linspace(0.0, 1.0, 257)
+    wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
+    dte = 1e6 * (dynamics["dte_real"].values + 1j * dynamics["dte_imag"].values)[..., h > 0]
+    ste = 1e6 * (modes["helical_ste"] - modes["helical_ste"].mean("position")).values
+    at, ste = periodic(modes["position"], ste)
+    # what is one line at one speed need not be one at another: the lines are those of all speeds
+    lines = alike_lines(dynamics["mesh"].values, np.hstack([*(dte[speeds] @ wave).real, ste]))
+    for ax, s in zip(axes, speeds):
+        for i, (text, row) in enumerate(lines):
+            ax.plot(
+                position, (dte[s, row] @ wave).real, linewidth=2.0, label=f"dynamic, {text}", **line_style(i)
+            )
+            ax.plot(at, ste[row], linewidth=0.8, label=f"static (thin), {text}", **line_style(i))
+        ax.set_xlim(0.0, 1.0)
+        frequency = float(dynamics["mesh_frequency"].values[s])
+        title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
+        label(ax, "position in the mesh period [1]", title=title)
+    for ax in axes[: len(speeds) : 2]:
+        label(ax, y="transmission error less its mean [µm]")
+    legend_below(figure, columns=2)
+    return figure
+
+
+def alike_lines(names, values, *, tolerance: float = 1e-6) -> list[tuple[str, int]]:
+    """Legend texts and row numbers of the curves to draw: one for all meshes of a kind whose curves agree.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Mesh labels.
+    values : (n, ...) array
+        A row a mesh.
+    tolerance : float
+        Largest difference of curves counted as equal, relative to the largest value.
+    """
+    names, values = [str(name) for name in names], np.asarray(values)
+    kinds, size, groups = [family(name) for name in names], np.abs(values).max(initial=0.0), []
+    for row, kind in enumerate(kinds):
+        for group in groups:
+            near = np.abs(values[row] - values[group[0]]).max() <= tolerance * size
+            if kinds[group[0]] == kind and near:
+                group.append(row)
+                break
+        else:
+            groups.append([row])
+    lines = []
+    for group in groups:
+        text = ", ".join(names[row] for row in group)
+        if 1 < len(group) == kinds.count(kinds[group[0]]):
+            text = f"all {kinds[group[0]]} meshes"
+        lines.append((text + " (identical)" if len(group) > 1 else text, group[0]))
+    return lines
 
 
 def mesh_force_spectra(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:

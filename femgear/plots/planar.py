@@ -8,13 +8,17 @@ import numpy as np
 
 from femgear.plots.style import BLACK, COLOURS, GREY, label, legend_below, line_style, new_figure
 
+# how parts of a curve are drawn and called, by what is known of them
+STABILITY = {1: ("-", "stable"), 0: ("--", "not stable"), -1: (":", "stability not known")}
+
 
 def response_branches(curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, quantity: str, x: str = ""):
-    """Amplitude over frequency, dashed where the response is not known to be stable.
+    """Amplitude over frequency, dashed where the response is not stable, dotted where that is not known.
 
     Parameters
     ----------
-    curves : sequence of (text, frequency (p,) [Hz], amplitude (p,) [m], stable (p,) bool)
+    curves : sequence of (text, frequency (p,) [Hz], amplitude (p,) [m], stable (p,) bool or int)
+        1 stable, 0 not stable, -1 not known.
     sweeps : sequence of (text, frequency (f,) [Hz], amplitude (f,) [m])
         Drawn as markers.
     quantity : str
@@ -28,12 +32,11 @@ def response_branches(curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, 
     """
     figure, (ax,) = new_figure(width=8.5, height=5.0)
     for colour, (text, hertz, size, stable) in zip(COLOURS, curves):
-        for wanted, dash, note in ((True, "-", ""), (False, "--", ", not stable")):
-            # a segment is drawn once, unstable where one of its ends is
-            for number, part in enumerate(pieces(np.asarray(stable, bool), wanted)):
+        for wanted, (dash, note) in STABILITY.items():
+            for number, part in enumerate(pieces(stable, wanted)):
                 ax.plot(
                     hertz[part], 1e6 * size[part], color=colour, linestyle=dash,
-                    label=None if number else text + note,
+                    label=None if number else text + (f", {note}" if wanted != 1 else ""),
                 )  # fmt: skip
     for marker, (text, hertz, size) in zip("^vso", sweeps):
         ax.plot(hertz, 1e6 * size, marker, color=BLACK, markersize=4.5, fillstyle="none", label=text)
@@ -43,9 +46,13 @@ def response_branches(curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, 
     return figure
 
 
-def pieces(stable: np.ndarray, wanted: bool) -> list[slice]:
-    """Runs of segments of a curve that are stable, or that are not."""
-    segment = (stable[:-1] & stable[1:]) == wanted
+def pieces(stable, wanted: int) -> list[slice]:
+    """Runs of segments of a curve of one kind: 1 stable, 0 not stable, -1 not known.
+
+    A segment is drawn once: unknown where one of its ends is, otherwise unstable where one is.
+    """
+    stable = np.asarray(stable, int)
+    segment = np.minimum(stable[:-1], stable[1:]) == wanted
     edges = np.flatnonzero(np.diff(np.concatenate([[False], segment, [False]]).astype(int)))
     return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
 
@@ -68,7 +75,7 @@ def orbits(curves: Sequence[tuple], *, title: str = ""):
     ax.plot(0.0, 0.0, "+", color=GREY)
     ax.set_aspect("equal", adjustable="datalim")
     label(ax, "x [µm]", "y [µm]", title)
-    legend_below(figure, columns=2)
+    legend_below(figure, columns=1)
     return figure
 
 
@@ -120,7 +127,7 @@ def contact_over_frequency(hertz, shares, names: Sequence[str], *, title: str = 
 
 
 def contact_map(frequency, clearance, panels: Sequence[tuple], *, line: tuple | None = None):
-    """Share of the cycle in which flanks touch, over frequency and clearance.
+    """Share of the cycle in which flanks touch, over frequency and clearance; every panel on its own scale.
 
     Parameters
     ----------
@@ -129,6 +136,7 @@ def contact_map(frequency, clearance, panels: Sequence[tuple], *, line: tuple | 
     clearance : (c,) array
         [m]
     panels : sequence of (title, share (f, c))
+        nan where nothing was found: grey.
     line : (text, clearance), optional
         Marked clearance [m].
 
@@ -136,16 +144,28 @@ def contact_map(frequency, clearance, panels: Sequence[tuple], *, line: tuple | 
     -------
     Figure
     """
-    figure, axes = new_figure(columns=len(panels), width=5.0 * len(panels), height=4.4, sharey=True)
+    from matplotlib import colormaps
+
+    figure, axes = new_figure(columns=len(panels), width=5.6 * len(panels), height=4.6, sharey=True)
+    colours = colormaps["viridis"].with_extremes(bad="0.75")
     for ax, (title, share) in zip(axes, panels):
+        share = np.asarray(share, float)
+        low, high = np.nanmin(share, initial=1.0), np.nanmax(share, initial=0.0)
+        if high - low < 1e-9:
+            title += f": {high:.3g} everywhere"
+            low, high = 0.0, 1.0
         image = ax.pcolormesh(
-            frequency, 1e6 * np.asarray(clearance), np.asarray(share).T, vmin=0.0, vmax=1.0,
-            cmap="viridis", shading="nearest",
+            frequency, 1e6 * np.asarray(clearance), np.ma.masked_invalid(share.T), vmin=low, vmax=high,
+            cmap=colours, shading="nearest",
         )  # fmt: skip
         if line is not None:
             ax.axhline(1e6 * line[1], color="white", linestyle="--", label=line[0])
+            ax.annotate(
+                line[0], (0.98, 1e6 * line[1]), xycoords=("axes fraction", "data"), xytext=(0, 3),
+                textcoords="offset points", ha="right", color="white", fontsize=9,
+                bbox={"boxstyle": "round,pad=0.15", "facecolor": "0.25", "edgecolor": "none", "alpha": 0.7},
+            )  # fmt: skip
         label(ax, "frequency of the weight [Hz]", title=title)
+        figure.colorbar(image, ax=ax).set_label("share of the cycle in contact [1]")
     label(axes[0], y="clearance of the carrier bearing [µm]")
-    bar = figure.colorbar(image, ax=axes)
-    bar.set_label("share of the cycle in contact [1]")
     return figure

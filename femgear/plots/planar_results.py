@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.models.planar_response import merged_folds
-from femgear.plots.planar import bearing_forces, orbits, pieces
+from femgear.plots.planar import STABILITY, bearing_forces, orbits, pieces
 from femgear.plots.style import (
     BLACK,
     COLOURS,
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 _AXIS = "frequency of the weight in the carrier frame [Hz]"
 _PHASES = 721
 _LABELS = 4
+# difference of two curves, relative to the range they are drawn over, that cannot be seen
+_EQUAL = 5e-3
 # instants of a carrier turn in figures of two frequencies, at most
 _INSTANTS = 20_000
 
@@ -38,43 +40,28 @@ def branch_figures(branch: xr.Dataset) -> dict[str, Figure]:
     branch : xarray.Dataset
         Contents of branch.nc.
     """
-    points = shown_points(branch)
+    top = int(branch["shown_point"].values[-1])
     figures = {
         "weight_response": weight_response(branch),
-        "carrier_orbit": weight_orbits(branch, points),
-        "planet_bearing_forces": weight_bearing_forces(branch, points[-1]),
+        "carrier_orbit": weight_orbits(branch),
+        "planet_bearing_forces": weight_bearing_forces(branch, top),
         "tooth_contact": contact_over_branch(branch),
     }
     if np.any(branch["back_force_real"].values):
-        figures["wedged_teeth"] = mesh_forces(branch, points[-1])
+        figures["wedged_teeth"] = mesh_forces(branch)
     return figures
 
 
-def shown_points(branch: xr.Dataset) -> list[int]:
-    """Points whose orbits are drawn: the first, one before flanks wedge, the largest stable response."""
-    rms = branch["rms"].sel(member="carrier").values[:, 0]
-    back = branch["back_contact"].values.max(axis=1)
-    stable = branch["stable"].values.astype(bool)
-    top = int(np.argmax(np.where(stable, rms, -1.0) if stable.any() else rms))
-    points = [0]
-    if back[top] > 0.0:
-        free = np.flatnonzero(back[:top] == 0.0)
-        points += [int(free[-1])] if len(free) and free[-1] else []
-    return [*points, top] if top not in points else points
-
-
 def weight_response(branch: xr.Dataset) -> Figure:
-    """Amplitudes of carrier, ring and sun: stable parts drawn through, others dashed, folds marked."""
+    """Amplitudes of carrier, ring and sun: drawn by what is known of their stability, folds marked."""
     figure, axes = new_figure(rows=3, width=8.5, height=8.0, sharex=True)
-    hertz, stable = branch["weight_frequency"].values, branch["stable"].values.astype(bool)
-    known = branch.attrs["stability"] != "not computed"
-    folds = merged_folds(branch["weight_frequency"].values, branch["fold"].values)
+    hertz, folds = branch["weight_frequency"].values, merged_folds(
+        branch["weight_frequency"].values, branch["fold"].values
+    )  # fmt: skip
     for ax, colour, member in zip(axes, COLOURS, branch["member"].values):
         size = 1e6 * branch["rms"].sel(member=member).values[:, 0]
-        for wanted, dash in ((True, "-"), (False, "--")):
-            for part in pieces(stable if known else np.ones(len(hertz), bool), wanted):
-                text = "stable" if wanted and known else "stability not computed" if wanted else "not stable"
-                ax.plot(hertz[part], size[part], color=colour, linestyle=dash, label=text)
+        for dash, text, part in _parts(branch):
+            ax.plot(hertz[part], size[part], color=colour, linestyle=dash, label=text)
         ax.plot(
             hertz[folds], size[folds], "o", color=BLACK, markersize=6, markerfacecolor="none", label="fold"
         )
@@ -82,8 +69,11 @@ def weight_response(branch: xr.Dataset) -> Figure:
         label(ax, y=f"{member} x, r.m.s. [µm]")
     # many labels would hide one another; the table of the report has them all
     for point in folds if len(folds) <= _LABELS else ():
+        # outside of the turn, where the curve is not
+        right = hertz[point] >= hertz[max(point - 1, 0)]
         axes[0].annotate(
-            f"{hertz[point]:.2f} Hz", (hertz[point], 1e6 * branch["rms"].values[point, 0, 0]), xytext=(8, -3),
+            f"{hertz[point]:.2f} Hz", (hertz[point], 1e6 * branch["rms"].values[point, 0, 0]),
+            xytext=(10, -3) if right else (-8, -14), ha="left" if right else "right",
             textcoords="offset points", fontsize=SIZE - 1,
         )  # fmt: skip
     label(axes[-1], _AXIS)
@@ -91,14 +81,22 @@ def weight_response(branch: xr.Dataset) -> Figure:
     return figure
 
 
-def weight_orbits(branch: xr.Dataset, points) -> Figure:
+def _parts(branch: xr.Dataset) -> list[tuple]:
+    """(dash, words, slice) of the parts of a branch by their stability; one part where nothing was asked."""
+    if branch.attrs["stability"] == "not computed":
+        return [("-", "stability not computed", slice(None))]
+    stable = branch["stable"].values
+    return [(*STABILITY[wanted], part) for wanted in STABILITY for part in pieces(stable, wanted)]
+
+
+def weight_orbits(branch: xr.Dataset) -> Figure:
     """Paths of the carrier's centre in the carrier frame during one turn of the weight against it."""
     lines = branch["displacement_real"].values + 1j * branch["displacement_imag"].values
     curves = []
-    for point in points:
+    for point, words in zip(branch["shown_point"].values, branch["shown_as"].values):
         path = _wave(branch) @ np.swapaxes(lines[point, 0], 0, 1)
         note = "flanks wedge" if branch["back_contact"].values[point].max() > 0.0 else "drive flanks only"
-        curves.append((f"{branch['weight_frequency'].values[point]:.1f} Hz, {note}", path.real.T))
+        curves.append((f"{branch['weight_frequency'].values[point]:.1f} Hz, {words!s}: {note}", path.real.T))
     return orbits(curves)
 
 
@@ -107,35 +105,35 @@ def weight_bearing_forces(branch: xr.Dataset, point: int) -> Figure:
     lines = (branch["planet_bearing_force_real"] + 1j * branch["planet_bearing_force_imag"]).values[point]
     phase, wave = np.linspace(0.0, 2.0 * np.pi, _PHASES), _wave(branch)
     curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
-    return bearing_forces(phase, curves, title=f"{branch['weight_frequency'].values[point]:.1f} Hz")
+    return bearing_forces(phase, curves, title=_top(branch))
 
 
-def mesh_forces(branch: xr.Dataset, point: int) -> Figure:
+def _top(branch: xr.Dataset) -> str:
+    """The last shown point in words."""
+    point = int(branch["shown_point"].values[-1])
+    return f"{branch['weight_frequency'].values[point]:.1f} Hz, {branch['shown_as'].values[-1]!s}"
+
+
+def mesh_forces(branch: xr.Dataset) -> Figure:
     """Forces of drive and back flanks over one turn of the weight against the carrier."""
     figure, axes = new_figure(rows=2, width=8.0, height=6.0, sharex=True)
-    names, wave = [str(name) for name in branch["mesh"].values], _wave(branch)
-    degrees = np.degrees(np.linspace(0.0, 2.0 * np.pi, _PHASES))
-    for ax, kind, words in zip(axes, ("mesh_force", "back_force"), ("drive flanks", "back flanks")):
-        lines = (branch[f"{kind}_real"] + 1j * branch[f"{kind}_imag"]).values[point]
+    names, degrees = [str(name) for name in branch["mesh"].values], np.degrees(branch["phase"].values)
+    for ax, kind, words in zip(axes, ("drive_force", "flank_force"), ("drive flanks", "back flanks")):
         for number, mesh in enumerate((0, len(names) // 2)):
-            force = (lines[mesh] @ wave.T).real
+            force = branch[kind].values[-1, mesh]
             ax.plot(degrees, 1e-3 * force, label=names[mesh], **line_style(number))
         label(ax, y="force [kN]", title=words)
     axes[-1].set_xlim(0.0, 360.0)
     axes[-1].set_xticks(np.arange(0.0, 361.0, 60.0))
-    hertz = branch["weight_frequency"].values[point]
-    label(axes[0], title=f"{hertz:.1f} Hz: drive flanks")
+    label(axes[0], title=f"{_top(branch)}: drive flanks")
     label(axes[-1], "phase of the weight [°]")
     legend_below(figure, axes[0])
     return figure
 
 
 def contact_over_branch(branch: xr.Dataset) -> Figure:
-    """Share of the cycle in which flanks touch over the frequency, stable parts drawn through."""
-    stable = branch["stable"].values.astype(bool)
-    if branch.attrs["stability"] == "not computed":
-        stable = np.ones(len(stable), bool)
-    return _contact(branch, branch["weight_frequency"].values, _AXIS, stable)
+    """Share of the cycle in which flanks touch over the frequency, drawn by stability."""
+    return _contact(branch, branch["weight_frequency"].values, _AXIS, _parts(branch))
 
 
 def response_figures(response: xr.Dataset, speed: int) -> dict[str, Figure]:
@@ -193,20 +191,29 @@ def response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
 
 
 def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
-    """Mesh forces of the first planet over one carrier turn, and over the first mesh periods."""
+    """Mesh forces of the first planet over one carrier turn, and over the first mesh periods if they vary."""
     lines = (response["mesh_force_real"] + 1j * response["mesh_force_imag"]).values[speed]
     names = [str(name) for name in response["mesh"].values]
     turn, wave = _carrier_turn(response, speed)
     mesh, carrier = float(response["mesh_frequency"][speed]), _carrier_frequency(response, speed)
     near = turn * mesh / carrier <= 6.0 if carrier else np.ones(len(turn), bool)
-    figure, axes = new_figure(rows=2, width=8.5, height=6.0)
-    for number, one in enumerate((0, len(names) // 2)):
-        force = 1e-3 * (lines[one] @ wave.T).real
-        axes[0].plot(360.0 * turn, force, linewidth=0.8, label=names[one], **line_style(number))
-        axes[1].plot(360.0 * turn[near], force[near], label=names[one], **line_style(number))
-    title = f"{float(response['speed'][speed]):.6g} rpm"
-    label(axes[0], "carrier angle [°]", "mesh force [kN]", f"{title}: one turn of the carrier")
-    label(axes[1], "carrier angle [°]", "mesh force [kN]", "six mesh periods")
+    panels = [(slice(None), "one turn of the carrier")]
+    if response.attrs["mesh_lines"]:
+        panels.append((near, "six mesh periods"))
+    pair = (0, len(names) // 2)
+    forces = [1e-3 * (lines[one] @ wave.T).real for one in pair]
+    curves = [(names[one], force) for one, force in zip(pair, forces)]
+    # one curve would hide the other
+    if np.abs(forces[1] - forces[0]).max() <= _EQUAL * np.ptp(forces):
+        curves = [(f"{names[0]} and {names[pair[1]]}: equal", forces[0])]
+    figure, axes = new_figure(rows=len(panels), width=8.5, height=1.0 + 2.8 * len(panels))
+    for number, (text, force) in enumerate(curves):
+        for ax, (part, _) in zip(axes, panels):
+            ax.plot(360.0 * turn[part], force[part], linewidth=0.8, label=text, **line_style(number))
+    title = f"{float(response['speed'][speed]):.6g} rpm: "
+    for ax, (_, words) in zip(axes, panels):
+        label(ax, "carrier angle [°]", "mesh force [kN]", title + words)
+        title = ""
     legend_below(figure, axes[0])
     return figure
 
@@ -238,19 +245,18 @@ def response_spectrum(response: xr.Dataset, speed: int) -> Figure:
     return figure
 
 
-def _contact(data: xr.Dataset, x: np.ndarray, words: str, stable) -> Figure:
+def _contact(data: xr.Dataset, x: np.ndarray, words: str, parts) -> Figure:
     """Four panels: both flanks of the meshes of the first planet."""
     count = data.sizes["mesh"] // 2
     panels = [(side, mesh) for side in ("drive", "back") for mesh in (0, count)]
     figure, axes = new_figure(rows=4, width=8.0, height=6.4, sharex=True)
     for number, (ax, (side, mesh)) in enumerate(zip(axes, panels)):
         share, colour = data[f"{side}_contact"].values[:, mesh], COLOURS[number]
-        if stable is None:
+        if parts is None:
             ax.plot(x, share, "o-", color=colour, markersize=3)
         else:
-            for wanted, dash in ((True, "-"), (False, "--")):
-                for part in pieces(stable, wanted):
-                    ax.plot(x[part], share[part], color=colour, linestyle=dash)
+            for dash, _, part in parts:
+                ax.plot(x[part], share[part], color=colour, linestyle=dash)
         ax.set_ylim(-0.06, 1.06)
         ax.set_yticks([0.0, 0.5, 1.0])
         label(ax, title=f"{data['mesh'].values[mesh]!s}, {side} flanks")

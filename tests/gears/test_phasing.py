@@ -204,6 +204,8 @@ def test_factors_turn_with_the_phases():
         (dict(flank=2), "E-PHASING"),
         (dict(convention="other"), "E-PHASING"),
         (dict(lag=math.nan), "E-PHASING"),
+        (dict(lag="a"), "E-PHASING"),
+        (dict(sun_teeth=71, ring_teeth=29), "E-PHASING"),
         (dict(positions=(0, 25, 20)), "E-PHASING"),
         (dict(positions=(0, 100)), "E-PHASING"),
         (dict(positions=()), "E-PHASING"),
@@ -224,3 +226,21 @@ def test_angles_that_do_not_assemble_name_those_that_do():
     with pytest.raises(GeometryError, match=r"E-ASSEMBLY(.|\n)*118.8") as refused:
         mesh_phasing(30, 70, equal_planet_angles(3))
     assert "241.2" in refused.value.remedy
+
+
+@pytest.mark.parametrize("teeth", [-3, 0, 20.5, 4, True, "20"])
+def test_the_lag_of_no_planet_is_refused(teeth):
+    with pytest.raises(GeometryError, match="E-PHASING"):
+        standard_lag(teeth)
+
+
+@pytest.mark.parametrize("angles", [None, 1.0, "ab", [0.0, None]])
+def test_angles_that_are_no_numbers_are_refused(angles):
+    with pytest.raises(GeometryError, match="E-ANGLES"):
+        mesh_phasing(30, 70, angles)
+
+
+def test_a_small_miss_is_told_with_its_digits():
+    angles = np.add(equal_planet_angles(4), [0.0, 2e-6, 0.0, 0.0])
+    with pytest.raises(GeometryError, match=r"by 3\.18e-05 teeth"):
+        mesh_phasing(30, 70, angles)

@@ -8,9 +8,9 @@ import pytest
 from femgear.errors import GeometryError
 from femgear.gears import equal_planet_angles
 from femgear.gears.checks import feasible_angles, neighbour_limit
-from femgear.gears.phasing import KINDS, mesh_phasing
+from femgear.gears.phasing import KINDS, MeshPhasing, mesh_phasing
 from femgear.gears.phasing_tables import phasing_table
-from femgear.gears.tooth_choice import neighbouring_teeth
+from femgear.gears.tooth_choice import check_teeth, neighbouring_teeth
 
 
 @pytest.mark.parametrize(("wanted", "planets"), [((30, 20, 70), 4), ((27, 40, 108), 3), ((29, 16, 61), 5)])
@@ -98,3 +98,19 @@ def test_numbers_out_of_range_are_refused(change):
 
 def test_nothing_near_is_an_empty_list():
     assert len(neighbouring_teeth(30, 20, 90, 4, distance=1)) == 0
+
+
+def test_teeth_that_make_no_set_are_refused_and_rough_ones_remarked_on():
+    four = mesh_phasing(30, 70, equal_planet_angles(4))
+    assert check_teeth(four, 20) == () == check_teeth(mesh_phasing(27, 108, equal_planet_angles(3)), 40)
+    (said,) = check_teeth(four, 19)
+    assert "z_r - z_s - 2 z_p = 2" in said
+    with pytest.raises(GeometryError, match="E-CHOICE") as info:
+        check_teeth(four, 5)
+    assert "20 teeth close" in info.value.remedy
+    # seven planets of 20 teeth need 2 (50 / 2) sin(pi / 7) = 21.7 modules, their tips take 22
+    near = MeshPhasing(30, 70, tuple(round(n * 100 / 7) for n in range(7)))
+    (said,) = check_teeth(near, 20)
+    assert "overlap by" in said
+    with pytest.raises(GeometryError, match="E-NEIGHBOURS"):
+        check_teeth(MeshPhasing(30, 70, tuple(range(0, 100, 10))), 20)

@@ -151,3 +151,11 @@ def test_what_does_not_fit_is_refused():
         modal_error_response(system, modes, modes.frequency[5:6], error)
     still = modal_error_response(system, replace(modes), [0.0], error)
     assert np.all(np.isfinite(still.force))
+
+
+@pytest.mark.parametrize("harmonics", [[0], [1.5], [-1], ["a"], [[1]]])
+def test_harmonics_that_are_none_are_refused(harmonics):
+    data = kahraman_set()
+    error = np.full((8, 1), 1e-6)
+    with pytest.raises(CaseError, match="E-HARMONICS"):
+        modal_error_response(helical_system(data), helical_modes(data), HERTZ, error, harmonics=harmonics)
