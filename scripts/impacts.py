@@ -151,7 +151,7 @@ def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
         names = [f"piece {number + 1}" for number in range(len(pieces))]
     rows = [(f"balance: {name}", branch.parameter[part], state[part]) for name, part in zip(names, pieces)]
     grid = np.concatenate(
-        [np.linspace(0.6, 1.0, max(3, ratios // 2)), np.linspace(1.1, 3.5, max(3, ratios // 5))]
+        [np.linspace(0.6, 1.0, max(3, ratios // 2)), np.linspace(1.05, 3.5, max(3, ratios // 2))]
     )
     sweeps = sweep_up_and_down(lambda r: (pair.problem(r), 1.0), grid, steps=100, most=300)
     for name, sweep in zip(("up", "down"), sweeps):
@@ -185,9 +185,10 @@ def chaos_study(folder: Path, ratios: int, points: int) -> list[str]:
     exponent, error = (grid * [getattr(one, name)[0] for one in found] for name in ("exponents", "error"))
     low, high = (np.array([getattr(one, name)[0] for one in found]) for name in ("lowest", "highest"))
     repeats = [one.section.repeats_after(1e-3) for one in found]
+    words = [{True: "yes", False: "no", None: "not told"}[one.chaotic] for one in found]
     header = ("frequency ratio [1]", "largest exponent [omega_n]", "error [omega_n]", "smallest x [b]",
-              "largest x [b]", "repeats after periods")  # fmt: skip
-    records = zip(*(column.tolist() for column in (grid, exponent, error, low, high)), repeats)
+              "largest x [b]", "repeats after periods", "chaotic")  # fmt: skip
+    records = zip(*(column.tolist() for column in (grid, exponent, error, low, high)), repeats, words)
     write_csv(folder / "chaos.csv", header, records)
     shown = np.array([one.section.deflection[-min(points, 80) :, 0] for one in found])
     figure = bifurcation_and_exponent(grid, shown, exponent, error, lowest=low, highest=high)
@@ -205,8 +206,9 @@ def chaos_study(folder: Path, ratios: int, points: int) -> list[str]:
     chaotic = grid[[one.chaotic is True for one in found]]
     ends = [f"{r:.2f}" for r in chaotic[[0, -1]]] if len(chaotic) else ["none", "none"]
     print_table(
-        "Lightly loaded pair", ("ratios", "exponent clearly positive", "from", "to"),
-        [(str(len(grid)), str(len(chaotic)), *ends)],
+        "Lightly loaded pair", ("ratios", "chaotic: exponent clearly positive, no repetition", "from", "to",
+                                "not told", "smallest x"),
+        [(str(len(grid)), str(len(chaotic)), *ends, str(words.count("not told")), f"{low.min():.3f}")],
     )  # fmt: skip
     return ["chaos.csv", "chaos.png", "sections.png"]
 

@@ -14,6 +14,9 @@ from script_tools import Progress, print_table, ready_folder, run_script, say_fi
 
 from femgear.errors import CaseError
 
+# some seconds each; beyond these a figure shows nothing more
+MOST_BALANCE, MOST_POINTS, MOST_HARMONICS = 200, 20_000, 20
+
 
 def main(
     *,
@@ -43,7 +46,7 @@ def main(
     lateral
         The shafts between the stages carry the suns.
     balance
-        Speeds at which harmonic balance of the meshes with k(t) stands beside the modal summation.
+        Speeds at which harmonic balance of the meshes with k(t) stands beside the modal summation, up to 200.
     """
     from femgear.models.multistage_example import SPEED, TORQUE, four_stage_train
     from femgear.models.multistage_modes import multistage_modes
@@ -54,14 +57,17 @@ def main(
     if (
         not 0.0 < lowest < highest < math.inf
         or points < 2
-        or harmonics < 1
-        or balance < 0
+        or not 1 <= harmonics <= MOST_HARMONICS
+        or not 0 <= balance <= MOST_BALANCE
+        or points > MOST_POINTS
         or not 0 < damping < 1
     ):
         raise CaseError(
             f"{points} speeds from {lowest} to {highest} 1/min, {balance} of harmonic balance, {harmonics} "
             f"harmonics, damping {damping}",
-            code="E-RANGE", limit="0 < lowest < highest, 2 speeds, 1 harmonic, 0 < damping < 1",
+            code="E-RANGE",
+            limit=f"0 < lowest < highest, 2 to {MOST_POINTS} speeds, 1 to {MOST_HARMONICS} harmonics, up to "
+            f"{MOST_BALANCE} speeds of harmonic balance, 0 < damping < 1",
         )  # fmt: skip
     folder, train = ready_folder(output), four_stage_train(lateral=lateral)
     rpm = np.linspace(lowest, highest, points)

@@ -11,6 +11,8 @@ import numpy as np
 from cyclopts import Parameter
 from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
 
+from femgear.errors import CaseError
+
 ERRORS = ("ste overall", "ste sun-planet", "ste planet-ring")
 FORCES = ("mesh force", "peak mesh force", "housing")
 QUIET = {"static.stresses": False, "housing.published": None}
@@ -94,6 +96,7 @@ def main(
 
     data = read_case(case)
     data = data if torque is None else with_value(data, "operation.torque", torque)
+    _check_request(data, positions, flank_elements, samples, max_designs)
     variables = tuple(parse_variable(text) for text in vary)
     if not variables:
         data, variables = tip_reliefs(data)
@@ -119,6 +122,31 @@ def main(
     if check:
         names += _check(found, data, folder, speeds if elastic else None, rough)
     say_files(folder, names)
+
+
+def _check_request(case, positions: int, flank_elements: int, samples, max_designs) -> None:
+    """Refuse at once what no search can do."""
+    given = {"samples": samples, "max_designs": max_designs}
+    given |= {"positions": positions, "flank_elements": flank_elements}
+    for name, value in given.items():
+        least = 2 if name == "max_designs" else 1
+        if value is not None and not least <= value <= 1_000_000:
+            key = f"--{name.replace('_', '-')}"
+            raise CaseError("not usable", code="E-RANGE", key=key, value=value, limit=f"{least} to 1000000")
+    if case.operation.torque == 0.0:
+        raise CaseError(
+            "without torque no tooth carries load", code="E-NO-LOAD", key="operation.torque",
+            limit="not zero", remedy='give a torque, --torque "100 N m"',
+        )  # fmt: skip
+    for name in ("planar", "helical"):
+        section = getattr(case, name, None)
+        if getattr(section, "mesh_stiffness", None) is not None:
+            raise CaseError(
+                f"the case gives its mesh stiffness, so that deviations of the flanks change nothing in its "
+                f"{name} model", code="E-STAGE", key=f"{name}.mesh_stiffness",
+                limit="cases whose mesh stiffness is femgear's own",
+                remedy="leave the table out",
+            )  # fmt: skip
 
 
 def _refined(rough, case, folder: Path, options, method: str):

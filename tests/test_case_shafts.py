@@ -76,6 +76,13 @@ def test_shafts_that_are_none(parts, error, code):
     assert "sun.support" in str(caught.value)
 
 
+def test_a_shell_too_thin_for_elements_is_refused_in_words_of_the_case():
+    part = {"length": "60 mm", "outer_diameter": "20 mm", "inner_diameter": "19.9 mm"}
+    with pytest.raises(GeometryError, match="E-SHAFT") as caught:
+        on_shaft([part])
+    assert "sun.support_shaft" in str(caught.value) and "thinnest wall" in str(caught.value)
+
+
 def test_stiffness_and_shaft_together_are_refused():
     with pytest.raises(CaseError, match="E-DUPLICATE"):
         with_value(read_case(CASE), "sun.support_shaft", PARTS)

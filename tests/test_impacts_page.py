@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from femgear.solvers.lyapunov import LyapunovExponents
+
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "impacts.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
@@ -56,5 +58,7 @@ def test_named_functions_exist():
         known |= set(vars(importlib.import_module(f"femgear.{module}")))
     named = set(re.findall(r"`([A-Za-z_]\w+)`", prose))
     assert {"ImpactPair", "with_errors", "lyapunov_exponents", "contact_states"} <= named
-    # a field of the result, which is no function
-    assert named <= known | {"chaotic"}
+    # fields of the result, which are no functions
+    fields = {"chaotic", "verdict", "error", "scatter", "step_error"}
+    assert fields <= set(dir(LyapunovExponents)) | set(LyapunovExponents.__dataclass_fields__)
+    assert named <= known | fields

@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -405,12 +406,39 @@ def test_results_that_are_no_numbers_are_failures(case):
         (lambda c: pareto_front(Problem(c, [X], ROSENBROCK), X_ALONE, points=1), "E-RANGE", "points"),
         (lambda c: sweep(c, {}, [ROSENBROCK]), "E-SWEEP", "0 cases"),
         (lambda c: sweep(c, {"sun.mass": ["1 mm"]}, [ROSENBROCK]), "E-UNIT", "sun.mass"),
+        (lambda c: sweep(c, {"title": ["a", "b"]}, [ROSENBROCK]), "E-SWEEP", "title"),
+        (lambda c: Variable("sun.mass", 0.0, "2 kg"), "E-UNIT", "0.0 kg..2 kg"),
+        (
+            lambda c: Problem(c, [Variable("sun.modifications[9].amount", "0 um", "2 um")], ROSENBROCK),
+            "E-KEY",
+            "",
+        ),
+        (
+            lambda c: sweep(
+                with_values(c, {"operation.torque": "0 N m"}),
+                {"sun.mass": ["1 kg"]},
+                [replace(ROSENBROCK, stage="static")],
+            ),
+            "E-NO-LOAD",
+            "torque",
+        ),
     ],
 )
 def test_refusals(case, make, code, words):
     with pytest.raises(CaseError) as refused:
         make(case)
     assert code in str(refused.value) and words in str(refused.value)
+
+
+def test_thousands_of_cases_say_how_long_they_take(case, capsys):
+    quick = function("x", lambda x, y: x)
+    over = {"dynamics.damping_ratio": [0.01 * n for n in range(1, 9)], "carrier.mass": ["1 kg"]}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys.modules["femgear.optimisation.sweep"], "MANY", 8)
+        sweep(case, over, [quick])
+    assert "[W-SWEEP] 5 more cases of about" in capsys.readouterr().err
+    sweep(case, over, [quick])
+    assert capsys.readouterr().err == ""
 
 
 def test_whole_numbers(case):

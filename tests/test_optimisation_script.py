@@ -61,6 +61,9 @@ def test_a_search_of_the_gears_and_its_continuation(tmp_path):
         (["--method", "magic"], "magic"),
         (["--speeds", "3500 rpm", "1000 rpm"], "not a range of speeds"),
         (["--positions", "4"], "static.positions"),
+        (["--samples", "0"], "--samples"),
+        (["--torque", "0 N m"], "without torque"),
+        ([str(ROOT / "cases" / "nrel_pgb.toml")], "planar.mesh_stiffness"),
     ],
 )
 def test_bad_input_ends_in_a_message(arguments, message, tmp_path, monkeypatch, capsys):

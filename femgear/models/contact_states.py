@@ -13,10 +13,11 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.elements import GearMeshes
+from femgear.solvers.entries import checked_numbers
 from femgear.solvers.periodic import PeriodicSolution
 
-NORMAL, ONE_SIDED, TWO_SIDED = 0, 1, 2
-STATE_NAMES = ("normal", "one-sided impact", "two-sided impact")
+NORMAL, ONE_SIDED, TWO_SIDED, UNKNOWN = 0, 1, 2, 3
+STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
 
 
 @dataclass(frozen=True)
@@ -52,17 +53,26 @@ def contact_states(meshes: GearMeshes, x, theta) -> ContactStates:
     Raises
     ------
     CaseError
-        Meshes that do not separate (E-CONTACT-STATE).
+        Meshes that do not separate, no instants, deflections or forces that are not finite (E-CONTACT-STATE).
     """
     if not meshes.separates:
         raise CaseError(
             "meshes that do not separate have no impacts", code="E-CONTACT-STATE", limit="separates=True"
         )
+    x = checked_numbers(x, "x", code="E-CONTACT-STATE", unit="m")
+    theta = checked_numbers(theta, "theta", code="E-CONTACT-STATE", unit="rad")
+    columns = meshes.columns[:, 0]
+    if x.ndim < 2 or x.shape[-1] <= columns.max(initial=-1) or theta.ndim != 2 or not len(theta):
+        _refuse(f"deflections of shape {x.shape} at phases of shape {theta.shape}")
+    if x.shape[-2] != len(theta):
+        _refuse(f"{x.shape[-2]} deflections of every column at {len(theta)} instants")
     k = meshes.stiffness.at(theta)
-    line = meshes.force.at(theta) + k * (
-        np.asarray(x, float)[..., meshes.columns[:, 0]] - meshes.deflection.at(theta)
-    )
-    drive, back = line > 0.0, line + k * meshes.backlash < 0.0
+    line = meshes.force.at(theta) + k * (x[..., columns] - meshes.deflection.at(theta))
+    if not np.all(np.isfinite(line)):
+        _refuse("deflections or forces that are not finite")
+    # flanks of infinite backlash have no back side
+    play = np.where(np.isfinite(meshes.backlash), meshes.backlash, 0.0)
+    drive, back = line > 0.0, np.isfinite(meshes.backlash) & (line + k * play < 0.0)
     return _judged(drive, back, axis=-2)
 
 
@@ -87,6 +97,8 @@ def solution_states(meshes: GearMeshes, solution: PeriodicSolution, *, samples: 
 def range_states(lowest, highest, *, drive: float, back: float) -> np.ndarray:
     """States (...) from the smallest and largest deflection, where the flanks close at constant deflections.
 
+    `UNKNOWN` where an extreme is nan or infinite, as of a motion that did not settle.
+
     Parameters
     ----------
     lowest, highest : (...) arrays
@@ -94,10 +106,18 @@ def range_states(lowest, highest, *, drive: float, back: float) -> np.ndarray:
     drive, back : float
         Deflections above and below which the drive and the back flanks touch.
     """
-    lowest, highest = np.asarray(lowest, float), np.asarray(highest, float)
+    lowest, highest, drive, back = (
+        checked_numbers(value, name, code="E-CONTACT-STATE", unit="m")
+        for name, value in (("lowest", lowest), ("highest", highest), ("drive", drive), ("back", back))
+    )
+    if not (np.all(np.isfinite([drive, back])) and np.all(back <= drive)):
+        _refuse(f"flanks that close above {drive} and below {back}")
+    if lowest.shape != highest.shape or np.any(lowest > highest):
+        _refuse("smallest deflections above the largest, or of another number")
     both = (highest > drive) & (lowest < back)
     closed = (lowest >= drive) | (highest <= back)
-    return np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
+    state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
+    return np.where(np.isfinite(lowest) & np.isfinite(highest), state, UNKNOWN)
 
 
 def state_regions(parameter, state) -> list[tuple[int, float, float]]:
@@ -105,7 +125,10 @@ def state_regions(parameter, state) -> list[tuple[int, float, float]]:
 
     Neighbouring runs share no value; where the state changes the border lies between them.
     """
-    parameter, state = np.asarray(parameter, float), np.asarray(state)
+    parameter = checked_numbers(parameter, "parameter", code="E-CONTACT-STATE", unit="")
+    state = checked_numbers(state, "state", code="E-CONTACT-STATE", unit="")
+    if parameter.ndim != 1 or parameter.shape != state.shape:
+        _refuse(f"states of shape {state.shape} over parameters of shape {parameter.shape}")
     ends = np.flatnonzero(np.diff(state, append=-1, prepend=-1))
     return [
         (int(state[first]), float(parameter[first]), float(parameter[last - 1]))
@@ -119,6 +142,12 @@ def level_crossings(parameter, value, level: float) -> np.ndarray:
     i = np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:]))
     share = away[i] / (away[i] - away[i + 1])
     return parameter[i] + share * (parameter[i + 1] - parameter[i])
+
+
+def _refuse(message: str):
+    raise CaseError(
+        message, code="E-CONTACT-STATE", limit="finite numbers, as many instants as phases, one or more"
+    )
 
 
 def _judged(drive, back, axis: int) -> ContactStates:

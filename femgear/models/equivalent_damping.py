@@ -15,6 +15,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.models.planar import CENTRAL, PlanarSet, free_motions, mesh_directions, pin_directions
 from femgear.models.planar_data import body_masses, member_radius
+from femgear.solvers.entries import checked_numbers
 
 
 def mesh_dampers(stiffness, mass_1, mass_2, ratio) -> np.ndarray:
@@ -34,7 +35,8 @@ def mesh_dampers(stiffness, mass_1, mass_2, ratio) -> np.ndarray:
     CaseError
         Negative or undefined values, masses that are not above zero (E-DAMPING).
     """
-    k, m1, m2, xi = (np.asarray(value, float) for value in (stiffness, mass_1, mass_2, ratio))
+    given = {"stiffness": stiffness, "mass_1": mass_1, "mass_2": mass_2, "ratio": ratio}
+    k, m1, m2, xi = (_numbers(name, value) for name, value in given.items())
     _not_negative("mesh stiffness", k)
     _not_negative("damping ratio", xi)
     if not (np.all(m1 > 0.0) and np.all(m2 > 0.0)):
@@ -55,7 +57,8 @@ def support_dampers(stiffness, mass, ratio) -> np.ndarray:
     CaseError
         Negative or undefined values (E-DAMPING).
     """
-    k, m, xi = (np.asarray(value, float) for value in (stiffness, mass, ratio))
+    given = {"stiffness": stiffness, "mass": mass, "ratio": ratio}
+    k, m, xi = (_numbers(name, value) for name, value in given.items())
     for name, value in (("support stiffness", k), ("mass", m), ("damping ratio", xi)):
         _not_negative(name, value)
     return 2.0 * xi * np.sqrt(k * m)
@@ -69,6 +72,11 @@ def planar_mesh_dampers(data: PlanarSet, ratio) -> np.ndarray:
     data : PlanarSet
     ratio : float or (2N,) array
     """
+    if _numbers("mesh_ratio", ratio).shape not in ((), (2 * data.n_planets,)):
+        raise CaseError(
+            f"mesh damping ratios of shape {np.shape(ratio)}", code="E-DAMPING", key="mesh_ratio",
+            limit=f"one, or {2 * data.n_planets}: one a mesh",
+        )  # fmt: skip
     turning = body_masses(data)[:, 2]
     held = {name: math.isinf(getattr(data, name).torsional_support) for name in CENTRAL}
     sun, ring = (math.inf if held[n] else turning[CENTRAL.index(n)] for n in ("sun", "ring"))
@@ -95,6 +103,10 @@ def equivalent_damping(data: PlanarSet, *, mesh_ratio, support_ratio, flank: int
     (n, n) array
         ``sum c w w^T`` over the springs' directions w [N s/m].
     """
+    if flank not in (1, -1):
+        raise CaseError(f"flank {flank}", code="E-DAMPING", key="flank", limit="1 or -1")
+    if _numbers("support_ratio", support_ratio).ndim:
+        raise CaseError("several support damping ratios", code="E-DAMPING", key="support_ratio", limit="one")
     W = mesh_directions(data, flank)
     C = (W * planar_mesh_dampers(data, mesh_ratio)) @ W.T
     along = np.zeros(len(W))
@@ -112,6 +124,10 @@ def equivalent_damping(data: PlanarSet, *, mesh_ratio, support_ratio, flank: int
     C += np.einsum("ina,n,jna->ij", pins, dampers, pins)
     T = free_motions(data)
     return T.T @ C @ T
+
+
+def _numbers(name: str, value) -> np.ndarray:
+    return checked_numbers(value, name, code="E-DAMPING", unit="")
 
 
 def _not_negative(name: str, value: np.ndarray) -> None:

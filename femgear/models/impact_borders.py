@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from femgear.errors import CaseError
 from femgear.models.impact_pair import ImpactPair
 from femgear.solvers.branches import Branch
+from femgear.solvers.entries import checked_numbers
 from femgear.solvers.harmonic_balance import solve_harmonic_balance
 
 # instants of a period, and a step of the ratio within which interpolation along the branch will do
@@ -31,9 +33,17 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
         Over the frequency ratio, from ``parameter_curve(pair.problem, ..., 1.0)``.
     level : float
         `DRIVE` for the first impacts, `BACK` for impacts on both flanks.
+
+    Raises
+    ------
+    CaseError
+        A level that is no finite number (E-VALUE).
     """
     from scipy.optimize import brentq
 
+    number = checked_numbers(level, "level", code="E-VALUE", unit="")
+    if number.ndim or not np.isfinite(number):
+        raise CaseError(f"a level of {number.tolist()}", code="E-VALUE", key="level", limit="a finite number")
     away = np.array([lowest_deflection(one) for one in branch.solutions]) - level
     borders = []
     for i in np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:])):

@@ -23,6 +23,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.elements import GearMeshes
+from femgear.solvers.entries import checked_count, checked_numbers
 from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.solvers.series import FourierSeries, constant
 from femgear.system import MechanicalSystem
@@ -50,8 +51,8 @@ class PairBearings:
     damping_ratio: float = 0.0
 
     def __post_init__(self):
-        values = (*self.mass, *self.stiffness)
-        if len(values) != 4 or not all(math.isfinite(v) and v > 0.0 for v in values):
+        values = [checked_numbers(v, "bearings", code="E-PAIR", unit="") for v in (self.mass, self.stiffness)]
+        if any(v.shape != (2,) or not np.all(np.isfinite(v) & (v > 0.0)) for v in values):
             raise CaseError(
                 f"bearings with masses {self.mass} and stiffnesses {self.stiffness}", code="E-PAIR",
                 limit="two of each, above 0",
@@ -91,17 +92,26 @@ class ImpactPair:
 
     def __post_init__(self):
         _not_negative("damping ratio", self.damping_ratio)
+        _number("load", self.load)
         for name in ("stiffness", "tooth_error", "eccentricity"):
-            values = np.atleast_1d(np.array(getattr(self, name), complex))
+            given = checked_numbers(getattr(self, name), name, code="E-PAIR", unit="", kind=complex)
+            values = np.atleast_1d(given)
             if values.ndim != 1 or not np.all(np.isfinite(values)):
                 raise CaseError(f"{name} {values.tolist()}", code="E-PAIR", key=name, limit="finite numbers")
             object.__setattr__(self, name, tuple(values.tolist()))
-        if not math.isfinite(self.load):
-            raise CaseError(f"a load of {self.load}", code="E-PAIR", key="load", limit="finite")
-        if len(self.eccentricity) != 2 or len(self.teeth) != 2 or min(self.teeth) < 1:
+        teeth = checked_numbers(self.teeth, "teeth", code="E-PAIR", unit="")
+        whole = teeth.shape == (2,) and np.all(teeth >= 1) and np.all(teeth == np.floor(teeth))
+        if len(self.eccentricity) != 2 or not whole or not np.all(np.isfinite(teeth)):
             raise CaseError(
                 f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth", code="E-PAIR",
-                limit="two of each, one tooth or more",
+                limit="two of each, whole numbers of teeth, one or more",
+            )  # fmt: skip
+        object.__setattr__(self, "teeth", tuple(int(z) for z in teeth))
+        if len(set(self.frequency)) < len(self.frequency):
+            raise CaseError(
+                f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth make two base "
+                "frequencies one", code="E-PAIR", key="eccentricity", limit="every base frequency once",
+                remedy="give the sum of both to one gear where only the mesh counts, or other teeth",
             )  # fmt: skip
 
     @property
@@ -120,8 +130,8 @@ class ImpactPair:
         Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `frequency`; for motions that
         repeat after several tooth periods ``divided`` counts these, and the first base is 1 / divided.
         """
-        if divided < 1:
-            raise CaseError(f"{divided} tooth periods", code="E-FREQUENCY", key="divided", limit="1 or more")
+        divided = checked_count(divided, "divided", code="E-FREQUENCY")
+        ratio = _number("ratio", ratio, code="E-FREQUENCY")
         if not (math.isfinite(ratio) and ratio > 0.0):
             raise CaseError(f"a frequency ratio of {ratio}", code="E-FREQUENCY", key="ratio", limit="above 0")
         M, C, K, along = self._matrices()
@@ -204,8 +214,11 @@ def pair_scales(*, inertia, base_radius, stiffness: float, backlash: float) -> P
     backlash : float
         Total play along the line of action.
     """
-    values = (*inertia, *base_radius, stiffness, backlash)
-    if len(values) != 6 or not all(math.isfinite(v) and v > 0.0 for v in values):
+    given = {"inertia": inertia, "base_radius": base_radius, "stiffness": stiffness, "backlash": backlash}
+    values = np.concatenate(
+        [np.ravel(checked_numbers(one, key, code="E-PAIR", unit="")) for key, one in given.items()]
+    ).tolist()
+    if np.shape(inertia) != (2,) or len(values) != 6 or not all(math.isfinite(v) and v > 0.0 for v in values):
         raise CaseError(f"a gear pair with the data {values}", code="E-PAIR", limit="all above 0")
     mass = 1.0 / sum(r * r / i for r, i in zip(base_radius, inertia))
     return PairScales(0.5 * backlash, math.sqrt(stiffness / mass), 0.5 * stiffness * backlash)
@@ -218,6 +231,14 @@ def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tup
     they part where ``error Omega^2 / |1 - Omega^2 + 2 i zeta Omega| = load``, a quadratic equation of
     Omega^2 (Kahraman and Singh 1990, transition from no impact to single-sided impact).
     """
+    given = {"damping_ratio": damping_ratio, "load": load, "error": error}
+    damping_ratio, load, error = (_number(key, value) for key, value in given.items())
+    _not_negative("damping ratio", damping_ratio)
+    if load == 0.0:
+        raise CaseError(
+            "a pair without load has no closed flanks that could part", code="E-PAIR", key="load",
+            limit="not 0",
+        )  # fmt: skip
     s = (error / load) ** 2
     roots = np.roots([1.0 - s, 4.0 * damping_ratio**2 - 2.0, 1.0])
     real = roots[np.abs(roots.imag) < 1e-12].real
@@ -228,6 +249,14 @@ def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
     return tuple(order if place == base else 0 for place in range(count))
 
 
+def _number(key: str, value, code: str = "E-PAIR") -> float:
+    """One finite number."""
+    number = checked_numbers(value, key, code=code, unit="")
+    if number.ndim or not np.isfinite(number):
+        raise CaseError(f"a {key} of {number.tolist()}", code=code, key=key, limit="one finite number")
+    return float(number)
+
+
 def _not_negative(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value >= 0.0):
+    if _number(name, value) < 0.0:
         raise CaseError(f"{name} {value}", code="E-PAIR", limit="0 or more")

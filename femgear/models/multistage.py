@@ -17,7 +17,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.models.multistage_data import Member, MultistageSet, StageCoupling
-from femgear.models.multistage_motion import train_speeds, train_torques
+from femgear.models.multistage_motion import check_turns, train_speeds, train_torques
 from femgear.models.planar import free_motions, mesh_directions, planar_dofs, planar_system
 from femgear.models.planar_data import CENTRAL, PlanarTorque, flank_sign, member_radius
 from femgear.models.planar_modes import planar_springs
@@ -52,11 +52,12 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
     Raises
     ------
     CaseError
-        A torque on a held member, a train that is not determined (E-MECHANISM), centres joined rigidly
-        between frames of different speeds (E-COUPLING).
+        A torque on a held member, a train that is not determined or locked (E-MECHANISM), centres joined
+        rigidly between frames of different speeds (E-COUPLING).
     """
     from scipy.linalg import block_diag
 
+    check_turns(data)
     turning = turning_couplings(data, speed)
     carrier = train_speeds(data, speed).carrier if speed else np.zeros(len(data.stages))
     parts = [planar_system(one.data, carrier_speed=w) for one, w in zip(data.stages, carrier.tolist())]

@@ -11,12 +11,15 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.models.planar_data import CENTRAL, PlanarSet, planar_from_set
+from femgear.solvers.entries import checked_count, checked_numbers
 
 if TYPE_CHECKING:
     from femgear.gears import PlanetarySet
 
 # radii of base circles may be rounded; tooth numbers that differ by more are another set
 _RADII = 1e-3
+# largest finite stiffness of a coupling [N m/rad, N/m]; beyond, rounding hides the other springs
+STIFFEST = {"torsional": 1e12, "lateral": 1e15}
 
 
 @dataclass(frozen=True, order=True)
@@ -32,6 +35,9 @@ class Member:
 
     stage: int
     name: str
+
+    def __post_init__(self):
+        object.__setattr__(self, "stage", checked_count(self.stage, "stage", code="E-COUPLING"))
 
     def __str__(self) -> str:
         return f"stage {self.stage} {self.name}"
@@ -76,12 +82,14 @@ class Stage:
                 f"the {self.fixed} is fixed but has no torsional support", code="E-MECHANISM",
                 key=f"{self.fixed}.torsional_support", limit="above 0, or infinite",
             )  # fmt: skip
-        if not math.isfinite(self.angle):
+        if checked_numbers(self.angle, "angle", code="E-VALUE", unit="rad").ndim or not np.isfinite(
+            self.angle
+        ):
             raise CaseError(f"a stage angle of {self.angle} rad", code="E-VALUE", key="angle", limit="finite")
         if self.teeth is not None:
             object.__setattr__(self, "teeth", _checked_teeth(self.data, self.teeth))
         if self.phases is not None:
-            phases = np.array(self.phases, float)
+            phases = np.array(checked_numbers(self.phases, "phases", code="E-SHAPE", unit=""))
             if phases.shape != (2 * self.data.n_planets,) or not np.all(np.isfinite(phases)):
                 raise CaseError(
                     f"mesh phases of shape {phases.shape}", code="E-SHAPE", key="phases",
@@ -123,10 +131,18 @@ class StageCoupling:
                 _refuse(f"a coupling of the {member.name!r}", f"members {', '.join(CENTRAL)}")
         if self.first.stage == self.second.stage:
             _refuse(f"a coupling inside stage {self.first.stage}", "members of two stages")
-        if not self.torsional > 0.0:
-            _refuse(f"a torsional stiffness of {self.torsional} N m/rad", "above 0, or infinite")
-        if not self.lateral >= 0.0:
-            _refuse(f"a lateral stiffness of {self.lateral} N/m", "0 or more, or infinite")
+        units = {"torsional": "N m/rad", "lateral": "N/m"}
+        for name, unit in units.items():
+            value = checked_numbers(getattr(self, name), name, code="E-COUPLING", unit=unit)
+            if value.ndim or not (value >= 0.0 and (value or name == "lateral")):
+                lowest = "0 or more" if name == "lateral" else "above 0"
+                _refuse(f"a {name} stiffness of {value.tolist()} {unit}", f"{lowest}, or infinite")
+            if STIFFEST[name] < value < math.inf:
+                raise CaseError(
+                    f"a {name} stiffness of {value:g} {unit}", code="E-COUPLING", key=name,
+                    limit=f"up to {STIFFEST[name]:g} {unit}: beyond, rounding hides all other springs",
+                    remedy="take infinite for a rigid coupling",
+                )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,6 +172,8 @@ class MultistageSet:
     def __post_init__(self):
         object.__setattr__(self, "stages", tuple(self.stages))
         object.__setattr__(self, "couplings", tuple(self.couplings))
+        if not self.stages or not all(isinstance(one, Stage) for one in self.stages):
+            _refuse("a train without stages, or of something else", "one Stage or more")
         named = [self.input, self.output]
         named += [member for one in self.couplings for member in (one.first, one.second)]
         for member in named:
@@ -195,10 +213,12 @@ def in_series(
     input, output : {"carrier", "ring", "sun"}
         Of the first and the last stage.
     """
+    if len(stages) < 1:
+        _refuse("a train of no stages", "one stage or more")
     count = len(stages) - 1
     stiffness = []
     for name, values in (("torsional", torsional), ("lateral", lateral)):
-        values = np.atleast_1d(np.asarray(values, float))
+        values = np.atleast_1d(checked_numbers(values, name, code="E-COUPLING", unit=""))
         if values.ndim != 1 or len(values) not in (1, count):
             _refuse(f"{values.size} {name} stiffnesses", f"one, or {count}")
         stiffness.append(np.broadcast_to(values, count).tolist())
@@ -272,9 +292,10 @@ def shaft_stiffness(
 
 
 def _checked_teeth(data: PlanarSet, teeth) -> tuple[int, int, int]:
-    if len(teeth) != 3 or any(int(z) != z or z < 1 for z in teeth):
+    numbers = checked_numbers(teeth, "teeth", code="E-TEETH", unit="")
+    if numbers.shape != (3,) or not np.all(np.isfinite(numbers) & (numbers >= 1) & (numbers % 1 == 0)):
         raise CaseError(
-            f"tooth numbers {tuple(teeth)}",
+            f"tooth numbers {numbers.tolist()}",
             code="E-TEETH",
             key="teeth",
             limit="sun, planet and ring, above 0",

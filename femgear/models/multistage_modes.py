@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femgear.errors import CaseError
 from femgear.models.kinds import class_energies, named_kinds
 from femgear.models.multistage import (
     joined_motions,
@@ -18,6 +19,7 @@ from femgear.models.multistage import (
 from femgear.models.multistage_data import MultistageSet
 from femgear.models.planar import planar_system
 from femgear.models.planar_modes import planar_motions
+from femgear.solvers.entries import checked_numbers
 from femgear.solvers.modal import solve_modes
 from femgear.system import MechanicalSystem, Modes
 
@@ -73,7 +75,14 @@ def multistage_modes(
         Of all stages [N/m]; that of the sets when not given.
     damping_ratio : float or (m,) array
     """
-    k = mean_mesh_stiffness(data) if mesh_stiffness is None else np.asarray(mesh_stiffness, float)
+    k = mean_mesh_stiffness(data)
+    if mesh_stiffness is not None:
+        k = checked_numbers(mesh_stiffness, "mesh_stiffness", code="E-SHAPE", unit="N/m")
+    if k.shape != (data.n_meshes,) or not np.all(np.isfinite(k)):
+        raise CaseError(
+            f"mesh stiffnesses of shape {k.shape}", code="E-SHAPE", key="mesh_stiffness",
+            limit=f"{data.n_meshes} finite numbers, one a mesh",
+        )  # fmt: skip
     system = multistage_system(data)
     modes = solve_modes(system, k, damping_ratio=damping_ratio)
     masses = stage_masses(data)

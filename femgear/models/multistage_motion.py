@@ -159,6 +159,26 @@ def speed_ratio(data: MultistageSet) -> float:
     return 1.0 / output
 
 
+def check_turns(data: MultistageSet) -> None:
+    """Refuse loops of couplings and fixed members: trains that are locked, or held twice.
+
+    Raises
+    ------
+    CaseError
+        E-MECHANISM.
+    """
+    rows = _rows(data, _radius_weights(data))
+    rank = np.linalg.matrix_rank(rows, tol=_RANK * np.linalg.norm(rows, 2))
+    if rank < len(rows) or rank == rows.shape[1]:
+        what = "cannot turn" if rank == rows.shape[1] else "is held twice in a loop"
+        raise CaseError(
+            f"the train {what}: {len(data.stages)} stages, {len(data.couplings)} couplings and "
+            f"{sum(stage.fixed is not None for stage in data.stages)} fixed members", code="E-MECHANISM",
+            limit="couplings and fixed members that close no loop",
+            remedy="leave out a coupling, or hold one member less",
+        )  # fmt: skip
+
+
 def _rows(data: MultistageSet, weights: np.ndarray) -> np.ndarray:
     """Stages, couplings (first less second), and fixed members (rows, 3 S)."""
     rows = np.zeros((len(data.stages), 3 * len(data.stages)))

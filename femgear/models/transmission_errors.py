@@ -17,6 +17,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.models.planar import CENTRAL, PlanarSet, mesh_directions
 from femgear.solvers.elements import GearMeshes
+from femgear.solvers.entries import checked_numbers
 from femgear.solvers.lines import distinct_lines
 from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.solvers.series import FourierSeries
@@ -24,6 +25,8 @@ from femgear.solvers.summed_series import SummedSeries
 
 # sense of the rotation relative to the carrier where the sun turns counter-clockwise in its frame
 SENSE = {"sun": 1, "planet": -1, "ring": -1}
+# base radii of published sets are rounded; ratios of teeth that differ by more are another set
+_RADII = 1e-2
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,8 @@ class TransmissionErrors:
     ----------
     data : PlanarSet
     teeth : dict
-        Numbers of teeth of ``sun``, ``planet`` and ``ring``.
+        Numbers of teeth of ``sun``, ``planet`` and ``ring``, in the ratio of the base radii to 1 % (those of
+        published sets are rounded).
     sun, planet, ring : Eccentricity, optional
     tooth : (2N, H) complex array, optional
         Harmonics 1 to H of the tooth-frequency error of every mesh, its phase included: the deflection at
@@ -73,18 +77,17 @@ class TransmissionErrors:
     bases: tuple[str, ...] = field(init=False)
 
     def __post_init__(self):
-        missing = {"sun", "planet", "ring"} - self.teeth.keys()
-        if missing or min(self.teeth.values()) < 1 or abs(self.flank) != 1 or abs(self.direction) != 1:
+        if self.flank not in (1, -1) or self.direction not in (1, -1):
             raise CaseError(
-                f"errors of gears with teeth {self.teeth}, flank {self.flank}, direction {self.direction}",
-                code="E-ERRORS", limit="teeth of sun, planet and ring; 1 or -1",
-            )  # fmt: skip
+                f"errors on flank {self.flank}, direction {self.direction}", code="E-ERRORS", limit="1 or -1"
+            )
+        _check_teeth(self.data, self.teeth)
         used = tuple(name for name in SENSE if getattr(self, name) is not None)
         object.__setattr__(self, "bases", ("mesh", *used))
         for name in used:
             self._vector(name)
         if self.tooth is not None:
-            lines = np.array(self.tooth, complex)
+            lines = checked_numbers(self.tooth, "tooth", code="E-SHAPE", unit="m", kind=complex)
             if lines.ndim != 2 or len(lines) != 2 * self.data.n_planets or not np.all(np.isfinite(lines)):
                 raise CaseError(
                     f"tooth errors of shape {lines.shape}", code="E-SHAPE", key="tooth",
@@ -144,7 +147,13 @@ class TransmissionErrors:
     def _vector(self, name: str) -> np.ndarray:
         """Complex displacement (2,) of the teeth in x and y; planets (N, 2), radial and tangential."""
         given = getattr(self, name)
-        amplitude, phase = np.asarray(given.amplitude, float), np.asarray(given.phase, float)
+        if not isinstance(given, Eccentricity):
+            raise CaseError(
+                f"an eccentricity given as {given!r}", code="E-ERRORS", key=name, limit="an Eccentricity",
+                remedy=f"{name}=Eccentricity(5e-6)",
+            )  # fmt: skip
+        amplitude = checked_numbers(given.amplitude, f"{name}.amplitude", code="E-ERRORS", unit="m")
+        phase = checked_numbers(given.phase, f"{name}.phase", code="E-ERRORS", unit="rad")
         size = (self.data.n_planets,) if name == "planet" else ()
         sense = SENSE[name] * self.direction
         try:
@@ -168,9 +177,23 @@ def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
         Harmonics 1 to H at phase zero [m].
     phases : (2N,) array
         Fractions of the mesh period, see `femgear.models.planar_problem.phased_series`.
+
+    Raises
+    ------
+    CaseError
+        An odd number of phases, values that are not finite numbers (E-SHAPE).
     """
-    waves = [np.atleast_1d(np.asarray(wave, complex)) for wave in (sun_planet, planet_ring)]
-    phases, count = np.asarray(phases, float), max(map(len, waves))
+    waves = [
+        np.atleast_1d(checked_numbers(wave, name, code="E-SHAPE", unit="m", kind=complex))
+        for name, wave in (("sun_planet", sun_planet), ("planet_ring", planet_ring))
+    ]
+    phases, count = checked_numbers(phases, "phases", code="E-SHAPE", unit=""), max(map(len, waves))
+    finite = all(np.all(np.isfinite(values)) for values in (*waves, phases))
+    if phases.ndim != 1 or not len(phases) or len(phases) % 2 or max(w.ndim for w in waves) > 1 or not finite:
+        raise CaseError(
+            f"mesh phases of shape {phases.shape}", code="E-SHAPE", key="phases",
+            limit="two a planet, finite: sun-planet meshes, then planet-ring meshes",
+        )  # fmt: skip
     table = np.repeat([np.pad(wave, (0, count - len(wave))) for wave in waves], len(phases) // 2, axis=0)
     return table * np.exp(2j * np.pi * phases[:, None] * np.arange(1, count + 1))
 
@@ -213,7 +236,14 @@ def with_errors(
             raise CaseError(
                 "mesh dampers without the mesh frequency", code="E-FREQUENCY", key="mesh_frequency"
             )
-        pushes = problem.system.W[:, drive.columns[:, 0]] * np.asarray(dampers, float)
+        dampers = checked_numbers(dampers, "dampers", code="E-SHAPE", unit="N s/m")
+        rate = checked_numbers(mesh_frequency, "mesh_frequency", code="E-FREQUENCY", unit="rad/s")
+        if dampers.shape != (len(drive.columns),) or rate.ndim or not np.all(np.isfinite([*dampers, rate])):
+            raise CaseError(
+                f"mesh dampers of shape {dampers.shape} at {rate.tolist()} rad/s", code="E-SHAPE",
+                key="dampers", limit=f"{len(drive.columns)} finite numbers and one mesh frequency",
+            )  # fmt: skip
+        pushes = problem.system.W[:, drive.columns[:, 0]] * dampers
         forces = (*forces, *_rates(pushes, series, errors.frequency(mesh_frequency)))
     return replace(problem, elements=elements, forces=forces)
 
@@ -229,8 +259,35 @@ def carrier_pins(data: PlanarSet, amplitude: float, phase: float = 0.0) -> np.nd
     phase : float
         Direction from the x axis of the carrier [rad].
     """
+    given = {"amplitude": amplitude, "phase": phase}
+    for name, value in given.items():
+        number = checked_numbers(value, name, code="E-ERRORS", unit="")
+        if number.ndim or not np.isfinite(number):
+            raise CaseError(f"a {name} of {value}", code="E-ERRORS", key=name, limit="one finite number")
     angle = phase - data.planet_angles
     return amplitude * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def _check_teeth(data: PlanarSet, teeth) -> None:
+    """Refuse numbers that are no teeth, or not those of the base radii."""
+    names = ("sun", "planet", "ring")
+    values = [teeth.get(name) for name in names] if isinstance(teeth, dict) else [None]
+    numbers = [
+        z for z in values if isinstance(z, int | float | np.number) and float(z).is_integer() and z >= 1
+    ]
+    if len(numbers) != 3:
+        raise CaseError(
+            f"errors of gears with teeth {teeth}", code="E-ERRORS", key="teeth",
+            limit="whole numbers of sun, planet and ring, 1 or more",
+        )  # fmt: skip
+    for name, count, radius in zip(names[1:], numbers[1:], (data.planet_radius, data.ring_radius)):
+        teeth_ratio, radii_ratio = count / numbers[0], radius / data.sun_radius
+        if abs(radii_ratio / teeth_ratio - 1.0) > _RADII:
+            raise CaseError(
+                f"{name} and sun have {teeth_ratio:.5g} as ratio of teeth and {radii_ratio:.5g} as ratio of "
+                "base radii", code="E-TEETH", key="teeth", value=tuple(numbers), limit="the same to 1 %",
+                remedy="give the teeth of the set",
+            )  # fmt: skip
 
 
 def _rates(pushes, series: SummedSeries, frequency):

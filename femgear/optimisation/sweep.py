@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,10 @@ from femgear.threads import one_blas_thread
 
 LARGEST = 100_000
 """Combinations at most."""
+MANY = 1000
+"""Combinations from which their time is estimated and said."""
+_WITHOUT_EFFECT = {"title", "format"}
+_TIMED = 3
 _RANGE = re.compile(r"(.+?)\.\.(.+?)/\s*(\d{1,6})\s*", re.DOTALL)
 
 
@@ -98,7 +103,7 @@ def sweep(
     count = check_sweep(case, over, quantities)
     points = tuple(itertools.product(*over.values()))
     table, errors = np.full((count, len(quantities)), np.nan), []
-    keyed = [(key,) for key in keys]
+    keyed, warned = [(key,) for key in keys], False
     with open_designs(case, keyed, journal=journal, cache=cache) as designs:
         for i, point in enumerate(points):
             try:
@@ -109,6 +114,9 @@ def sweep(
                 errors.append(f"[{failure.error['code']}] {failure}")
             if progress is not None:
                 progress("cases", i + 1, count)
+            if count >= MANY and i < count - 1 and not warned and designs.computed == _TIMED:
+                warned = True
+                _warn_of_time(count - i - 1, designs.seconds / _TIMED)
         seconds = designs.seconds / max(designs.computed, 1)
         return Sweep(keys, points, quantities, table, tuple(errors), designs.computed, seconds)
 
@@ -123,9 +131,50 @@ def check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Se
             limit=f"1 to {LARGEST} cases, at least one quantity",
         )
     for key, values in over.items():
+        if key.split(".")[0] in _WITHOUT_EFFECT:
+            raise CaseError(
+                f"{key} changes no quantity", code="E-SWEEP", key="--over", value=key,
+                limit="entries that the computation uses",
+            )  # fmt: skip
         for value in values:
             with_value(case, key, value)
+    check_stages(case, quantities, over)
     return count
+
+
+def check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str] = ()) -> None:
+    """Refuse quantities that the case can never have.
+
+    Raises
+    ------
+    CaseError
+        E-NO-LOAD: what needs a torque without one; E-STAGE: a planar or helical case has no elastic ring.
+    """
+    stages = {quantity.stage for quantity in quantities}
+    elastic = [quantity.name for quantity in quantities if quantity.stage in ("dynamics", "housing")]
+    other = [name for name in ("planar", "helical") if getattr(case, name, None) is not None]
+    if elastic and other:
+        raise CaseError(
+            f"{elastic[0]} needs a case with an elastic ring", code="E-STAGE", key=other[0],
+            limit="transmission error, contact ratio, tip thickness, contact pressure, root stress",
+        )  # fmt: skip
+    # transmission errors may name a torque of their own
+    loaded = any(key.startswith("operation") for key in keys) or any("N m" in q.name for q in quantities)
+    if stages - {"gears"} and case.operation.torque == 0.0 and not loaded:
+        raise CaseError(
+            "without torque no tooth carries load", code="E-NO-LOAD", key="operation.torque",
+            limit="not zero for transmission errors, forces and stresses", remedy="give a torque",
+        )  # fmt: skip
+
+
+def _warn_of_time(left: int, seconds: float) -> None:
+    total = left * seconds
+    shown = f"{total / 3600.0:.1f} h" if total > 5400.0 else f"{total / 60.0:.1f} min"
+    print(
+        f"[W-SWEEP] {left} more cases of about {seconds:.2g} s each: {shown}; "
+        "an interrupted sweep goes on where it was",
+        file=sys.stderr,
+    )
 
 
 def parse_over(text: str) -> tuple[str, list[object]]:

@@ -52,6 +52,7 @@ class Variable:
         object.__setattr__(self, "key", keys)
         if not keys:
             raise CaseError("a design variable needs a key", code="E-VARIABLE", remedy='"sun.profile_shift"')
+        self._check_units()
         low, high = self.bounds
         if not low < high:
             raise CaseError(
@@ -70,6 +71,20 @@ class Variable:
             )
         if not self.tolerance_at(high) > 0:
             raise CaseError("a tolerance is over 0", code="E-VARIABLE", key=self.name, value=self.tolerance)
+
+    def _check_units(self) -> None:
+        """Refuse bounds of which one has a unit."""
+        (_, first), (_, second) = (split(bound, self.name) for bound in (self.low, self.high))
+        if bool(first) != bool(second):
+            unit = first or second
+            low, high = (
+                bound if has else f"{bound} {unit}" for bound, has in ((self.low, first), (self.high, second))
+            )
+            raise CaseError(
+                "one bound has a unit and the other has none", code="E-UNIT", key=self.name,
+                value=f"{self.low}..{self.high}", limit="the same kind of unit at both bounds",
+                remedy=f'write "{low}..{high}"',
+            )  # fmt: skip
 
     @property
     def name(self) -> str:
@@ -197,4 +212,11 @@ def check_variables(case: Case, variables: Sequence[Variable]) -> None:
         )
     for variable in variables:
         for bound in variable.bounds:
-            with_values(case, dict.fromkeys(variable.key, variable.text(bound)))
+            try:
+                with_values(case, dict.fromkeys(variable.key, variable.text(bound)))
+            except CaseError as error:
+                if error.code == "E-KEY" and error.message.endswith("is not a list"):
+                    # entries of a list can only be varied where the file has them
+                    entry = variable.name.split("[")[0]
+                    error.remedy = f"give the case a table [[{entry}]] for every entry that is varied"
+                raise

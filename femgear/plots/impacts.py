@@ -20,8 +20,10 @@ from femgear.plots.style import (
     new_figure,
 )
 
-# colours of no impact, one-sided and two-sided impact
-STATE_COLOURS = (GREEN, ORANGE, VERMILION)
+# colours of no impact, one-sided and two-sided impact, and of states that are not known
+STATE_COLOURS = (GREEN, ORANGE, VERMILION, GREY)
+# parameters of a row up to which each is marked
+_SPARSE = 80
 
 
 def amplitude_and_mean(
@@ -77,21 +79,29 @@ def state_bands(rows: Sequence[tuple], names: Sequence[str], *, x: str = "freque
     rows : sequence of (text, parameter (p,), state (p,) int)
         Sweeps, or pieces of a curve between limit points.
     names : sequence of str
-        Of states 0, 1 and 2.
+        Of states 0, 1 and 2, and of 3 where one is not known. A border is drawn halfway between two
+        parameters; sparse rows show these as dots.
 
     Returns
     -------
     Figure
     """
     figure, (ax,) = new_figure(width=8.5, height=1.6 + 0.5 * len(rows))
+    marked = False
     for place, (_, parameter, state) in enumerate(rows):
         order = np.argsort(parameter)
         at, value = np.asarray(parameter, float)[order], np.asarray(state)[order]
         edges = np.concatenate([at[:1], 0.5 * (at[1:] + at[:-1]), at[-1:]])
         for number, (low, high) in enumerate(pairwise(edges)):
             ax.barh(place, high - low, left=low, height=0.7, color=STATE_COLOURS[value[number]], linewidth=0)
-    for colour, name in zip(STATE_COLOURS, names):
-        ax.barh([0], [0.0], color=colour, label=name)
+        if len(at) <= _SPARSE:
+            mark = {"marker": "|", "color": BLACK, "markersize": 5.0, "linestyle": "none"}
+            ax.plot(at, np.full(len(at), place), **mark, label=None if marked else "computed ratios")
+            marked = True
+    present = {int(one) for _, _, state in rows for one in np.unique(state)}
+    for number, (colour, name) in enumerate(zip(STATE_COLOURS, names)):
+        if number < 3 or number in present:
+            ax.barh([0], [0.0], color=colour, label=name)
     ax.set_yticks(range(len(rows)), [text for text, _, _ in rows])
     ax.invert_yaxis()
     ax.grid(False, axis="y")

@@ -1,7 +1,8 @@
 """Lyapunov exponents: how fast motions that start side by side part or come together.
 
 G. Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9-30: small motions are followed
-along the motion and made orthogonal after every period; the mean logarithm of their growth is the exponent.
+along the motion and made orthogonal several times a period; the mean logarithm of their growth is
+the exponent.
 Element forces are continuous, so that small motions do not jump at contact changes: the saltation matrix is
 the unit matrix (R. I. Leine and H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
 section 7.2). Means over the periods are weighted by exp(-1 / (s (1 - s))), which for regular motions
@@ -13,11 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.adaptive import flow, trajectory
+from femgear.solvers.entries import checked_count, checked_numbers, checked_tolerance
 from femgear.solvers.initial_state import checked_start, motion_scale
 from femgear.solvers.nonlinear import NonlinearSystem, element_forces
 from femgear.solvers.poincare import PoincareSection
@@ -26,8 +29,21 @@ from femgear.solvers.variational import Frame, frame_of
 
 # parts of the run that are compared for the error
 _PARTS = 4
-# errors by which an exponent must differ from zero to have a sign
+# errors by which an exponent differs from zero to have a sign, and exponent times period that is rounding
 _CLEAR = 3.0
+_ROUNDING = 1e-9
+# small motions are made orthogonal this often in a period at least, and before they shrink by exp(-_FADED)
+_PIECES = 4
+_FADED = 3.0
+_MOST_PIECES = 1000
+# deviation of a section, relative to its size, within which it repeats, and motion beyond all bounds
+_REPEATS = 1e-3
+_BEYOND = 1e100
+# relative change of a tangent that is rounding, and of the sum of all exponents that is refused
+_SAME = 1e-9
+_SUM = 0.02
+# factor of the tolerance, or of the step, in the run that stands beside for the error of the integration
+_COARSER = {"DOP853": 1e3, "average acceleration": 2}
 
 
 @dataclass(frozen=True)
@@ -38,9 +54,11 @@ class LyapunovExponents:
     ----------
     exponents : (count,) array
         [1/s]
-    error : (count,) array
-        Of the mean over finite time, in one standard deviation: scatter of four parts of the run and of the
-        first directions. The error of the integration is not in it: repeat with more ``steps``.
+    scatter : (count,) array
+        Standard error of the mean over finite time: four parts of the run and the first directions [1/s].
+    step_error : (count,) array
+        Change against the same periods with half the steps; for DOP853 against a quarter of them with a
+        thousand times the tolerance [1/s].
     growth : (periods, directions, count) array
         Logarithm of the growth in every period.
     period : float
@@ -51,16 +69,25 @@ class LyapunovExponents:
         Smallest and largest deflection over these periods, at the steps of the integration [m].
     divergence : float
         ``-trace(M^-1 C)`` of the coordinates followed: the sum of all their exponents [1/s].
+    same_tangents : bool
+        The stiffness at every phase is the same in all periods: a linear system, or a motion that repeats.
     """
 
     exponents: np.ndarray
-    error: np.ndarray
+    scatter: np.ndarray
+    step_error: np.ndarray
     growth: np.ndarray
     period: float
     section: PoincareSection
     lowest: np.ndarray
     highest: np.ndarray
     divergence: float
+    same_tangents: bool
+
+    @property
+    def error(self) -> np.ndarray:
+        """Scatter and error of the integration together, (count,) [1/s]."""
+        return np.hypot(self.scatter, self.step_error)
 
     @property
     def largest(self) -> float:
@@ -69,10 +96,44 @@ class LyapunovExponents:
 
     @property
     def chaotic(self) -> bool | None:
-        """The largest exponent is positive; None where it is zero to within three errors."""
-        if abs(self.exponents[0]) <= _CLEAR * self.error[0]:
-            return None
-        return bool(self.exponents[0] > 0.0)
+        """Bounded, without repetition and with a positive exponent; None where this cannot be told.
+
+        See `verdict` for the reason.
+        """
+        return self._judged()[0]
+
+    @property
+    def verdict(self) -> str:
+        """Why `chaotic` is what it is."""
+        return self._judged()[1]
+
+    def _judged(self) -> tuple[bool | None, str]:
+        value = f"largest exponent {self.largest:.3g} +- {self.error[0]:.1g} 1/s"
+        zero = abs(self.largest) <= max(_CLEAR * self.error[0], _ROUNDING / self.period)
+        if not zero and self.largest < 0.0:
+            return False, f"{value}: neighbouring motions come together"
+        if self.same_tangents:
+            return False, f"{value}, but the stiffness repeats every period: linear there, not chaotic"
+        if zero:
+            return None, f"{value}: not told from zero, take more points or more steps"
+        if self._grows():
+            return None, f"{value}, but the motion grows: chaos is a property of bounded motions"
+        if repeats := self.section.repeats_after(_REPEATS):
+            return (
+                None,
+                f"{value}, but the motion repeats after {repeats} periods to {_REPEATS:g} of its size",
+            )
+        return True, f"{value}: neighbouring motions part"
+
+    def _grows(self) -> bool:
+        """Whether the motion is larger from part to part of the run, and no less so at its end."""
+        both = (self.section.displacement, self.section.velocity)
+        for states in both:
+            parts = np.array([np.abs(part).max() for part in np.array_split(states, _PARTS)])
+            more = np.diff(parts)
+            if np.all(more > 0.0) and more[-1] >= 0.5 * more[0] and parts[-1] > 1.1 * parts[0]:
+                return True
+        return False
 
 
 def lyapunov_exponents(
@@ -109,7 +170,7 @@ def lyapunov_exponents(
     start : pair of (n,) arrays, optional
         Displacement and velocity at phase zero; at rest when not given.
     steps : int
-        Time steps in a period, of average acceleration.
+        Time steps in a period, of average acceleration; 8 or more.
     periods : int
         Periods of the first base frequency between two points.
     method : str
@@ -124,55 +185,112 @@ def lyapunov_exponents(
     Raises
     ------
     CaseError
-        Numbers out of range (E-LYAPUNOV), frequencies without the common period, an unknown method.
+        Numbers out of range (E-LYAPUNOV, E-TOLERANCE), frequencies without the common period, an unknown
+        method.
     ConvergenceError
-        A step whose column equations do not converge.
+        A step whose column equations do not converge, a motion beyond all bounds (E-UNBOUNDED), exponents
+        whose sum is not the divergence (E-LYAPUNOV-SUM).
 
     Notes
     -----
     Fixed steps leave out free motions that no element and no damping feels (rotation of a free train), whose
     exponents are zero; DOP853 has them among the exponents.
     """
-    if points < 2 * _PARTS or skip < 0 or directions < 1:
-        raise CaseError(
-            f"exponents of {points} periods after {skip}, {directions} directions", code="E-LYAPUNOV",
-            limit=f"{2 * _PARTS} periods or more, no negative skip, one direction or more",
-        )  # fmt: skip
-    frequency = np.atleast_1d(np.asarray(frequency, float))
-    start = checked_start(problem, start)
-    if method == "average acceleration":
-        runs = _Stepped(problem, frequency, steps, periods)
-    elif method == "DOP853":
-        runs = _Adaptive(problem, frequency, steps, periods, tolerance)
-    else:
+    least = {"points": 2 * _PARTS, "skip": 0, "directions": 1, "count": 1, "seed": 0}
+    given = {"points": points, "skip": skip, "directions": directions, "count": count, "seed": seed}
+    points, skip, directions, count, seed = (
+        checked_count(value, key, code="E-LYAPUNOV", least=least[key]) for key, value in given.items()
+    )
+    if method not in _COARSER:
         raise CaseError(
             f"exponents by {method!r}", code="E-METHOD", key="method", limit="average acceleration or DOP853"
         )
-    if not 1 <= count <= runs.size:
+    steps = checked_count(steps, "steps", code="E-STEP", least=8)
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    tolerance = checked_tolerance(tolerance)
+    start = checked_start(problem, start)
+    finer, coarser = _both_runs(problem, frequency, method, steps, checked_count(
+        periods, "periods", code="E-FREQUENCY"), tolerance)  # fmt: skip
+    if count > finer.size:
         raise CaseError(
-            f"{count} exponents", code="E-LYAPUNOV", key="count", limit=f"1 to {runs.size}, two a coordinate"
+            f"{count} exponents", code="E-LYAPUNOV", key="count", limit=f"1 to {finer.size}, two a coordinate"
         )
-    first = np.random.default_rng(seed).standard_normal((directions, runs.size, count))
-    growth, rows = _followed(runs.passages(start), np.linalg.qr(first)[0], skip, points)
+    frames = np.linalg.qr(np.random.default_rng(seed).standard_normal((directions, finer.size, count)))[0]
+    passages = finer.passages(start)
+    for _, (_, matrices) in zip(range(skip), passages):
+        frames, _ = _turned(frames, matrices)
+    growth, rows, same = _followed(passages, frames, points, problem)
     q, v, x, low, high = (np.array(part) for part in zip(*rows))
-    time = runs.period * (skip + np.arange(points))
-    exponents, error = _means(growth / runs.period)
+    # the same attractor and the same directions, so that only the steps differ
+    beside = points if method != "DOP853" else max(2 * _PARTS, points // 4)
+    other, _, _ = _followed(coarser.passages((q[0], v[0])), frames, beside, problem)
+    exponents, scatter = _means(growth / finer.period)
+    step_error = np.abs(_means((other - growth[:beside]) / finer.period)[0])
+    _check_sum(exponents, scatter, finer)
+    time = finer.period * (skip + np.arange(points))
     return LyapunovExponents(
-        exponents, error, growth, runs.period, PoincareSection(time, q, v, x), low.min(axis=0),
-        high.max(axis=0), runs.divergence,
+        exponents, scatter, step_error, growth, finer.period, PoincareSection(time, q, v, x), low.min(axis=0),
+        high.max(axis=0), finer.divergence, same,
     )  # fmt: skip
 
 
-def _followed(passages: Iterator, frames, skip: int, points: int):
-    """Growth (points, directions, count) of the frames and what the motion does in every period."""
-    growth, rows = [], []
-    for number in range(skip + points):
-        motion, matrix = next(passages)
+def _both_runs(problem, frequency, method, steps, periods, tolerance):
+    """The run, and the coarser one beside it."""
+    if method == "DOP853":
+        loose = min(tolerance * _COARSER[method], 1e-2)
+        return tuple(_Adaptive(problem, frequency, steps, periods, one) for one in (tolerance, loose))
+    return tuple(_Stepped(problem, frequency, n, periods) for n in (steps, steps // _COARSER[method]))
+
+
+def _turned(frames, matrices):
+    """Frames after the pieces of a period, and the logarithm of their growth (directions, count)."""
+    growth = 0.0
+    for matrix in matrices:
         frames, triangle = np.linalg.qr(matrix @ frames)
-        if number >= skip:
-            growth.append(np.log(np.abs(np.diagonal(triangle, axis1=-2, axis2=-1))))
-            rows.append(motion)
-    return np.array(growth), rows
+        growth = growth + np.log(np.abs(np.diagonal(triangle, axis1=-2, axis2=-1)))
+    return frames, growth
+
+
+def _followed(passages: Iterator, frames, points: int, problem):
+    """Growth (points, directions, count), what the motion does, whether tangents repeat."""
+    growth, rows, first, same = [], [], None, True
+    for _, ((q, v, x, theta), matrices) in zip(range(points), passages):
+        frames, grown = _turned(frames, matrices)
+        growth.append(grown)
+        rows.append((q, v, x[0], x.min(axis=0), x.max(axis=0)))
+        if same:
+            tangent = element_forces(problem, x, theta)[1]
+            first = tangent if first is None else first
+            same = bool(np.abs(tangent - first).max(initial=0.0) <= _SAME * np.abs(first).max(initial=0.0))
+    return np.array(growth), rows, same
+
+
+def _check_sum(exponents, scatter, run) -> None:
+    """Refuse a complete set of exponents that does not add up to the divergence."""
+    if len(exponents) < run.size:
+        return
+    off = abs(exponents.sum() - run.divergence)
+    if off > max(_SUM * np.abs(exponents).max(), _CLEAR * scatter.max(), _ROUNDING / run.period):
+        raise ConvergenceError(
+            f"the exponents add up to {exponents.sum():.6g} 1/s, the damping to {run.divergence:.6g} 1/s",
+            code="E-LYAPUNOV-SUM", limit="the same to 2 % of the largest one",
+            remedy="take more steps a period or a smaller tolerance",
+        )  # fmt: skip
+
+
+def _bounded(q, v) -> None:
+    if not (np.abs(q).max(initial=0.0) < _BEYOND and np.abs(v).max(initial=0.0) < _BEYOND):
+        raise ConvergenceError(
+            "the motion grows beyond all bounds and has no attractor", code="E-UNBOUNDED",
+            limit=f"displacements and velocities below {_BEYOND:g}",
+            remedy="start elsewhere, or give supports or damping that hold the motion",
+        )  # fmt: skip
+
+
+def _pieces(damping, period: float) -> int:
+    """Parts of a period after which small motions are made orthogonal."""
+    fading = float(np.linalg.norm(damping, 2)) if len(damping) else 0.0
+    return int(min(max(_PIECES, np.ceil(fading * period / _FADED)), _MOST_PIECES))
 
 
 def _means(rate):
@@ -200,30 +318,36 @@ class _Stepped:
         self.divergence = -float(np.trace(self._frame.damping))
         natural = self._frame.fastest or 2.0 * np.pi / self.period
         self._scale = np.repeat([1.0, natural], len(self._frame.square))
+        self._pieces = min(_pieces(self._frame.damping, self.period), steps)
 
     def passages(self, start):
-        """Motion at the start of every period, its extremes, and the derivative of its map."""
+        """Motion at the start of every period, deflections and phases in it, derivatives of its parts."""
         once = self._strobe
         state, g = once.enter(start)
         while True:
             block = once.run(state, g)
             x = once.columns(block)
             q, v = once.motion(block, np.array([0]))
-            yield (q[0], v[0], x[0], x.min(axis=0), x.max(axis=0)), self._map(x)
+            _bounded(q, v)
+            yield (q[0], v[0], x, once.theta), self._map(x)
             state, g = block.states[-1], block.excess[-1]
 
     def _map(self, x):
-        """Product of the steps ``(1 - h/2 A_{i+1})^-1 (1 + h/2 A_i)``."""
+        """Products over parts of the period of the steps ``(1 - h/2 A_{i+1})^-1 (1 + h/2 A_i)``."""
         once, scale = self._strobe, self._scale
         kappa = self._frame.kappa(element_forces(once.problem, x, once.theta)[1])
         half = 0.5 * self.period / (len(x) - 1) * self._frame.state_matrices(kappa) * scale / scale[:, None]
         unit = np.eye(self.size)
         factors = np.linalg.solve(unit - half[1:], unit + half[:-1])
-        while len(factors) > 1:
-            # pairs, the later one on the left
-            rest = factors[len(factors) // 2 * 2 :]
-            factors = np.concatenate([factors[1::2] @ factors[: len(factors) // 2 * 2 : 2], rest])
-        return factors[0]
+        return [_product(part) for part in np.array_split(factors, self._pieces)]
+
+
+def _product(factors):
+    """Of matrices in the order of time, the later one on the left, pair by pair."""
+    while len(factors) > 1:
+        rest = factors[len(factors) // 2 * 2 :]
+        factors = np.concatenate([factors[1::2] @ factors[: len(factors) // 2 * 2 : 2], rest])
+    return factors[0]
 
 
 class _Adaptive:
@@ -232,21 +356,32 @@ class _Adaptive:
     def __init__(self, problem, frequency, samples, periods, tolerance):
         self.period = common_period(frequency, periods)
         self._flow = flow(problem, frequency, variational=True)
-        self._samples, self._tolerance = samples, tolerance
+        self._tolerance = tolerance
         self.size = 2 * self._flow.size
-        self.divergence = -float(np.trace(np.linalg.solve(problem.system.M, problem.damping)))
+        damping = np.linalg.solve(problem.system.M, problem.damping)
+        self.divergence = -float(np.trace(damping))
+        self._times = self.period * np.linspace(0.0, 1.0, samples + 1)
+        self._ends = self.period * np.linspace(0.0, 1.0, _pieces(damping, self.period) + 1)
 
     def passages(self, start):
         """As for fixed steps, in displacements and scaled velocities."""
-        moving = self._flow
-        q, v = start
+        moving, (q, v) = self._flow, start
+        theta = self._times[:, None] * moving.frequency
         while True:
-            options = {"tolerance": self._tolerance, "events": True, "scale": motion_scale(moving, (q, v))}
-            x0, y = moving.rows @ q, moving.state(q, v)
-            low, high = x0, x0
-            for t0, t1, dense in trajectory(moving, y, 0.0, self.period, **options):
-                inside = max(2, int(np.ceil((t1 - t0) / self.period * self._samples)) + 1)
-                x = moving.split(dense(np.linspace(t0, t1, inside)))[2]
-                low, high, end = np.minimum(low, x.min(axis=1)), np.maximum(high, x.max(axis=1)), dense(t1)
-            yield (q, v, x0, low, high), moving.tangents(end)
-            q, v, _ = moving.split(end)
+            _bounded(q, v)
+            options = {
+                "tolerance": self._tolerance,
+                "events": True,
+                "scale": motion_scale(moving, (q, v)) or 1.0,
+            }
+            first, x, matrices = (q, v), np.tile(moving.rows @ q, (len(theta), 1)), []
+            for begin, end in pairwise(self._ends):
+                y = moving.state(q, v)
+                for t0, t1, dense in trajectory(moving, y, begin, end, **options):
+                    inside = np.flatnonzero((self._times > t0) & (self._times <= t1))
+                    if len(inside):
+                        x[inside] = moving.split(dense(self._times[inside]))[2].T
+                    y = dense(t1)
+                matrices.append(moving.tangents(y))
+                q, v, _ = moving.split(y)
+            yield (*first, x, theta), matrices

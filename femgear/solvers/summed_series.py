@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.solvers.entries import checked_numbers
 from femgear.solvers.series import FourierSeries
 
 
@@ -65,7 +66,12 @@ def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np
     amplitude : (n, L) complex array
         ``Re sum_l A_l exp(i omega_l t)``.
     """
-    frequency = np.atleast_1d(np.asarray(frequency, float))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
+        raise CaseError(
+            f"base frequencies of shape {frequency.shape}", code="E-FREQUENCY", key="frequency",
+            limit="finite numbers, one a base",
+        )  # fmt: skip
     parts = series.parts if isinstance(series, SummedSeries) else (series,)
     rates, lines = [np.zeros(1)], [np.zeros((len(parts[0].amplitudes), 1), complex)]
     for part in parts:

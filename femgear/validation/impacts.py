@@ -221,11 +221,11 @@ def chaos() -> tuple[Row, ...]:
         2.0 * zeta / ratio, lambda t: load / ratio**2 + error * np.cos(t), 60, 150, 60, 200,
     )  # fmt: skip
     calm = lyapunov_exponents(pair.problem(2.2), 1.0, points=100, skip=100)
-    both = math.hypot(ours.error[0], scatter)
+    both = math.hypot(ours.scatter[0], scatter)
     name = "lightly loaded pair, zeta 0.05, ratio 1.5:"
     return (
         within("chaos", "one long run elsewhere", "Ueda's attractor (1979): largest exponent [1/s]", 0.0999,
-               found.largest, 3.0 * found.error[0], relative=False, note="gate: three errors of the mean"),
+               found.largest, 3.0 * found.scatter[0], relative=False, note="gate: three errors of the mean"),
         within("chaos", "-c", "Ueda's attractor: sum of both exponents [1/s]", -0.05,
                found.exponents.sum(), 1e-3, relative=False),
         within("chaos", "Runge-Kutta, 60 starts", f"{name} largest exponent [1/theta]", other, ours.largest,

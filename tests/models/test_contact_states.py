@@ -5,6 +5,8 @@ import pytest
 
 from femgear.errors import CaseError
 from femgear.models.contact_states import (
+    STATE_NAMES,
+    UNKNOWN,
     contact_states,
     level_crossings,
     range_states,
@@ -63,3 +65,37 @@ def test_meshes_that_cannot_part_are_refused():
     linear = GearMeshes([0], constant([1.0]), separates=False)
     with pytest.raises(CaseError, match="E-CONTACT-STATE"):
         contact_states(linear, np.zeros((4, 1)), np.zeros((4, 1)))
+
+
+@pytest.mark.parametrize(
+    "x, theta",
+    [
+        (np.full((4, 3), np.nan), np.zeros((4, 1))),
+        (np.zeros((0, 3)), np.zeros((0, 1))),
+        (np.zeros((4, 2)), np.zeros((4, 1))),
+        (np.zeros((4, 3)), np.zeros((5, 1))),
+        ("text", np.zeros((4, 1))),
+    ],
+)
+def test_motions_that_have_no_state_are_refused(x, theta):
+    with pytest.raises(CaseError, match="E-CONTACT-STATE"):
+        contact_states(MESHES, x, theta)
+
+
+def test_infinite_backlash_has_no_back_flanks():
+    open_side = GearMeshes([0], constant([2.0]), deflection=constant([1.0]))
+    theta = 2.0 * np.pi * np.arange(40)[:, None] / 40
+    parting = contact_states(open_side, 5.0 * np.cos(theta), theta)
+    assert parting.state.tolist() == [1] and parting.back.tolist() == [0.0]
+    assert contact_states(open_side, 5.0 + np.cos(theta), theta).state.tolist() == [0]
+
+
+def test_extremes_that_are_no_numbers_are_not_known():
+    assert range_states(np.nan, 1.0, drive=1.0, back=-1.0) == UNKNOWN
+    assert range_states([0.0, 1.5], [np.inf, 2.0], drive=1.0, back=-1.0).tolist() == [UNKNOWN, 0]
+    assert STATE_NAMES[UNKNOWN] == "not known"
+    for lowest, highest in ((1.0, 0.0), ("a", 1.0), ([0.0, 1.0], [2.0])):
+        with pytest.raises(CaseError, match="E-CONTACT-STATE"):
+            range_states(lowest, highest, drive=1.0, back=-1.0)
+    with pytest.raises(CaseError, match="E-CONTACT-STATE"):
+        state_regions([1.0, 2.0, 3.0], [0, 1])

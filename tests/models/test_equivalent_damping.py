@@ -103,3 +103,17 @@ def test_wrong_springs_are_refused(values):
     if values[3] < 0:
         with pytest.raises(CaseError, match="E-DAMPING"):
             support_dampers(1.0, 1.0, values[3])
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"mesh_ratio": 0.05, "support_ratio": 0.03, "flank": 2},
+        {"mesh_ratio": [0.05, 0.05], "support_ratio": 0.03},
+        {"mesh_ratio": "a", "support_ratio": 0.03},
+        {"mesh_ratio": 0.05, "support_ratio": [0.03, 0.03]},
+    ],
+)
+def test_ratios_and_flanks_that_do_not_fit_are_refused(options):
+    with pytest.raises(CaseError, match="E-DAMPING"):
+        equivalent_damping(lin_parker_set(3), **options)

@@ -191,3 +191,24 @@ def test_wrong_ratios_and_bearings_are_refused():
         PairBearings(mass=(1.0, 0.0), stiffness=(1.0, 1.0))
     with pytest.raises(CaseError, match="E-PAIR"):
         pair_scales(inertia=(1.0, 1.0), base_radius=(1.0, 1.0), stiffness=0.0, backlash=1.0)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: separation_ratios(damping_ratio=0.1, load=0.0, error=0.5),
+        lambda: separation_ratios(damping_ratio=0.1, load=np.nan, error=0.5),
+        lambda: separation_ratios(damping_ratio="a", load=1.0, error=0.5),
+        lambda: example_pair(0.1).problem(1.0, divided=1.5),
+        lambda: example_pair(0.1).problem("fast"),
+        lambda: ImpactPair(damping_ratio=0.1, load=1.0, teeth=(20, 20), eccentricity=(1.0, 1.0)),
+        lambda: ImpactPair(damping_ratio=0.1, load=1.0, teeth=(20.5, 30)),
+        lambda: ImpactPair(damping_ratio="a", load=1.0),
+        lambda: ImpactPair(damping_ratio=0.1, load="a"),
+        lambda: PairBearings(mass=("a", 1.0), stiffness=(1.0, 1.0)),
+        lambda: pair_scales(inertia=(1.0, "a"), base_radius=(1.0, 1.0), stiffness=1.0, backlash=1.0),
+    ],
+)
+def test_questions_without_answer_are_refused(make):
+    with pytest.raises(CaseError):
+        make()

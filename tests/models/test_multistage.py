@@ -388,3 +388,28 @@ def test_refusals(make, code):
     with pytest.raises(CaseError) as caught:
         make()
     assert caught.value.code == code
+
+
+def test_a_locked_loop_has_neither_ratio_nor_modes():
+    train = two_stages()
+    loop = StageCoupling(Member(2, "carrier"), Member(1, "sun"), 1e6)
+    locked = replace(train, couplings=(*train.couplings, loop))
+    for solve in (speed_ratio, multistage_modes):
+        with pytest.raises(CaseError, match="E-MECHANISM"):
+            solve(locked)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: in_series([]),
+        lambda: Member(1.5, "sun"),
+        lambda: Member("one", "sun"),
+        lambda: StageCoupling(Member(1, "sun"), Member(2, "sun"), 1e30),
+        lambda: StageCoupling(Member(1, "sun"), Member(2, "sun"), "stiff"),
+        lambda: multistage_modes(two_stages(), mesh_stiffness=[1e8]),
+    ],
+)
+def test_trains_that_are_none_are_refused(make):
+    with pytest.raises(CaseError):
+        make()

@@ -23,7 +23,7 @@ from femgear.solvers.transient import solve_transient
 from femgear.validation.planar import lin_parker_set
 
 DATA = lin_parker_set(3)
-TEETH = {"sun": 27, "planet": 40, "ring": 108}
+TEETH = {"sun": 28, "planet": 36, "ring": 101}
 
 
 def errors(**parts):
@@ -57,10 +57,11 @@ def test_frequencies_and_spectrum():
         sun=Eccentricity(10e-6), planet=Eccentricity(4e-6), ring=Eccentricity(8e-6),
         tooth=tooth_lines([3e-6, 1e-6], [2e-6], np.arange(6) / 6),
     )  # fmt: skip
-    frequency = full.frequency(1080.0)
-    np.testing.assert_allclose(frequency, [1080.0, 40.0, 27.0, 10.0])
+    mesh = 28.0 * 36.0 * 101.0
+    frequency = full.frequency(mesh)
+    np.testing.assert_allclose(frequency, [mesh, 36.0 * 101.0, 28.0 * 101.0, 28.0 * 36.0])
     line, amplitude = series_spectrum(full.series, frequency)
-    np.testing.assert_allclose(line, [0.0, 10.0, 27.0, 40.0, 1080.0, 2160.0])
+    np.testing.assert_allclose(line, [0.0, 1008.0, 2828.0, 3636.0, mesh, 2.0 * mesh])
     np.testing.assert_allclose(np.abs(amplitude[0]), [0, 0, 4e-6, 10e-6, 3e-6, 1e-6], atol=1e-18)
     np.testing.assert_allclose(np.abs(amplitude[3]), [0, 8e-6, 4e-6, 0, 2e-6, 0], atol=1e-18)
     assert np.angle(amplitude[1, 4]) == pytest.approx(2 * np.pi / 6)
@@ -111,7 +112,7 @@ def test_dampers_act_on_the_rate_less_the_error():
 def test_two_bases_against_integration():
     # few teeth, so that both repeat soon, but no two lines coincide; light torque, so that teeth part
     eccentric = TransmissionErrors(
-        data=DATA, teeth={"sun": 7, "planet": 5, "ring": 17}, sun=Eccentricity(9e-6),
+        data=DATA, teeth={"sun": 7, "planet": 9, "ring": 25}, sun=Eccentricity(9e-6),
         tooth=tooth_lines([2e-6], [1e-6], np.arange(6) / 3),
     )  # fmt: skip
     meshes = planar_meshes(DATA, backlash=40e-6)
@@ -144,12 +145,30 @@ def test_carrier_eccentricity_stands_still_in_its_frame():
         ({"planet": Eccentricity([1e-6, 2e-6])}, "E-ERRORS"),
         ({"tooth": np.zeros((5, 2))}, "E-SHAPE"),
         ({"flank": 0}, "E-ERRORS"),
+        ({"sun": 1e-5}, "E-ERRORS"),
+        ({"sun": Eccentricity("much")}, "E-ERRORS"),
     ],
 )
 def test_wrong_errors_are_refused(parts, code):
     with pytest.raises(CaseError) as caught:
         errors(**parts)
     assert caught.value.code == code
+
+
+@pytest.mark.parametrize(
+    "teeth, code",
+    [((12, 99, 7), "E-TEETH"), ((28.5, 36, 101), "E-ERRORS"), ((28, 36, 110), "E-TEETH")],
+)
+def test_teeth_of_another_set_are_refused(teeth, code):
+    with pytest.raises(CaseError) as caught:
+        TransmissionErrors(data=DATA, teeth=dict(zip(("sun", "planet", "ring"), teeth)))
+    assert caught.value.code == code
+
+
+@pytest.mark.parametrize("phases", [np.zeros(5), [], [0.0, np.nan], ["a", "b"]])
+def test_phases_that_are_no_pairs_are_refused(phases):
+    with pytest.raises(CaseError, match="E-SHAPE"):
+        tooth_lines([1e-6], [1e-6], phases)
 
 
 def test_problems_that_cannot_take_errors_are_refused():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, ConvergenceError
 from femgear.models.impact_pair import example_pair, lightly_loaded_pair
 from femgear.solvers.elements import GearMeshes, PolynomialSprings
 from femgear.solvers.harmonic_balance import solve_harmonic_balance
@@ -38,7 +38,10 @@ def test_damped_mathieu_equation(method, tolerance):
     found = lyapunov_exponents(problem, 2.0, count=2, points=12, skip=12, method=method)
     floquet = np.log(4.15605494) / np.pi
     np.testing.assert_allclose(found.exponents, [floquet - 0.1, -floquet - 0.1], atol=tolerance)
-    assert found.chaotic is True and found.error.max() < 1e-9
+    assert found.scatter.max() < 1e-9
+    assert np.abs(found.exponents - [floquet - 0.1, -floquet - 0.1]).max() <= max(found.error.max(), 1e-8)
+    # an unstable linear system is not chaotic
+    assert found.chaotic is False and "linear" in found.verdict
 
 
 def test_attractor_of_ueda():
@@ -95,6 +98,68 @@ def test_chaotic_pair_by_tangents_and_by_neighbours():
     ],
 )
 def test_wrong_questions_are_refused(options, code):
+    with pytest.raises(CaseError) as caught:
+        lyapunov_exponents(lightly_loaded_pair().problem(1.0), 1.0, **options)
+    assert caught.value.code == code
+
+
+def unsupported(stiffness, damping, force):
+    one = np.eye(1)
+    system = MechanicalSystem(one, damping * one, stiffness * one, one, np.zeros(1), ("x",))
+    return NonlinearSystem(system, (), (HarmonicForce([force]),))
+
+
+@pytest.mark.parametrize("stiffness, damping", [(4.0, 0.0), (0.0, 0.0), (-1.0, 0.1)])
+@pytest.mark.parametrize("method", ["average acceleration", "DOP853"])
+def test_linear_motions_are_not_chaotic(stiffness, damping, method):
+    problem = unsupported(stiffness, damping, 1.0)
+    found = lyapunov_exponents(problem, 1.0, points=8, skip=2, steps=60, method=method, directions=1)
+    assert found.chaotic is not True and found.verdict
+
+
+def test_overdamped_oscillator_by_both_methods():
+    # x'' + 5 x' + x: (-5 +- sqrt 21) / 2
+    problem = oscillator(GearMeshes([0], constant([1.0]), separates=False), 5.0, 1.0)
+    exact = np.array([-5.0 + np.sqrt(21.0), -5.0 - np.sqrt(21.0)]) / 2.0
+    for method, steps, bound in (("DOP853", 200, 1e-6), ("average acceleration", 400, 3e-3)):
+        options = {"count": 2, "points": 8, "skip": 1, "steps": steps, "method": method, "directions": 1}
+        found = lyapunov_exponents(problem, 1.0, **options)
+        np.testing.assert_allclose(found.exponents, exact, atol=bound)
+        assert np.abs(found.exponents - exact).max() <= max(found.error.max(), 1e-9)
+
+
+def test_exponents_that_do_not_add_up_are_refused():
+    # 8 steps a period for a decay of 40 per time unit
+    problem = oscillator(GearMeshes([0], constant([1.0]), separates=False), 40.0, 1.0)
+    with pytest.raises(ConvergenceError) as caught:
+        lyapunov_exponents(problem, 1.0, count=2, points=8, skip=0, steps=8)
+    assert caught.value.code == "E-LYAPUNOV-SUM"
+
+
+def test_motion_beyond_all_bounds_is_refused():
+    with pytest.raises(ConvergenceError) as caught:
+        lyapunov_exponents(unsupported(-1.0, 0.1, 1.0), 1.0, points=60, skip=20)
+    assert caught.value.code == "E-UNBOUNDED"
+
+
+def test_unstable_rest_by_the_adaptive_method():
+    found = lyapunov_exponents(
+        unsupported(-1.0, 0.1, 0.0), 1.0, points=8, skip=0, method="DOP853", directions=1
+    )
+    assert found.chaotic is False
+
+
+@pytest.mark.parametrize(
+    "options, code",
+    [
+        ({"points": 20.5}, "E-LYAPUNOV"),
+        ({"skip": 1.5}, "E-LYAPUNOV"),
+        ({"seed": -1}, "E-LYAPUNOV"),
+        ({"points": "many"}, "E-LYAPUNOV"),
+        ({"tolerance": 0.0, "method": "DOP853"}, "E-TOLERANCE"),
+    ],
+)
+def test_wrong_numbers_are_refused(options, code):
     with pytest.raises(CaseError) as caught:
         lyapunov_exponents(lightly_loaded_pair().problem(1.0), 1.0, **options)
     assert caught.value.code == code
