@@ -20,6 +20,7 @@ def run(*arguments, folder):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_quick_studies(tmp_path):
     options = ("--study", "chaos", "--study", "eccentricity", "--ratios", 3, "--points", 10)
     done = run(*options, "--frequencies", 2, "-o", tmp_path, folder=tmp_path)

@@ -152,6 +152,7 @@ def relief_problem(case):
     return Problem(coarse, [Variable(keys, "0 um", "12 um", "1 um")], transmission_error("sun-planet"))
 
 
+@pytest.mark.slow
 def test_descents_find_the_relief_that_a_scan_finds(relief_problem, grids, tmp_path):
     """Against whole contact problems of `harris_map`, which knows nothing of variants and journals."""
     from femgear.design import harris_map, with_tip_relief

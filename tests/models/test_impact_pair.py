@@ -146,6 +146,7 @@ def lowest_deflection(branch):
     return np.array([solution.at(times)[:, 0].min() for solution in branch.solutions])
 
 
+@pytest.mark.slow
 def test_damping_of_fifteen_per_cent_leaves_one_answer_and_nine_per_cent_does_not():
     found = {}
     for zeta in (0.15, 0.09):

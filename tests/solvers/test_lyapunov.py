@@ -44,6 +44,7 @@ def test_damped_mathieu_equation(method, tolerance):
     assert found.chaotic is False and "linear" in found.verdict
 
 
+@pytest.mark.slow
 def test_attractor_of_ueda():
     # Y. Ueda, J. Stat. Phys. 20 (1979) 181-196: x'' + 0.05 x' + x^3 = 7.5 cos t; 0.0999 and -0.1499 over one
     # long run (sites.google.com/view/lyapunov-spectrum), 0.1022 +- 0.0008 by Runge-Kutta from 100 starts
