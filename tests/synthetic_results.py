@@ -263,6 +263,7 @@ def dynamics(*, speeds: np.ndarray | None = None) -> xr.Dataset:
         "residual": _variable("speed", np.full(s, 3e-8), "1", "residual"),
         "spectral_radius": _variable("speed", radius, "1", "spectral radius"),
         "floquet_multiplier": _variable("speed", np.full(s, 0.83), "1", "largest Floquet multiplier"),
+        "stable": _variable("speed", np.ones(s, bool), "1", "whether no perturbation grows"),
         "method": _variable("speed", np.array(["fixed point"] * s), "", "method"),
     } | {
         f"{name}_{part}": _variable(smh, getattr(value, part), units, name)

@@ -149,6 +149,7 @@ def test_verdicts_are_warnings(tmp_path):
         if stage == "dynamics":
             data["converged"].values[1] = False
             data["floquet_multiplier"].values[0] = 1.07
+            data["stable"].values[0] = False
 
     text = write_report(make_run(tmp_path / "out", change=change)).read_text(encoding="utf-8")
     assert "<li>the periodic solution did not converge at 3100 rpm</li>" in text
