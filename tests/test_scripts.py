@@ -108,7 +108,7 @@ def test_help(name, tmp_path):
         ("gravity_wedging.py", ["--lowest", "90", "--highest", "30"], 2, "lowest < highest"),
         ("bearing_clearance.py", ["--clearance=-1 um"], 2, "clearances of 0 or more"),
         ("bearing_clearance.py", ["--points", "1"], 2, "two frequencies"),
-        ("multistage.py", ["--points", "1"], 2, "2 speeds"),
+        ("multistage.py", ["--points", "1"], 2, "2 to 20000 speeds"),
         ("multistage.py", ["--damping", "2"], 2, "0 < damping < 1"),
         ("planet_phasing.py", ["--points", "1"], 2, "2 frequencies"),
         ("planet_phasing.py", ["--angle", "0", "--angle", "100"], 2, "100.800000"),
