@@ -156,7 +156,6 @@ THEMES = (
         "Sun-planet and planet-ring of 27/40/108, each alone, 100/3 N m at the sun.",
         (torque_rotation.same_depth,),
         (
-            torque_rotation.some_positions,
             torque_rotation.all_positions,
             torque_rotation.planet_and_ring,
             torque_rotation.other_treatments,

@@ -128,14 +128,9 @@ def _compared(mesh: int, positions: tuple[int, ...], name: str, shown) -> tuple[
     return tuple(rows)
 
 
-def some_positions() -> tuple[Row, ...]:
-    """Sun and planet with two tooth pairs and with one."""
-    return _compared(SUN_PLANET, (0, 16), "sun-planet", (0, 1))
-
-
 def all_positions() -> tuple[Row, ...]:
     """Sun and planet over one mesh cycle, a tip corner that begins to carry included."""
-    return _compared(SUN_PLANET, tuple(range(0, POSITIONS, 4)), "sun-planet", (6, 7, 11))
+    return _compared(SUN_PLANET, tuple(range(POSITIONS)), "sun-planet", (0, 16, 24, 28, 44))
 
 
 def planet_and_ring() -> tuple[Row, ...]:
