@@ -10,18 +10,53 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.analysis import DynamicsResult, HousingResult, ModesResult, StaticResult
+    from femgear.analysis_helical import HelicalDynamicsResult
 
 RPM = np.pi / 30.0
+FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
 
 
-def _variable(dims, values, units, long_name):
-    return dims, np.asarray(values), {"units": units, "long_name": long_name}
+def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
+    """Dataset of entries ``(dims, values, units, long_name)``."""
+    import xarray as xr
+
+    def made(entries):
+        return {
+            name: (dims, np.asarray(values), {"units": units, "long_name": words})
+            for name, (dims, values, units, words) in entries.items()
+        }
+
+    return xr.Dataset(made(variables), coords=made(coords), attrs=attrs)
+
+
+def complex_entries(entries) -> dict[str, tuple]:
+    """Real and imaginary parts of entries ``(name, dims, values, units, long_name)``."""
+    found = {}
+    for name, dims, values, units, words in entries:
+        found[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
+        found[f"{name}_imag"] = (dims, values.imag, units, f"{words}, imaginary part")
+    return found
+
+
+def response_entries(result: DynamicsResult | HelicalDynamicsResult) -> dict[str, tuple]:
+    """What is known of the periodic response at every speed: frequency, convergence, stability."""
+    response, stability, speed = result.response, result.stability, ("speed",)
+    return {
+        "mesh_frequency": (speed, response.mesh_frequency, "Hz", "mesh frequency"),
+        "carrier_speed": (speed, [s.carrier for s in result.speeds], "rad/s", "speed of the carrier"),
+        "converged": (speed, response.converged, "1", "whether the solution satisfies its tolerance"),
+        "iterations": (speed, response.iterations, "1", "iterations of the fixed point"),
+        "residual": (speed, response.residual, "1", "relative residual of the harmonic equations"),
+        "spectral_radius": (speed, response.spectral_radius, "1", "spectral radius of the fixed point"),
+        "tail": (speed, response.tail, "1", "share of the amplitude in the upper half of the harmonics"),
+        "method": (speed, list(response.method), "1", "method of solution"),
+        "floquet_multiplier": (speed, np.abs(stability.multiplier), "1", "largest Floquet multiplier"),
+        "stable": (speed, stability.stable, "1", "whether no perturbation grows"),
+    }
 
 
 def static_dataset(result: StaticResult) -> xr.Dataset:
     """Contents of static.nc."""
-    import xarray as xr
-
     cycle, gears = result.cycle, result.planetary_set
     mesh_position = ("mesh", "position")
     teeth = cycle.tooth_load.shape[1]
@@ -72,15 +107,15 @@ def static_dataset(result: StaticResult) -> xr.Dataset:
         "residual": (("position",), cycle.residual, "1", "residual of contact conditions and equilibrium"),
         "iterations": (("position",), cycle.iterations, "1", "steps of the active set"),
     }
-    return xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
+    return dataset(
+        variables,
         coords={
-            "mesh": _variable(("mesh",), list(gears.mesh_names), "1", "gear mesh"),
-            "position": _variable(("position",), cycle.position, "1", "position in mesh periods"),
-            "planet": _variable(("planet",), np.arange(1, gears.n_planets + 1), "1", "planet"),
-            "axis": _variable(("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
-            "member": _variable(("member",), list(cycle.member_names), "1", "moving member and direction"),
-            "tooth": _variable(("tooth",), np.arange(teeth), "1", "tooth pair in the order of the path"),
+            "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+            "position": (("position",), cycle.position, "1", "position in mesh periods"),
+            "planet": (("planet",), np.arange(1, gears.n_planets + 1), "1", "planet"),
+            "axis": (("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
+            "member": (("member",), list(cycle.member_names), "1", "moving member and direction"),
+            "tooth": (("tooth",), np.arange(teeth), "1", "tooth pair in the order of the path"),
         },
         attrs={
             "title": "static transmission error, load sharing and mesh stiffness",
@@ -109,8 +144,6 @@ def static_dataset(result: StaticResult) -> xr.Dataset:
 
 def modes_dataset(result: ModesResult) -> xr.Dataset:
     """Contents of modes.nc."""
-    import xarray as xr
-
     from femgear.models.elastic import ring_field
     from femgear.models.ring import RADIAL, TANGENTIAL
 
@@ -136,16 +169,14 @@ def modes_dataset(result: ModesResult) -> xr.Dataset:
         for part in ("real", "imag"):
             values = getattr(field, part)
             variables[f"{name}_{part}"] = (("mode", "circumferential"), values, "kg^-1/2", words)
-    n_meshes = len(modes.mesh_stiffness)
-    return xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
+    n_meshes, diameters = len(modes.mesh_stiffness), np.arange(-n_max, n_max + 1)
+    return dataset(
+        variables,
         coords={
-            "mode": _variable(("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-            "dof": _variable(("dof",), list(modes.dofs), "1", "degree of freedom"),
-            "mesh": _variable(("mesh",), _mesh_names(n_meshes // 2), "1", "gear mesh"),
-            "circumferential": _variable(
-                ("circumferential",), np.arange(-n_max, n_max + 1), "1", "signed nodal diameter n"
-            ),
+            "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
+            "dof": (("dof",), list(modes.dofs), "1", "degree of freedom"),
+            "mesh": (("mesh",), _mesh_names(n_meshes // 2), "1", "gear mesh"),
+            "circumferential": (("circumferential",), diameters, "1", "signed nodal diameter n"),
         },
         attrs={
             "title": "modal basis with mean mesh stiffnesses",
@@ -157,59 +188,36 @@ def modes_dataset(result: ModesResult) -> xr.Dataset:
 
 def dynamics_dataset(result: DynamicsResult) -> xr.Dataset:
     """Contents of dynamics.nc."""
-    import xarray as xr
-
-    response, stability = result.response, result.stability
-    speed, lines = ("speed",), ("speed", "mesh", "harmonic")
+    response, lines = result.response, ("speed", "mesh", "harmonic")
     field = ("speed", "harmonic", "circumferential")
-    n_max = result.ring_radial.shape[-1] // 2
-    variables = {
-        "mesh_frequency": (speed, response.mesh_frequency, "Hz", "mesh frequency"),
-        "carrier_speed": (speed, [s.carrier for s in result.speeds], "rad/s", "speed of the carrier"),
-        "converged": (speed, response.converged, "1", "whether the solution satisfies its tolerance"),
-        "iterations": (speed, response.iterations, "1", "iterations of the fixed point"),
-        "residual": (speed, response.residual, "1", "relative residual of the harmonic equations"),
-        "spectral_radius": (speed, response.spectral_radius, "1", "spectral radius of the fixed point"),
-        "tail": (speed, response.tail, "1", "share of the amplitude in the upper half of the harmonics"),
-        "method": (speed, list(response.method), "1", "method of solution"),
-        "floquet_multiplier": (speed, np.abs(stability.multiplier), "1", "largest Floquet multiplier"),
-        "stable": (speed, stability.stable, "1", "whether no perturbation grows"),
-    }
-    for name, dims, values, units, words in (
+    n_max, harmonics = result.ring_radial.shape[-1] // 2, np.arange(response.force.shape[-1])
+    diameters = np.arange(-n_max, n_max + 1)
+    entries = (
         ("dte", lines, result.dte, "m", "dynamic transmission error"),
         ("mesh_force", lines, response.force, "N", "dynamic mesh force"),
         ("mesh_deflection", lines, response.deflection, "m", "deflection of the mesh spring"),
         ("ring", field, result.ring_radial, "m", "outer radial displacement of the ring"),
         ("ring_tangential", field, result.ring_tangential, "m", "outer tangential displacement of the ring"),
-    ):
-        variables[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
-        variables[f"{name}_imag"] = (dims, values.imag, units, f"{words}, imaginary part")
-    rpm = result.input_speed / RPM
-    return xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
+    )
+    return dataset(
+        response_entries(result) | complex_entries(entries),
         coords={
-            "speed": _variable(speed, rpm, "rpm", "speed of the input"),
-            "mesh": _variable(("mesh",), list(result.mesh_names), "1", "gear mesh"),
-            "harmonic": _variable(
-                ("harmonic",), np.arange(response.force.shape[-1]), "1", "harmonic of the mesh frequency"
-            ),
-            "circumferential": _variable(
-                ("circumferential",), np.arange(-n_max, n_max + 1), "1", "signed nodal diameter n"
-            ),
+            "speed": (("speed",), result.input_speed / RPM, "rpm", "speed of the input"),
+            "mesh": (("mesh",), list(result.mesh_names), "1", "gear mesh"),
+            "harmonic": (("harmonic",), harmonics, "1", "harmonic of the mesh frequency"),
+            "circumferential": (("circumferential",), diameters, "1", "signed nodal diameter n"),
         },
         attrs={
             "title": "periodic response by the spectral method",
             "message": response.message,
             "ring_teeth": result.ring_teeth,
-            "fourier_convention": "x(t) = Re sum_h X_h exp(i h omega t)",
+            "fourier_convention": FOURIER,
         },
     )
 
 
 def housing_dataset(result: HousingResult) -> xr.Dataset:
     """Contents of housing.nc."""
-    import xarray as xr
-
     signal, speed = result.signal, ("speed",)
     order = ("speed", "order")
     variables = {
@@ -240,12 +248,12 @@ def housing_dataset(result: HousingResult) -> xr.Dataset:
             "displacement phase, exact lines",
         ),
     }
-    return xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
+    return dataset(
+        variables,
         coords={
-            "speed": _variable(speed, result.input_speed / RPM, "rpm", "speed of the input"),
-            "time": _variable(("time",), signal.revolution, "1", "fraction of one carrier revolution"),
-            "order": _variable(("order",), result.linear.order, "1", "carrier order"),
+            "speed": (speed, result.input_speed / RPM, "rpm", "speed of the input"),
+            "time": (("time",), signal.revolution, "1", "fraction of one carrier revolution"),
+            "order": (("order",), result.linear.order, "1", "carrier order"),
         },
         attrs={
             "title": "what a sensor fixed on the housing hears",

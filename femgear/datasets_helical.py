@@ -6,27 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.datasets import FOURIER, RPM, complex_entries, dataset, response_entries
+from femgear.datasets_planar import MEMBERS, in_space
+
 if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.analysis_helical import HelicalDynamicsResult, HelicalModesResult
 
-RPM = np.pi / 30.0
-MEMBERS = ("carrier", "ring", "sun")
 AXES = ("x", "y", "z", "tilt x", "tilt y", "rotation")
-FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
-
-
-def _variable(dims, values, units, long_name):
-    return dims, np.asarray(values), {"units": units, "long_name": long_name}
 
 
 def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
     """Contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
-    import xarray as xr
+    from femgear.models.helical import free_motions
 
     modes, data = result.modes, result.data
-    shape, dofs = _in_space(result)
+    shape, dofs = in_space(data, free_motions(data) @ modes.shape, AXES)
     meshes = (2 * data.n_planets, data.slices)
     deflection = modes.mesh_deflection.reshape(*meshes, -1).mean(axis=1)
     variables = {
@@ -45,8 +41,8 @@ def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
         ),
     }  # fmt: skip
     coords = _coordinates(result) | {
-        "mode": _variable(("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-        "dof": _variable(("dof",), dofs, "1", "degree of freedom"),
+        "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
+        "dof": (("dof",), dofs, "1", "degree of freedom"),
     }
     if result.whole is not None:
         along, whole = np.cos(data.base_helix_angle), result.whole
@@ -59,9 +55,9 @@ def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
             "static transmission error along the transverse line of action, centres fixed",
         )  # fmt: skip
         position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
-        coords["position"] = _variable(("position",), position, "1", "position in mesh periods")
-    return xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
+        coords["position"] = (("position",), position, "1", "position in mesh periods")
+    return dataset(
+        variables,
         coords=coords,
         attrs={"title": "modes of the helical set at standstill", "unknowns": len(modes.shape)}
         | _attributes(result),
@@ -70,32 +66,17 @@ def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
 
 def helical_dynamics_dataset(result: HelicalDynamicsResult) -> xr.Dataset:
     """Contents of dynamics.nc of a helical case."""
-    import xarray as xr
-
-    response, stability, basis = result.response, result.stability, result.modes
-    speed, lines = ("speed",), ("speed", "mesh", "harmonic")
+    response, basis, lines = result.response, result.modes, ("speed", "mesh", "harmonic")
     data = basis.data
     whole = (len(response.mesh_frequency), 2 * data.n_planets, data.slices, -1)
     force, deflection = response.force.reshape(whole), response.deflection.reshape(whole)
-    variables = {
-        "mesh_frequency": (speed, response.mesh_frequency, "Hz", "mesh frequency"),
-        "carrier_speed": (speed, [s.carrier for s in result.speeds], "rad/s", "speed of the carrier"),
-        "converged": (speed, response.converged, "1", "whether the solution satisfies its tolerance"),
-        "iterations": (speed, response.iterations, "1", "iterations of the fixed point"),
-        "residual": (speed, response.residual, "1", "relative residual of the harmonic equations"),
-        "spectral_radius": (speed, response.spectral_radius, "1", "spectral radius of the fixed point"),
-        "tail": (speed, response.tail, "1", "share of the amplitude in the upper half of the harmonics"),
-        "method": (speed, list(response.method), "1", "method of solution"),
-        "floquet_multiplier": (speed, np.abs(stability.multiplier), "1", "largest Floquet multiplier"),
-        "stable": (speed, stability.stable, "1", "whether no perturbation grows"),
-    }
     pin, support = result.loads["pin"], result.loads["support"]
     along = np.cos(data.base_helix_angle)
     on_planet, on_member = (
         ("speed", "planet", "direction", "harmonic"),
         ("speed", "member", "axis", "harmonic"),
     )
-    for name, dims, values, units, words in (
+    entries = (
         (
             "dte", lines, deflection.mean(axis=2) / along, "m",
             "dynamic transmission error along the transverse line of action at mid-face",
@@ -113,11 +94,9 @@ def helical_dynamics_dataset(result: HelicalDynamicsResult) -> xr.Dataset:
         ("pin_moment", on_planet, pin[:, :, 3:], "N m", "moment of the pin on the planet"),
         ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),
         ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
-    ):  # fmt: skip
-        variables[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
-        variables[f"{name}_imag"] = (dims, values.imag, units, f"{words}, imaginary part")
-    return xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
+    )  # fmt: skip
+    return dataset(
+        response_entries(result) | complex_entries(entries),
         coords=_coordinates(basis) | _lines(result),
         attrs={
             "title": "periodic response of the helical set by the spectral method",
@@ -134,18 +113,18 @@ def _lines(result: HelicalDynamicsResult) -> dict[str, tuple]:
     planets = np.arange(1, data.n_planets + 1)
     axes, directions = ["x", "y", "z"], ["radial", "tangential", "axial"]
     return {
-        "speed": _variable(("speed",), result.input_speed / RPM, "rpm", "speed of the input"),
-        "harmonic": _variable(("harmonic",), harmonics, "1", "harmonic of the mesh frequency"),
-        "slice": _variable(("slice",), data.slice_heights, "m", "height of the slice above mid-face"),
-        "planet": _variable(("planet",), planets, "1", "planet"),
-        "direction": _variable(("direction",), directions, "1", "direction at the planet"),
-        "member": _variable(("member",), list(MEMBERS), "1", "member"),
-        "axis": _variable(("axis",), axes, "1", "axis of the frame of the carrier"),
+        "speed": (("speed",), result.input_speed / RPM, "rpm", "speed of the input"),
+        "harmonic": (("harmonic",), harmonics, "1", "harmonic of the mesh frequency"),
+        "slice": (("slice",), data.slice_heights, "m", "height of the slice above mid-face"),
+        "planet": (("planet",), planets, "1", "planet"),
+        "direction": (("direction",), directions, "1", "direction at the planet"),
+        "member": (("member",), list(MEMBERS), "1", "member"),
+        "axis": (("axis",), axes, "1", "axis of the frame of the carrier"),
     }
 
 
 def _coordinates(result: HelicalModesResult) -> dict[str, tuple]:
-    return {"mesh": _variable(("mesh",), list(result.planetary_set.mesh_names), "1", "gear mesh")}
+    return {"mesh": (("mesh",), list(result.planetary_set.mesh_names), "1", "gear mesh")}
 
 
 def _attributes(result: HelicalModesResult) -> dict:
@@ -159,20 +138,3 @@ def _attributes(result: HelicalModesResult) -> dict:
     if section is not None:
         given |= {"virtual_teeth": np.array(section.teeth), "section_factor": section.factor}
     return given
-
-
-def _in_space(result: HelicalModesResult) -> tuple[np.ndarray, list[str]]:
-    """Shapes as motions of every body along and about x, y and z, held ones included."""
-    from femgear.models.helical import free_motions
-    from femgear.models.planar_data import member_radius
-
-    data, N = result.data, result.data.n_planets
-    full = (free_motions(data) @ result.modes.shape).reshape(N + 3, 6, -1).copy()
-    cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
-    for first in (0, 3):
-        one, two = full[3:, first].copy(), full[3:, first + 1].copy()
-        full[3:, first], full[3:, first + 1] = one * cosine - two * sine, one * sine + two * cosine
-    radii = np.array([member_radius(data, name) for name in MEMBERS] + [data.planet_radius] * N)
-    full[:, 3:] /= radii[:, None, None]
-    bodies = [*MEMBERS, *(f"planet {n + 1}" for n in range(N))]
-    return full.reshape(6 * (N + 3), -1), [f"{body}: {axis}" for body in bodies for axis in AXES]

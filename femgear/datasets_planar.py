@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.datasets import RPM, complex_entries, dataset
+
 if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.analysis_planar import BranchResult, PlanarModesResult, PlanarResponseResult
+    from femgear.models.planar_data import RigidSet
     from femgear.solvers.branches import Branch
     from femgear.solvers.verdict import FloquetVerdict
 
-RPM = np.pi / 30.0
 MEMBERS = ("carrier", "ring", "sun")
 FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
 
@@ -22,16 +24,12 @@ FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
 PHASES = 721
 
 
-def _variable(dims, values, units, long_name):
-    return dims, np.asarray(values), {"units": units, "long_name": long_name}
-
-
 def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
     """Contents of modes.nc of a planar case: axes and rotations of all bodies, no elastic ring."""
-    import xarray as xr
+    from femgear.models.planar import free_motions
 
     modes, gears = result.modes, result.planetary_set
-    shape, dofs = _in_space(result)
+    shape, dofs = in_space(result.data, free_motions(result.data) @ modes.shape, ("x", "y", "rotation"))
     n = 2 * gears.n_planets
     variables = {
         "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
@@ -44,12 +42,12 @@ def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
             ("mesh", "mode"), modes.mesh_deflection[:n], "kg^-1/2", "mesh deflection of the mode",
         ),
     }  # fmt: skip
-    return xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
+    return dataset(
+        variables,
         coords={
-            "mode": _variable(("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-            "dof": _variable(("dof",), dofs, "1", "degree of freedom"),
-            "mesh": _variable(("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+            "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
+            "dof": (("dof",), dofs, "1", "degree of freedom"),
+            "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
         },
         attrs={
             "title": "modes of the planar set at standstill, bearings closed, back flanks open",
@@ -59,26 +57,34 @@ def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
     )
 
 
-def _in_space(result: PlanarModesResult) -> tuple[np.ndarray, list[str]]:
-    """Shapes as x, y and rotation of every body, held ones included."""
-    from femgear.models.planar import free_motions, member_radius
+def in_space(data: RigidSet, motions: np.ndarray, axes: tuple[str, ...]) -> tuple[np.ndarray, list[str]]:
+    """Motions of every body along and about x, y (and z) with their names, held ones included.
 
-    data, N = result.data, result.planetary_set.n_planets
-    full = (free_motions(data) @ result.modes.shape).reshape(N + 3, 3, -1).copy()
+    Parameters
+    ----------
+    data : RigidSet
+    motions : (n, m) array
+        In all coordinates: two in the plane and ``u``; or three translations, two tilts and ``u``.
+    axes : tuple of str
+        Names of the motions of a body.
+    """
+    from femgear.models.planar_data import member_radius
+
+    N = data.n_planets
+    full = motions.reshape(N + 3, len(axes), -1).copy()
     cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
-    radial, tangential = full[3:, 0].copy(), full[3:, 1].copy()
-    full[3:, 0], full[3:, 1] = radial * cosine - tangential * sine, radial * sine + tangential * cosine
-    radii = [member_radius(data, name) for name in MEMBERS] + [data.planet_radius] * N
-    full[:, 2] /= np.array(radii)[:, None]
+    for first in range(0, len(axes), 3):
+        radial, tangential = full[3:, first].copy(), full[3:, first + 1].copy()
+        full[3:, first] = radial * cosine - tangential * sine
+        full[3:, first + 1] = radial * sine + tangential * cosine
+    radii = np.array([member_radius(data, name) for name in MEMBERS] + [data.planet_radius] * N)
+    full[:, -(len(axes) // 2) :] /= radii[:, None, None]
     bodies = [*MEMBERS, *(f"planet {n + 1}" for n in range(N))]
-    dofs = [f"{body}: {axis}" for body in bodies for axis in ("x", "y", "rotation")]
-    return full.reshape(3 * (N + 3), -1), dofs
+    return full.reshape(len(motions), -1), [f"{body}: {axis}" for body in bodies for axis in axes]
 
 
 def branch_dataset(result: BranchResult) -> xr.Dataset:
     """Contents of branch.nc."""
-    import xarray as xr
-
     branch, point = result.branch, ("point",)
     hertz = branch.parameter / (2.0 * np.pi)
     known = len(branch.verdicts) > 0
@@ -99,12 +105,12 @@ def branch_dataset(result: BranchResult) -> xr.Dataset:
     variables |= _stability(branch, stable) | _flank_forces(result, stable)
     variables |= _motions(result.lines, "point", "harmonic")
     coords = _coordinates(result.planetary_set) | {
-        "point": _variable(point, np.arange(len(hertz)), "1", "point along the branch"),
-        "harmonic": _variable(("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
-        "phase": _variable(("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
+        "point": (point, np.arange(len(hertz)), "1", "point along the branch"),
+        "harmonic": (("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
+        "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
     }
-    data = xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
+    data = dataset(
+        variables,
         coords=coords,
         attrs={
             "title": "periodic responses to the weight",
@@ -174,8 +180,6 @@ def _nearest(verdict: FloquetVerdict) -> float:
 
 def response_dataset(result: PlanarResponseResult) -> xr.Dataset:
     """Contents of response.nc."""
-    import xarray as xr
-
     found, speed = result.solutions, ("speed",)
     mesh = [one.mesh_frequency for one in result.speeds]
     variables = {
@@ -205,12 +209,12 @@ def response_dataset(result: PlanarResponseResult) -> xr.Dataset:
     variables |= _motions(result.lines, "speed", "line")
     orders, line = found[0].orders, ("line",)
     coords = _coordinates(result.planetary_set) | {
-        "speed": _variable(speed, result.input_speed / RPM, "rpm", "speed of the input"),
-        "carrier_order": _variable(line, orders[:, 0], "1", "multiple of the carrier's frequency"),
-        "mesh_order": _variable(line, orders[:, 1], "1", "multiple of the mesh frequency"),
+        "speed": (speed, result.input_speed / RPM, "rpm", "speed of the input"),
+        "carrier_order": (line, orders[:, 0], "1", "multiple of the carrier's frequency"),
+        "mesh_order": (line, orders[:, 1], "1", "multiple of the mesh frequency"),
     }
-    return xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
+    return dataset(
+        variables,
         coords=coords,
         attrs={
             "title": "responses to weight and mesh frequency together",
@@ -233,21 +237,22 @@ def _motions(lines, along: str, line: str) -> dict[str, tuple]:
     )  # fmt: skip
     out["motion"] = ((along,), found["motion"], "m", "farthest that a member's centre moves from its place")
     out["rms"] = (member, fluctuation(found["member"]), "m", "displacement about its mean, r.m.s.")
-    for name, key, dims, units, words in (
-        ("displacement", "member", (*member, line), "m", "displacement in the carrier frame"),
-        ("mesh_force", "mesh_force", (*mesh, line), "N", "mesh force along the line of the drive flanks"),
-        ("back_force", "back_force", (*mesh, line), "N", "force of the back flanks on their own line"),
+    out |= complex_entries((
+        ("displacement", (*member, line), found["member"], "m", "displacement in the carrier frame"),
         (
-            "planet_bearing_force", "planet_bearing", (along, "planet", "direction", line), "N",
+            "mesh_force", (*mesh, line), found["mesh_force"], "N",
+            "mesh force along the line of the drive flanks",
+        ),
+        ("back_force", (*mesh, line), found["back_force"], "N", "force of the back flanks on their own line"),
+        (
+            "planet_bearing_force", (along, "planet", "direction", line), found["planet_bearing"], "N",
             "force of the pin on the planet",
         ),
         (
-            "carrier_bearing_force", "carrier_bearing", (along, "axis", line), "N",
+            "carrier_bearing_force", (along, "axis", line), found["carrier_bearing"], "N",
             "force of the carrier bearing on the carrier",
         ),
-    ):  # fmt: skip
-        out[f"{name}_real"] = (dims, found[key].real, units, f"{words}, real part")
-        out[f"{name}_imag"] = (dims, found[key].imag, units, f"{words}, imaginary part")
+    ))  # fmt: skip
     for side in ("drive", "back"):
         words = f"share of the time in which the {side} flanks touch: 1 in contact, 0 not"
         out[f"{side}_contact"] = (mesh, found[f"{side}_contact"], "1", words)
@@ -257,9 +262,9 @@ def _motions(lines, along: str, line: str) -> dict[str, tuple]:
 def _coordinates(gears) -> dict[str, tuple]:
     numbers = np.arange(1, gears.n_planets + 1)
     return {
-        "mesh": _variable(("mesh",), list(gears.mesh_names), "1", "gear mesh"),
-        "planet": _variable(("planet",), numbers, "1", "planet"),
-        "member": _variable(("member",), list(MEMBERS), "1", "member"),
-        "axis": _variable(("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
-        "direction": _variable(("direction",), ["radial", "tangential"], "1", "direction at the planet"),
+        "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+        "planet": (("planet",), numbers, "1", "planet"),
+        "member": (("member",), list(MEMBERS), "1", "member"),
+        "axis": (("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
+        "direction": (("direction",), ["radial", "tangential"], "1", "direction at the planet"),
     }

@@ -1,28 +1,16 @@
 """docs/choosing_teeth.md: its examples print what it says."""
 
-import contextlib
-import io
 import re
-from pathlib import Path
 
 import pytest
+from page_examples import read_page, run_examples
 
-ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs" / "choosing_teeth.md").read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
-PRINTED = re.findall(r"^```text\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
+PAGE, EXAMPLES, PRINTED = read_page("choosing_teeth.md")
 
 
 @pytest.fixture(scope="module")
 def outputs():
-    """What the examples print, run one after the other as on the page."""
-    names, found = {"__name__": "__main__"}, []
-    for number, example in enumerate(EXAMPLES):
-        output = io.StringIO()
-        with contextlib.redirect_stdout(output):
-            exec(compile(example, f"docs/choosing_teeth.md, example {number + 1}", "exec"), names)
-        found.append(output.getvalue())
-    return found
+    return run_examples("choosing_teeth.md", EXAMPLES)
 
 
 def test_every_example_has_its_output():

@@ -1,19 +1,14 @@
 """docs/impacts.md: its examples print what it says, its pictures and the names in it exist."""
 
-import contextlib
 import importlib
-import io
 import re
-from pathlib import Path
 
 import pytest
+from page_examples import ROOT, read_page, run_examples
 
 from femgear.solvers.lyapunov import LyapunovExponents
 
-ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs" / "impacts.md").read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
-PRINTED = re.findall(r"^```text\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
+PAGE, EXAMPLES, PRINTED = read_page("impacts.md")
 MODULES = (
     "models.equivalent_damping", "models.transmission_errors", "models.impact_pair", "models.impact_borders",
     "models.contact_states", "solvers.lyapunov", "solvers.summed_series", "solvers.nonlinear",
@@ -23,14 +18,7 @@ MODULES = (
 
 @pytest.fixture(scope="module")
 def outputs():
-    """What the examples print, run one after the other as on the page."""
-    names, found = {"__name__": "__main__"}, []
-    for number, example in enumerate(EXAMPLES):
-        output = io.StringIO()
-        with contextlib.redirect_stdout(output):
-            exec(compile(example, f"docs/impacts.md, example {number + 1}", "exec"), names)
-        found.append(output.getvalue())
-    return found
+    return run_examples("impacts.md", EXAMPLES)
 
 
 def test_every_example_has_its_output():

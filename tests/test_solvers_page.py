@@ -1,18 +1,13 @@
 """docs/solvers.md: its examples print what it says, the functions that it names exist."""
 
-import contextlib
 import importlib
 import inspect
-import io
 import re
-from pathlib import Path
 
 import pytest
+from page_examples import ROOT, read_page, run_examples
 
-ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs" / "solvers.md").read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
-PRINTED = re.findall(r"^```text\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
+PAGE, EXAMPLES, PRINTED = read_page("solvers.md")
 # options, fields and parameters, which are no functions
 WORDS = {
     "converged",
@@ -41,14 +36,7 @@ WORDS = {
 
 @pytest.fixture(scope="module")
 def outputs():
-    """What the examples print, run one after the other as on the page."""
-    names, found = {"__name__": "__main__"}, []
-    for number, example in enumerate(EXAMPLES):
-        output = io.StringIO()
-        with contextlib.redirect_stdout(output):
-            exec(compile(example, f"docs/solvers.md, example {number + 1}", "exec"), names)
-        found.append(output.getvalue())
-    return found
+    return run_examples("solvers.md", EXAMPLES)
 
 
 def test_every_example_has_its_output():

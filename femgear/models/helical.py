@@ -27,7 +27,7 @@ from femgear.models.helical_data import (
     reduced_body,
     reduced_support,
 )
-from femgear.models.planar_data import CENTRAL, PlanarTorque, flank_sign, member_radius, torque_shares
+from femgear.models.planar_data import CENTRAL, PlanarTorque, flank_sign, member_radius, torque_load
 from femgear.system import MechanicalSystem
 
 __all__ = [
@@ -79,19 +79,19 @@ def helical_system(data: HelicalSet, *, torque: PlanarTorque | None = None) -> M
     CaseError
         A torque on a held member, or a set that cannot move at all (E-MECHANISM).
     """
-    T = free_motions(data)
+    T, kept = free_motions(data), _kept(data)
     if not T.shape[1]:
         raise CaseError(
             "infinite stiffnesses hold every motion of the set", code="E-MECHANISM",
             remedy="give the support or the bearing of a body finite stiffnesses",
         )  # fmt: skip
-    names = np.array(helical_dofs(data.n_planets))[_kept(data)]
+    names = np.array(helical_dofs(data.n_planets))[kept]
     return MechanicalSystem(
         M=(T.T * body_masses(data).ravel()) @ T,
         C=np.zeros((T.shape[1], T.shape[1])),
         K=T.T @ _linear_stiffness(data) @ T,
         W=T.T @ mesh_directions(data, flank_sign(data, torque)),
-        load=T.T @ _torque_load(data, torque),
+        load=T.T @ torque_load(data, torque, kept),
         dofs=tuple(str(name) for name in names),
     )
 
@@ -210,21 +210,3 @@ def _linear_stiffness(data: HelicalSet) -> np.ndarray:
     k = np.where(np.isfinite(data.pin_stiffness), data.pin_stiffness, 0.0)
     K = np.einsum("ina,na,jna->ij", pins, k, pins, optimize=True)
     return K + np.diag(np.where(np.isfinite(diagonal), diagonal, 0.0).ravel())
-
-
-def _torque_load(data: HelicalSet, torque: PlanarTorque | None) -> np.ndarray:
-    """Forces on ``u`` of the driven member and the output."""
-    load = np.zeros(6 * (data.n_planets + 3))
-    if torque is None:
-        return load
-    if math.isinf(getattr(data, torque.member).support.torsional):
-        raise CaseError(
-            f"the torque acts on the {torque.member}, which is held", code="E-MECHANISM",
-            remedy="drive a member that can turn",
-        )  # fmt: skip
-    shares = torque_shares(data)
-    on_sun = torque.torque / member_radius(data, torque.member) / shares[torque.member]
-    for member in (torque.member, torque.output):
-        if member is not None:
-            load[6 * CENTRAL.index(member) + 5] = on_sun * shares[member]
-    return load

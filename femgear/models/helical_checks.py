@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.models.planar_checks import check_angles, refuse
 
 if TYPE_CHECKING:
     from femgear.models.helical_data import HelicalBody, HelicalSet, HelicalSupport
@@ -16,6 +17,7 @@ CONTACT_POINTS = ("pitch_point", "base_circles")
 # Rounded numbers miss each other by less than 1 %, other distances or angles than those of the gears by more.
 LARGEST_CLOSURE = 0.1
 DIRECTIONS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}
+_refuse = partial(refuse, code="E-HELICAL")
 
 
 def check_body(name: str, body: HelicalBody) -> None:
@@ -52,7 +54,7 @@ def check_set(data: HelicalSet) -> None:
         if np.any(wrong):
             _refuse(name, values[wrong][0], "N/m", "finite, 0 or more")
     check_support("planet_bearing", data.planet_bearing, count=data.n_planets)
-    _check_angles(data.planet_angles)
+    check_angles(data.planet_angles, code="E-HELICAL")
     _check_contact(data)
     _check_closure(data)
 
@@ -101,18 +103,3 @@ def _check_closure(data: HelicalSet) -> None:
             f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {LARGEST_CLOSURE:.0%}",
             remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
         )  # fmt: skip
-
-
-def _check_angles(angles: np.ndarray) -> None:
-    allowed = "one or more, finite, ascending, within one turn"
-    if not angles.size or angles.ndim != 1 or not np.all(np.isfinite(angles)):
-        _refuse("planet_angles", angles.tolist(), "rad", allowed)
-    if np.any(np.diff(angles) < 1e-9) or np.ptp(angles) > 2.0 * math.pi - 1e-9:
-        _refuse("planet_angles", angles.tolist(), "rad", allowed, remedy="give radians, in ascending order")
-
-
-def _refuse(key: str, value, unit: str, limit: str, *, remedy: str | None = None):
-    raise CaseError(
-        f"{key.replace('_', ' ').replace('.', ': ')} of {value} {unit}".rstrip(),
-        code="E-HELICAL", key=key, value=value, limit=limit, remedy=remedy,
-    )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from femgear.gears import involute
 from femgear.models.helical_checks import check_body, check_set, check_support, numbers
-from femgear.models.planar_data import CENTRAL, member_radius
+from femgear.models.planar_data import CENTRAL, RigidSet, gear_geometry, member_radius
 
 if TYPE_CHECKING:
     from femgear.gears import PlanetarySet
@@ -84,27 +83,16 @@ class HelicalBody:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class HelicalSet:
+class HelicalSet(RigidSet):
     """Data of the helical set; the centres of all bodies lie in one plane.
+
+    Bodies, radii, angles and mesh stiffnesses as in `RigidSet`; a stiffness of zero leaves a mesh out.
 
     Parameters
     ----------
-    sun, ring, carrier : HelicalBody
-    planet : HelicalBody
-        Each of the N equal planets; it has no supports but its bearing.
-    sun_radius, ring_radius, planet_radius : float
-        Base radii [m].
-    centre_distance : float
-        Radius of the circle of planet centres [m].
-    planet_angles : (N,) array
-        psi_n [rad], ascending within one turn, counter-clockwise from the x axis.
-    pressure_angle_sun_planet, pressure_angle_planet_ring : float
-        Working pressure angles in the transverse section [rad].
     base_helix_angle : float
         Angle of the tooth normals to the transverse section [rad], beta_b with ``sin beta_b = sin beta cos
         alpha_n``; positive for a right-handed sun, whose planets and ring are then left-handed.
-    stiffness_sun_planet, stiffness_planet_ring : float or (N,) array
-        Mean stiffnesses of the whole meshes along the tooth normals [N/m]; zero leaves a mesh out.
     planet_bearing : HelicalSupport
         Between planet and carrier, of numbers or (N,) arrays; infinite ties the planet to its pin.
     contact_points : {"pitch_point", "base_circles"}
@@ -126,20 +114,7 @@ class HelicalSet:
         `closure` tells by how much they do.
     """
 
-    sun: HelicalBody
-    ring: HelicalBody
-    carrier: HelicalBody
-    planet: HelicalBody
-    sun_radius: float
-    ring_radius: float
-    planet_radius: float
-    centre_distance: float
-    planet_angles: Sequence[float] | np.ndarray
-    pressure_angle_sun_planet: float
-    pressure_angle_planet_ring: float
     base_helix_angle: float
-    stiffness_sun_planet: float | np.ndarray
-    stiffness_planet_ring: float | np.ndarray
     planet_bearing: HelicalSupport
     contact_points: str = "pitch_point"
     slices: int = 1
@@ -159,30 +134,9 @@ class HelicalSet:
         check_set(self)
 
     @property
-    def n_planets(self) -> int:
-        return len(self.planet_angles)
-
-    @property
-    def mesh_stiffness(self) -> np.ndarray:
-        """Mean stiffness of the 2N meshes [N/m]."""
-        return np.concatenate([self.stiffness_sun_planet, self.stiffness_planet_ring])
-
-    @property
     def column_stiffness(self) -> np.ndarray:
         """Mean stiffness of the 2N S columns of ``W`` [N/m], the slices of a mesh side by side."""
         return self.per_column(self.mesh_stiffness) / self.slices
-
-    @property
-    def closure(self) -> tuple[float, float]:
-        """``(r_s + r_p) / (a cos alpha_sp) - 1`` and ``(r_r - r_p) / (a cos alpha_pr) - 1``.
-
-        Zero where radii, centre distance and pressure angles belong to one set of gears.
-        """
-        a = self.centre_distance
-        return (
-            (self.sun_radius + self.planet_radius) / (a * math.cos(self.pressure_angle_sun_planet)) - 1.0,
-            (self.ring_radius - self.planet_radius) / (a * math.cos(self.pressure_angle_planet_ring)) - 1.0,
-        )
 
     @property
     def slice_heights(self) -> np.ndarray:
@@ -253,26 +207,19 @@ def helical_from_set(
     contact_points, slices, face_width
         See `HelicalSet`.
     """
-    s = planetary_set
     return HelicalSet(
         sun=sun,
         ring=ring,
         carrier=carrier,
         planet=planet,
-        sun_radius=s.sun.base_radius,
-        ring_radius=s.ring.base_radius,
-        planet_radius=s.planet.base_radius,
-        centre_distance=s.centre_distance,
-        planet_angles=s.planet_angles,
-        pressure_angle_sun_planet=s.working_pressure_angle_sun_planet,
-        pressure_angle_planet_ring=s.working_pressure_angle_planet_ring,
-        base_helix_angle=math.atan(math.tan(helix_angle) * math.cos(s.sun.pressure_angle)),
+        base_helix_angle=math.atan(math.tan(helix_angle) * math.cos(planetary_set.sun.pressure_angle)),
         stiffness_sun_planet=stiffness_sun_planet,
         stiffness_planet_ring=stiffness_planet_ring,
         planet_bearing=planet_bearing,
         contact_points=contact_points,
         slices=slices,
         face_width=face_width,
+        **gear_geometry(planetary_set),
     )
 
 

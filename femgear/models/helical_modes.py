@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.errors import CaseError
 from femgear.models.helical import (
     CENTRAL,
     HelicalSet,
@@ -16,8 +15,9 @@ from femgear.models.helical import (
     pin_directions,
 )
 from femgear.models.helical_data import body_masses
-from femgear.models.kinds import SetMotions, class_energies, named_kinds, phase_basis
+from femgear.models.kinds import SetMotions, named_kinds, phase_basis
 from femgear.models.planar_data import member_radius
+from femgear.models.planar_modes import body_motions, energy_shares
 from femgear.solvers.modal import solve_modes
 from femgear.system import Modes
 
@@ -96,9 +96,7 @@ def helical_kinds(data: HelicalSet, shape, *, frequency) -> tuple[str, ...]:
 
 def class_shares(data: HelicalSet, shape) -> np.ndarray:
     """Shares (3, m) of rotational-axial, translational-tilting and planet motion in the kinetic energy."""
-    motions = helical_motions(data, shape)
-    central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
-    return class_energies(motions) / (central + (np.abs(motions.weighted) ** 2).sum(axis=(0, 1)))
+    return energy_shares(helical_motions(data, shape))
 
 
 def helical_motions(data: HelicalSet, shape) -> SetMotions:
@@ -118,12 +116,7 @@ def helical_motions(data: HelicalSet, shape) -> SetMotions:
     CaseError
         Shapes of another system (E-SHAPE).
     """
-    T, shape = free_motions(data), np.asarray(shape)
-    if shape.ndim != 2 or len(shape) != T.shape[1]:
-        raise CaseError(
-            f"mode shapes of shape {shape.shape}", code="E-SHAPE", limit=f"({T.shape[1]}, modes)"
-        )  # fmt: skip
-    full, mass = (T @ shape).reshape(data.n_planets + 3, 6, -1), body_masses(data)
+    full, mass = body_motions(data, free_motions(data), shape), body_masses(data)
     plane, space = [0, 1, 5], [3, 4, 2]
     central = np.concatenate([full[:3, plane], full[:3, space]])
     central_mass = np.concatenate([mass[:3, plane], mass[:3, space]])

@@ -9,11 +9,12 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.models.helical import HelicalSet, helical_system
 from femgear.models.planar_data import PlanarTorque
-from femgear.solvers.elements import GearMeshes, gear_meshes
+from femgear.models.planar_problem import damping_matrix, mesh_elements
+from femgear.solvers.elements import GearMeshes
 from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import NonlinearSystem, modal_damping
-from femgear.solvers.series import FourierSeries, StepSeries, constant
-from femgear.system import MechanicalSystem, MeshExcitation
+from femgear.solvers.nonlinear import NonlinearSystem
+from femgear.solvers.series import FourierSeries, StepSeries
+from femgear.system import MeshExcitation
 
 
 def helical_meshes(
@@ -49,16 +50,7 @@ def helical_meshes(
         A record without the number of its harmonics (E-HARMONICS), values for another number of columns
         (E-SHAPE).
     """
-    columns = np.arange(2 * data.n_planets * data.slices)
-    if isinstance(stiffness, MeshExcitation):
-        if harmonics is None:
-            raise CaseError(
-                "the mesh harmonics of the record are not said", code="E-HARMONICS", key="harmonics",
-                limit="a whole number of 1 or more",
-            )  # fmt: skip
-        made = gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
-    else:
-        made = GearMeshes(columns, constant(data.column_stiffness) if stiffness is None else stiffness)
+    made = mesh_elements(stiffness, data.column_stiffness, harmonics, orders, record="record")
     backlash = made.backlash if backlash is None else backlash
     return replace(made, backlash=backlash, separates=separates, smoothing=smoothing)
 
@@ -99,19 +91,4 @@ def helical_problem(
     reference = NonlinearSystem(system, (meshes,)).reference
     # refuses a load that nothing takes up before a solver drifts away with it
     solve_modes(system, reference)
-    return NonlinearSystem(replace(system, C=_damping(system, reference, damping)), (meshes,))
-
-
-def _damping(system: MechanicalSystem, reference: np.ndarray, damping) -> np.ndarray:
-    """``C`` as given, or of modal ratios."""
-    if damping is None:
-        return system.C
-    array = np.asarray(damping, float)
-    if array.ndim < 2:
-        return modal_damping(system, reference, damping)
-    if array.shape != system.M.shape or not np.all(np.isfinite(array)):
-        raise CaseError(
-            f"a damping matrix of shape {array.shape}", code="E-SHAPE", key="damping",
-            limit=f"{system.M.shape} finite numbers",
-        )  # fmt: skip
-    return array
+    return NonlinearSystem(replace(system, C=damping_matrix(system, reference, damping)), (meshes,))

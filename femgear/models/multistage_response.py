@@ -19,11 +19,11 @@ from femgear.models.multistage_data import MultistageSet, Stage
 from femgear.models.multistage_modes import multistage_modes
 from femgear.models.multistage_motion import train_speeds
 from femgear.models.multistage_turning import TurningSprings, turning_wave
-from femgear.models.planar_problem import planar_meshes
+from femgear.models.planar_problem import damping_matrix, planar_meshes
 from femgear.solvers.elements import GearMeshes
 from femgear.solvers.frequency_response import MeshErrorResponse, modal_response
 from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import NonlinearSystem, modal_damping
+from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.system import Modes
 
 
@@ -186,22 +186,9 @@ def multistage_problem(
     problem = NonlinearSystem(system, elements + turned, speed=speed)
     if damping is None:
         return problem
-    return replace(problem, system=replace(system, C=_damping(data, problem, turning, damping)))
-
-
-def _damping(data: MultistageSet, problem: NonlinearSystem, turning, damping) -> np.ndarray:
-    """``C`` as given, or of modal ratios."""
-    system, array = problem.system, np.asarray(damping, float)
-    if array.ndim < 2:
-        # standing frames with the columns of the turning ones
-        centred = replace(system, K=_standing(data, turning), gyroscopic=None)
-        return modal_damping(centred, problem.reference, damping)
-    if array.shape != system.M.shape or not np.all(np.isfinite(array)):
-        raise CaseError(
-            f"a damping matrix of shape {array.shape}", code="E-SHAPE", key="damping",
-            limit=f"{system.M.shape} finite numbers",
-        )  # fmt: skip
-    return array
+    # standing frames with the columns of the turning ones
+    centred = replace(system, K=_standing(data, turning), gyroscopic=None)
+    return replace(problem, system=replace(system, C=damping_matrix(centred, problem.reference, damping)))
 
 
 def _standing(data: MultistageSet, turning) -> np.ndarray:

@@ -30,6 +30,7 @@ from femgear.models.planar_data import (
     inertia_of_reduced,
     member_radius,
     planar_from_set,
+    torque_load,
     torque_shares,
     torsional_of_reduced,
     torsional_set,
@@ -132,13 +133,14 @@ def planar_system(
         columns.append(mesh_directions(data, -flank))
     columns += [_bearing_columns(data, name) for name in bearings]
     K = _linear_stiffness(data, bearings)
-    load = _torque_load(data, torque)
+    kept = _kept(data)
+    load = torque_load(data, torque, kept)
     gyroscopic = None
     if carrier_speed:
         K -= carrier_speed**2 * np.diag(along)
         load[9::3] += carrier_speed**2 * data.planet.mass * data.centre_distance
         gyroscopic = T.T @ _gyroscopic(along) @ T
-    names = np.array(planar_dofs(data.n_planets))[_kept(data)]
+    names = np.array(planar_dofs(data.n_planets))[kept]
     return MechanicalSystem(
         M=(T.T * M) @ T,
         C=np.zeros((T.shape[1], T.shape[1])),
@@ -242,21 +244,3 @@ def _bearing_columns(data: PlanarSet, name: str) -> np.ndarray:
         return pin_directions(data).reshape(-1, 2 * data.n_planets)
     first = 3 * CENTRAL.index(name)
     return np.eye(3 * (data.n_planets + 3))[:, first : first + 2]
-
-
-def _torque_load(data: PlanarSet, torque: PlanarTorque | None) -> np.ndarray:
-    """Forces on ``u`` of the driven member and the output."""
-    load = np.zeros(3 * (data.n_planets + 3))
-    if torque is None:
-        return load
-    if math.isinf(getattr(data, torque.member).torsional_support):
-        raise CaseError(
-            f"the torque acts on the {torque.member}, which is held", code="E-MECHANISM",
-            remedy="drive a member that can turn",
-        )  # fmt: skip
-    shares = torque_shares(data)
-    on_sun = torque.torque / member_radius(data, torque.member) / shares[torque.member]
-    for member in (torque.member, torque.output):
-        if member is not None:
-            load[3 * CENTRAL.index(member) + 2] = on_sun * shares[member]
-    return load

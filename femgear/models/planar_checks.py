@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,19 +47,25 @@ def check_set(data: PlanarSet) -> None:
             _refuse(name, f"{len(values)} values", "", f"one number, or {data.n_planets}")
         if np.any(wrong):
             _refuse(name, values[wrong][0], "N/m", allowed)
-    _check_angles(data.planet_angles)
+    check_angles(data.planet_angles, code="E-PLANAR")
 
 
-def _check_angles(angles: np.ndarray) -> None:
+def check_angles(angles: np.ndarray, *, code: str) -> None:
+    """Refuse planet angles that are none, unordered or span more than a turn."""
     allowed = "one or more, finite, ascending, within one turn"
     if not angles.size or angles.ndim != 1 or not np.all(np.isfinite(angles)):
-        _refuse("planet_angles", angles.tolist(), "rad", allowed)
+        refuse("planet_angles", angles.tolist(), "rad", allowed, code=code)
     if np.any(np.diff(angles) < 1e-9) or np.ptp(angles) > 2.0 * math.pi - 1e-9:
-        _refuse("planet_angles", angles.tolist(), "rad", allowed, remedy="give radians, in ascending order")
+        remedy = "give radians, in ascending order"
+        refuse("planet_angles", angles.tolist(), "rad", allowed, code=code, remedy=remedy)
 
 
-def _refuse(key: str, value, unit: str, limit: str, *, remedy: str | None = None):
+def refuse(key: str, value, unit: str, limit: str, *, code: str, remedy: str | None = None):
+    """Refuse an entry of a set, such as ``planet.mass``, with its value and what is allowed."""
     raise CaseError(
         f"{key.replace('_', ' ').replace('.', ': ')} of {value} {unit}".rstrip(),
-        code="E-PLANAR", key=key, value=value, limit=limit, remedy=remedy,
+        code=code, key=key, value=value, limit=limit, remedy=remedy,
     )  # fmt: skip
+
+
+_refuse = partial(refuse, code="E-PLANAR")

@@ -14,6 +14,7 @@ from femgear.models.planar_checks import check_body, check_set
 
 if TYPE_CHECKING:
     from femgear.gears import PlanetarySet
+    from femgear.models.helical_data import HelicalBody
 
 CENTRAL = ("carrier", "ring", "sun")
 
@@ -41,13 +42,13 @@ class PlanarBody:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PlanarSet:
-    """Data of the lumped set.
+class RigidSet:
+    """Rigid bodies, the geometry of their gears and the stiffness of their meshes.
 
     Parameters
     ----------
-    sun, ring, carrier : PlanarBody
-    planet : PlanarBody
+    sun, ring, carrier : PlanarBody or HelicalBody
+    planet : PlanarBody or HelicalBody
         Each of the N equal planets; it has no supports but its bearing.
     sun_radius, ring_radius, planet_radius : float
         Base radii [m].
@@ -56,28 +57,15 @@ class PlanarSet:
     planet_angles : (N,) array
         psi_n [rad], ascending within one turn, counter-clockwise from the x axis.
     pressure_angle_sun_planet, pressure_angle_planet_ring : float
-        Working pressure angles [rad].
+        Working pressure angles in the transverse section [rad].
     stiffness_sun_planet, stiffness_planet_ring : float or (N,) array
-        Mean mesh stiffnesses [N/m].
-    planet_bearing : float or (N,) array
-        Isotropic stiffness between planet and carrier [N/m]; infinite fixes the planet's axis to its pin.
-
-    Raises
-    ------
-    CaseError
-        Numbers that no set can have (E-PLANAR), planet angles that are none, unordered or span more than a
-        turn (E-PLANAR).
-
-    Notes
-    -----
-    Published data are often rounded, or mix reference and working angles: radii that do not close are
-    taken as they are, and `closure` tells by how much.
+        Mean stiffnesses of the whole meshes along the tooth normals [N/m].
     """
 
-    sun: PlanarBody
-    ring: PlanarBody
-    carrier: PlanarBody
-    planet: PlanarBody
+    sun: PlanarBody | HelicalBody
+    ring: PlanarBody | HelicalBody
+    carrier: PlanarBody | HelicalBody
+    planet: PlanarBody | HelicalBody
     sun_radius: float
     ring_radius: float
     planet_radius: float
@@ -87,23 +75,6 @@ class PlanarSet:
     pressure_angle_planet_ring: float
     stiffness_sun_planet: float | np.ndarray
     stiffness_planet_ring: float | np.ndarray
-    planet_bearing: float | np.ndarray
-
-    def __post_init__(self):
-        angles = np.atleast_1d(np.array(self.planet_angles, float))
-        per_planet = ("stiffness_sun_planet", "stiffness_planet_ring", "planet_bearing")
-        arrays = {"planet_angles": angles} | {
-            name: np.array(getattr(self, name), float) * np.ones(1) for name in per_planet
-        }
-        for name in per_planet:
-            if len(arrays[name]) == 1:
-                arrays[name] = np.full(len(angles), arrays[name][0])
-        for name, array in arrays.items():
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-        for name in (*CENTRAL, "planet"):
-            check_body(name, getattr(self, name))
-        check_set(self)
 
     @property
     def n_planets(self) -> int:
@@ -125,6 +96,46 @@ class PlanarSet:
             (self.sun_radius + self.planet_radius) / (a * math.cos(self.pressure_angle_sun_planet)) - 1.0,
             (self.ring_radius - self.planet_radius) / (a * math.cos(self.pressure_angle_planet_ring)) - 1.0,
         )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlanarSet(RigidSet):
+    """Data of the lumped set; bodies, radii, angles and mesh stiffnesses as in `RigidSet`.
+
+    Parameters
+    ----------
+    planet_bearing : float or (N,) array
+        Isotropic stiffness between planet and carrier [N/m]; infinite fixes the planet's axis to its pin.
+
+    Raises
+    ------
+    CaseError
+        Numbers that no set can have (E-PLANAR), planet angles that are none, unordered or span more than a
+        turn (E-PLANAR).
+
+    Notes
+    -----
+    Published data are often rounded, or mix reference and working angles: radii that do not close are
+    taken as they are, and `closure` tells by how much.
+    """
+
+    planet_bearing: float | np.ndarray
+
+    def __post_init__(self):
+        angles = np.atleast_1d(np.array(self.planet_angles, float))
+        per_planet = ("stiffness_sun_planet", "stiffness_planet_ring", "planet_bearing")
+        arrays = {"planet_angles": angles} | {
+            name: np.array(getattr(self, name), float) * np.ones(1) for name in per_planet
+        }
+        for name in per_planet:
+            if len(arrays[name]) == 1:
+                arrays[name] = np.full(len(angles), arrays[name][0])
+        for name, array in arrays.items():
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        for name in (*CENTRAL, "planet"):
+            check_body(name, getattr(self, name))
+        check_set(self)
 
 
 @dataclass(frozen=True)
@@ -184,23 +195,29 @@ def planar_from_set(
     sun, ring, carrier, planet, stiffness_sun_planet, stiffness_planet_ring, planet_bearing
         See `PlanarSet`.
     """
-    s = planetary_set
     return PlanarSet(
         sun=sun,
         ring=ring,
         carrier=carrier,
         planet=planet,
-        sun_radius=s.sun.base_radius,
-        ring_radius=s.ring.base_radius,
-        planet_radius=s.planet.base_radius,
-        centre_distance=s.centre_distance,
-        planet_angles=s.planet_angles,
-        pressure_angle_sun_planet=s.working_pressure_angle_sun_planet,
-        pressure_angle_planet_ring=s.working_pressure_angle_planet_ring,
         stiffness_sun_planet=stiffness_sun_planet,
         stiffness_planet_ring=stiffness_planet_ring,
         planet_bearing=planet_bearing,
+        **gear_geometry(planetary_set),
     )
+
+
+def gear_geometry(s: PlanetarySet) -> dict[str, float | np.ndarray]:
+    """Base radii, centre distance, planet angles and working pressure angles of a `RigidSet`."""
+    return {
+        "sun_radius": s.sun.base_radius,
+        "ring_radius": s.ring.base_radius,
+        "planet_radius": s.planet.base_radius,
+        "centre_distance": s.centre_distance,
+        "planet_angles": s.planet_angles,
+        "pressure_angle_sun_planet": s.working_pressure_angle_sun_planet,
+        "pressure_angle_planet_ring": s.working_pressure_angle_planet_ring,
+    }
 
 
 def torsional_set(data: PlanarSet) -> PlanarSet:
@@ -212,7 +229,7 @@ def torsional_set(data: PlanarSet) -> PlanarSet:
     return replace(data, planet_bearing=math.inf, **held)
 
 
-def torque_shares(data: PlanarSet) -> dict[str, float]:
+def torque_shares(data: RigidSet) -> dict[str, float]:
     """Forces on ``u`` of the members in static balance, that on the sun being one.
 
     Power balance over the rotations that strain no mesh, ``u_s + u_r = (cos alpha_sp + cos alpha_pr) u_c``
@@ -223,16 +240,47 @@ def torque_shares(data: PlanarSet) -> dict[str, float]:
     return {"sun": 1.0, "ring": 1.0, "carrier": -both}
 
 
-def member_radius(data: PlanarSet, member: str) -> float:
+def member_radius(data: RigidSet, member: str) -> float:
     """Radius [m] of ``u = r theta`` of the carrier, ring or sun."""
     return data.centre_distance if member == "carrier" else getattr(data, f"{member}_radius")
 
 
-def flank_sign(data: PlanarSet, torque: PlanarTorque | None) -> int:
+def flank_sign(data: RigidSet, torque: PlanarTorque | None) -> int:
     """1 where the loaded flanks are those of a sun that drives counter-clockwise, else -1."""
     if torque is None:
         return 1
     return -1 if torque.torque * torque_shares(data)[torque.member] < 0.0 else 1
+
+
+def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -> np.ndarray:
+    """Forces on ``u`` of the driven member and the output, in static balance by `torque_shares`.
+
+    Parameters
+    ----------
+    data : RigidSet
+    torque : PlanarTorque, optional
+    kept : (n,) bool array
+        Coordinates that no infinite stiffness holds; as many a body, ``u`` being the last.
+
+    Raises
+    ------
+    CaseError
+        A torque on a held member (E-MECHANISM).
+    """
+    load, kept = np.zeros(kept.size), kept.reshape(data.n_planets + 3, -1)
+    if torque is None:
+        return load
+    if not kept[CENTRAL.index(torque.member), -1]:
+        raise CaseError(
+            f"the torque acts on the {torque.member}, which is held", code="E-MECHANISM",
+            remedy="drive a member that can turn",
+        )  # fmt: skip
+    shares = torque_shares(data)
+    on_sun = torque.torque / member_radius(data, torque.member) / shares[torque.member]
+    for member in (torque.member, torque.output):
+        if member is not None:
+            load[kept.shape[1] * (CENTRAL.index(member) + 1) - 1] = on_sun * shares[member]
+    return load
 
 
 def body_masses(data: PlanarSet) -> np.ndarray:

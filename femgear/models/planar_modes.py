@@ -16,7 +16,7 @@ from femgear.models.planar import (
     pin_directions,
     planar_system,
 )
-from femgear.models.planar_data import body_masses, member_radius
+from femgear.models.planar_data import RigidSet, body_masses, member_radius
 from femgear.solvers.modal import solve_modes
 from femgear.system import Modes
 
@@ -72,7 +72,11 @@ def class_shares(data: PlanarSet, shape) -> np.ndarray:
 
     See `femgear.models.kinds.class_energies`, also for unequal spacing.
     """
-    motions = planar_motions(data, shape)
+    return energy_shares(planar_motions(data, shape))
+
+
+def energy_shares(motions: SetMotions) -> np.ndarray:
+    """`class_energies` (3, m) over the whole kinetic energy."""
     central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
     return class_energies(motions) / (central + (np.abs(motions.weighted) ** 2).sum(axis=(0, 1)))
 
@@ -91,13 +95,19 @@ def planar_motions(data: PlanarSet, shape) -> SetMotions:
     CaseError
         Shapes of another system (E-SHAPE).
     """
-    T, shape = free_motions(data), np.asarray(shape)
+    full, mass = body_motions(data, free_motions(data), shape), body_masses(data)
+    return SetMotions(full[:3], mass[:3], full[3:], mass[3:], data.planet_angles)
+
+
+def body_motions(data: RigidSet, T: np.ndarray, shape) -> np.ndarray:
+    """Mode shapes (n, m) in all coordinates (N + 3, axes, m); `T` are the free motions (E-SHAPE)."""
+    shape = np.asarray(shape)
     if shape.ndim != 2 or len(shape) != T.shape[1]:
         raise CaseError(
             f"mode shapes of shape {shape.shape}", code="E-SHAPE", limit=f"({T.shape[1]}, modes)"
         )  # fmt: skip
-    full, mass = (T @ shape).reshape(data.n_planets + 3, 3, -1), body_masses(data)
-    return SetMotions(full[:3], mass[:3], full[3:], mass[3:], data.planet_angles)
+    bodies = data.n_planets + 3
+    return (T @ shape).reshape(bodies, len(T) // bodies, -1)
 
 
 def planar_springs(data: PlanarSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:

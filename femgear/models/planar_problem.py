@@ -105,18 +105,22 @@ def planar_meshes(
         A static record without the number of its harmonics (E-HARMONICS), values for another number of
         meshes (E-SHAPE).
     """
-    columns = np.arange(2 * data.n_planets)
-    if isinstance(stiffness, MeshExcitation):
-        if harmonics is None:
-            raise CaseError(
-                "the mesh harmonics of the static record are not said", code="E-HARMONICS", key="harmonics",
-                limit="a whole number of 1 or more",
-            )  # fmt: skip
-        made = gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
-    else:
-        made = GearMeshes(columns, constant(data.mesh_stiffness) if stiffness is None else stiffness)
+    made = mesh_elements(stiffness, data.mesh_stiffness, harmonics, orders, record="static record")
     backlash = made.backlash if backlash is None else backlash
     return replace(made, backlash=backlash, separates=separates, smoothing=smoothing)
+
+
+def mesh_elements(stiffness, mean: np.ndarray, harmonics, orders, *, record: str) -> GearMeshes:
+    """Elements on the first columns of ``W``, of mean stiffness where none is given; see `planar_meshes`."""
+    columns = np.arange(len(mean))
+    if not isinstance(stiffness, MeshExcitation):
+        return GearMeshes(columns, constant(mean) if stiffness is None else stiffness)
+    if harmonics is None:
+        raise CaseError(
+            f"the mesh harmonics of the {record} are not said", code="E-HARMONICS", key="harmonics",
+            limit="a whole number of 1 or more",
+        )  # fmt: skip
+    return gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
 
 
 def planar_problem(
@@ -181,7 +185,7 @@ def planar_problem(
     system = planar_system(data, carrier_speed=carrier_speed, **options)
     steady, forces = _weight(data, gravity)
     load = system.load + steady + _pin_inertia(data, pins, carrier_speed)
-    system = replace(system, load=load, C=_damping(still, reference, damping))
+    system = replace(system, load=load, C=damping_matrix(still, reference, damping))
     return NonlinearSystem(system, elements, forces, speed=carrier_speed)
 
 
@@ -327,7 +331,7 @@ def _pin_inertia(data: PlanarSet, pins: np.ndarray, carrier_speed: float) -> np.
     return free_motions(data).T @ force.ravel()
 
 
-def _damping(still: MechanicalSystem, reference: np.ndarray, damping) -> np.ndarray:
+def damping_matrix(still: MechanicalSystem, reference: np.ndarray, damping) -> np.ndarray:
     """``C`` as given, or of modal ratios."""
     if damping is None:
         return still.C

@@ -1,13 +1,13 @@
 """Signs and sizes of separations from exact flanks, drawn where displaced and turned bodies stand."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from deviation_sets import PLAY, SET, UM
 from scipy.optimize import brentq
 
-from femgear.gears import Gear, close_set, equal_planet_angles, orientations
+from femgear.gears import orientations
 from femgear.gears.deviations import (
     Runout,
     body_separation,
@@ -16,38 +16,6 @@ from femgear.gears.deviations import (
     tooth_separation,
 )
 from femgear.gears.gear import flank_points
-
-ALPHA = math.radians(20.0)
-UM = 1e-6
-
-
-def make_set(teeth=(27, 40, 108), planets=3, *, backlash=0.0, angles=None):
-    gears = [
-        Gear(teeth[0], 1.5e-3, ALPHA, 0.0, 0.025, 9e-3, thickness_allowance=backlash / 2, name="sun"),
-        Gear(teeth[1], 1.5e-3, ALPHA, 0.0, 0.025, 15e-3, thickness_allowance=backlash / 2, name="planet"),
-        Gear(
-            teeth[2],
-            1.5e-3,
-            ALPHA,
-            0.0,
-            0.025,
-            0.1,
-            internal=True,
-            thickness_allowance=backlash / 2,
-            name="ring",
-        ),
-    ]
-    distance = 51e-3 if teeth == (27, 40, 108) else None
-    return close_set(
-        *gears,
-        planet_angles=angles or equal_planet_angles(planets),
-        centre_distance=distance,
-        find=("sun", "ring") if distance else ("ring",),
-    )
-
-
-SET = make_set()
-PLAY = make_set(backlash=60 * UM)
 
 
 def curve(gear, angle, centre, side):

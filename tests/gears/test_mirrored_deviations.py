@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from deviation_sets import ALPHA, UM, make_set
 
 from femgear.contact.mirrored import mirrored_set
 from femgear.contact.teeth import tooth_numbers
-from femgear.gears import Gear, close_set, equal_planet_angles, orientations
+from femgear.gears import orientations
 from femgear.gears.deviations import (
     FlankForm,
     Ovality,
@@ -19,34 +20,6 @@ from femgear.gears.deviations import (
 )
 from femgear.gears.mirrored_deviations import mirrored_deviations
 from femgear.gears.modifications import ProfileSlope
-
-ALPHA = math.radians(20.0)
-UM = 1e-6
-
-
-def make_set(teeth=(27, 40, 108), planets=3, *, backlash=0.0, angles=None):
-    gears = [
-        Gear(teeth[0], 1.5e-3, ALPHA, 0.0, 0.025, 9e-3, thickness_allowance=backlash / 2, name="sun"),
-        Gear(teeth[1], 1.5e-3, ALPHA, 0.0, 0.025, 15e-3, thickness_allowance=backlash / 2, name="planet"),
-        Gear(
-            teeth[2],
-            1.5e-3,
-            ALPHA,
-            0.0,
-            0.025,
-            0.1,
-            internal=True,
-            thickness_allowance=backlash / 2,
-            name="ring",
-        ),
-    ]
-    distance = 51e-3 if teeth == (27, 40, 108) else None
-    return close_set(
-        *gears,
-        planet_angles=angles or equal_planet_angles(planets),
-        centre_distance=distance,
-        find=("sun", "ring") if distance else ("ring",),
-    )
 
 
 def random_deviations(s, seed=3):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh, null_space
 from scipy.optimize import root
+from uneven_set import ANGLES, UNEVEN
 
 from femgear.errors import CaseError
 from femgear.models.helical import (
@@ -29,25 +30,12 @@ from femgear.validation.helical import kahraman_set, rigid_motions
 from femgear.validation.planar import lin_parker_set
 from femgear.validation.planetary import nrel_set
 
-ANGLES = np.array([0.3, 1.9, 4.1])
-
 
 def uneven(**changes):
-    """Unequal angles, pressure angles, stiffnesses and pins; radii close."""
-    alpha, beta = math.radians(24.0), math.radians(18.0)
-    distance, sun = 0.1, 0.04
-    planet = distance * math.cos(alpha) - sun
+    """The uneven set with unequal pins as well."""
     return kahraman_set(
-        planet_angles=ANGLES,
-        sun_radius=sun,
-        planet_radius=planet,
-        ring_radius=planet + distance * math.cos(beta),
-        centre_distance=distance,
-        pressure_angle_sun_planet=alpha,
-        pressure_angle_planet_ring=beta,
+        **UNEVEN,
         base_helix_angle=math.radians(14.0),
-        stiffness_sun_planet=[4e8, 5e8, 6e8],
-        stiffness_planet_ring=[7e8, 3e8, 5e8],
         planet_bearing=HelicalSupport(np.array([1e8, 2e8, 3e8]), 4e8, 1e5, 2e3),
         contact_points="pitch_point",
         **changes,

@@ -1,15 +1,14 @@
 """Stages in series: exact fractions, an assembly from springs in one fixed frame, single sets."""
 
-import importlib.util
 import math
 from collections import Counter
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import eigh
+from trains import closed_set, stage, two_stages
 
 from femgear.errors import CaseError
 from femgear.models.multistage import (
@@ -41,12 +40,6 @@ from femgear.models.planar_modes import planar_modes
 from femgear.models.planar_problem import planar_meshes
 from femgear.solvers.mode_energy import stiffness_of, strain_shares
 from femgear.validation.planar import lin_parker_set
-
-_SPEC = importlib.util.spec_from_file_location("trains", Path(__file__).with_name("trains.py"))
-trains = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(trains)
-closed_set, stage, two_stages = trains.closed_set, trains.stage, trains.two_stages
-
 
 # --- speeds and torques -------------------------------------------------------------------------------
 

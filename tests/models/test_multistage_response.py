@@ -1,11 +1,10 @@
 """Response of stages in series: direct solution, harmonic balance, integration, a fixed frame."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from trains import two_stages
 
 from femgear.errors import CaseError
 from femgear.models.multistage import (
@@ -34,11 +33,6 @@ from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balan
 from femgear.solvers.lines import distinct_lines, harmonic_lines
 from femgear.solvers.series import FourierSeries
 from femgear.solvers.transient import solve_transient
-
-_SPEC = importlib.util.spec_from_file_location("trains", Path(__file__).with_name("trains.py"))
-trains = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(trains)
-closed_set, stage, two_stages = trains.closed_set, trains.stage, trains.two_stages
 
 
 def test_load_bends_the_train_as_the_torques_say():

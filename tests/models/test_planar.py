@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import eig, eigh
+from uneven_set import ANGLES, UNEVEN
 
 from femgear.errors import CaseError
 from femgear.gears import torques
@@ -27,28 +28,10 @@ from femgear.solvers.modal import solve_modes
 from femgear.validation.planar import lin_parker_set
 from femgear.validation.planetary import nrel_set
 
-ANGLES = np.array([0.3, 1.9, 4.1])
-
 
 def uneven(**changes):
-    """Unequal angles, unequal pressure angles and stiffnesses that differ from mesh to mesh; radii close."""
-    alpha, beta = math.radians(24.0), math.radians(18.0)
-    distance, sun = 0.1, 0.04
-    planet = distance * math.cos(alpha) - sun
-    data = replace(
-        lin_parker_set(3),
-        planet_angles=ANGLES,
-        sun_radius=sun,
-        planet_radius=planet,
-        ring_radius=planet + distance * math.cos(beta),
-        centre_distance=distance,
-        pressure_angle_sun_planet=alpha,
-        pressure_angle_planet_ring=beta,
-        stiffness_sun_planet=[4e8, 5e8, 6e8],
-        stiffness_planet_ring=[7e8, 3e8, 5e8],
-        planet_bearing=[1e8, 2e8, 3e8],
-    )
-    return replace(data, **changes)
+    """The uneven set with unequal pins as well."""
+    return replace(lin_parker_set(3), **UNEVEN | {"planet_bearing": [1e8, 2e8, 3e8]} | changes)
 
 
 def belt(one, two, turn, radii, *, crossed, branch):
