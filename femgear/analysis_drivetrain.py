@@ -16,6 +16,8 @@ from femgear.models.drivetrain_case import (
     TORSIONAL,
     case_model,
     check_drivetrain,
+    record_every,
+    record_rate,
     torque_histories,
 )
 from femgear.threads import one_blas_thread
@@ -116,41 +118,41 @@ def solve_transient_run(case: DrivetrainCase, *, progress: Progress | None = Non
     Raises
     ------
     ConvergenceError
-        The motion grew beyond all numbers (E-DIVERGED).
+        The motion outgrows the numbers (E-DIVERGED).
     """
-    from femgear.models.drivetrain_march import march_drivetrain
-
     check_drivetrain(case)
-    s = case.simulation
-    variants = (BENDING, TORSIONAL) if s.torsional else (BENDING,)
+    variants = (BENDING, TORSIONAL) if case.simulation.torsional else (BENDING,)
     models, runs, torques = {}, {}, ()
     for done, variant in enumerate(variants):
         model = models[variant] = case_model(case, variant)
         torques = torque_histories(case, model.ratio)
-        with np.errstate(over="ignore", invalid="ignore"):
-            run = march_drivetrain(
-                model,
-                torques,
-                duration=s.duration,
-                step=1.0 / s.rate,
-                speed=case.operation.speed,
-                start=s.start,
-                outputs=[f"{body.name}: rotation" for body in model.train.bodies],
-                every=case.every,
-                lowpass=True,
-            )
-        if not (np.isfinite(run.force).all() and np.isfinite(run.motion).all()):
-            raise ConvergenceError(
-                f"the motion {variant} grows without end: a parametric resonance",
-                code="E-DIVERGED",
-                key="simulation.damping_ratio",
-                value=s.damping_ratio,
-                remedy="give more damping, or another speed",
-            )
-        runs[variant] = run
+        runs[variant] = _run(case, variant, model, torques)
         if progress is not None:
             progress("transient", done + 1, len(variants))
     return TransientResult(models, runs, torques)
+
+
+def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
+    from femgear.models.drivetrain_march import march_drivetrain
+
+    s = case.simulation
+    try:
+        return march_drivetrain(
+            model,
+            torques,
+            duration=s.duration,
+            step=1.0 / s.rate,
+            speed=case.operation.speed,
+            start=s.start,
+            outputs=[f"{body.name}: rotation" for body in model.train.bodies],
+            every=record_every(case, model),
+            lowpass=True,
+            contact_loss=s.contact_loss,
+        )
+    except ConvergenceError as error:
+        if error.code == "E-DIVERGED":
+            error.key, error.message = "simulation.damping_ratio", f"{variant}: {error.message}"
+        raise
 
 
 def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> SpectrumResult:
@@ -165,7 +167,8 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
     from femgear.models.drivetrain_spectra import averaged_spectrum, order_spectrum
 
     first, settle = next(iter(transient.runs.values())), settle_time(case)
-    late, step = first.time >= settle, 1.0 / case.record_rate
+    rate = record_rate(case, transient.models[BENDING])
+    late, step = first.time >= settle, 1.0 / rate
     span = float(np.ptp(first.time[late]))
     resolution = case.simulation.resolution or max(0.1, 4.0 / span)
     speed = float(first.spin_speed[late].mean())
@@ -178,18 +181,16 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
             remedy="give torques that keep it turning, or write --only transient",
         )  # fmt: skip
     lines = mesh_lines(transient.models[BENDING])
-    per_turn = int(np.ceil(2.0 * np.pi * case.record_rate / slowest))
+    per_turn = int(np.ceil(2.0 * np.pi * rate / slowest))
     distance = 1.0 / (0.99 * turns)
     spectra, tracked, amplitudes = {}, {}, {}
     for variant, run in transient.runs.items():
         force, angle = run.force[late], run.spin[late]
         spectra[variant] = averaged_spectrum(force, step, resolution=resolution)
         found = order_spectrum(force, angle, resolution=distance, per_turn=per_turn)
-        kept = found.frequency <= _ORDERS * case.record_rate * 2.0 * np.pi / run.spin_speed[late].max()
+        kept = found.frequency <= _ORDERS * rate * 2.0 * np.pi / run.spin_speed[late].max()
         tracked[variant] = replace(
             found, frequency=found.frequency[kept], amplitude=found.amplitude[..., kept]
         )
-        amplitudes[variant] = line_amplitudes(
-            force, angle, run.spin_speed[late], lines, record_rate=case.record_rate
-        )
+        amplitudes[variant] = line_amplitudes(force, angle, run.spin_speed[late], lines, record_rate=rate)
     return SpectrumResult(transient, settle, speed, spectra, tracked, lines, amplitudes, distance)

@@ -20,6 +20,7 @@ from femgear.casefile.cross_checks import cross_check
 from femgear.casefile.deviations import CarrierErrors, GearErrors
 from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.casefile.given import added_material, in_terms_of_the_case, notices
+from femgear.casefile.origin import text_with_points
 from femgear.casefile.problems import combine, translate
 from femgear.casefile.profiles import embed_profiles
 from femgear.casefile.published import without_uncomputed
@@ -352,16 +353,7 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     lines = text if numbered else ""
     files = embed_profiles(data, name)
     if files:
-        text = tomlfile.write(data)
-        if len(text.encode()) > tomlfile.MAX_BYTES:
-            raise CaseError(
-                "the case is too long with the points of its measured profiles",
-                code="E-FILE",
-                value=f"{len(text.encode())} bytes",
-                limit=f"{tomlfile.MAX_BYTES} bytes",
-                remedy="measure at fewer points",
-                file=name or None,
-            )
+        text = text_with_points(data, name, points="measured profiles", remedy="measure at fewer points")
     try:
         case = Case.model_validate(data)
     except ValidationError as error:

@@ -6,10 +6,11 @@ import difflib
 
 from pydantic import ValidationError
 
-from femgear.casefile import tomlfile
 from femgear.casefile.drivetrain import MODEL, DrivetrainCase
-from femgear.casefile.drivetrain_checks import cross_check, notices
+from femgear.casefile.drivetrain_checks import cross_check
+from femgear.casefile.drivetrain_notices import notices
 from femgear.casefile.fields import described
+from femgear.casefile.origin import text_with_points
 from femgear.casefile.problems import combine, translate
 from femgear.casefile.torque_series import embed_torques
 from femgear.errors import CaseError
@@ -37,16 +38,7 @@ def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True)
         raise combine([_unknown_model(data.get("model"))], lines, name)
     files = embed_torques(data, name)
     if files:
-        text = tomlfile.write(data)
-        if len(text.encode()) > tomlfile.MAX_BYTES:
-            raise CaseError(
-                "the case is too long with the points of its torque series",
-                code="E-FILE",
-                value=f"{len(text.encode())} bytes",
-                limit=f"{tomlfile.MAX_BYTES} bytes",
-                remedy="give the series at fewer points",
-                file=name or None,
-            )
+        text = text_with_points(data, name, points="torque series", remedy="give them at fewer points")
     try:
         case = DrivetrainCase.model_validate(data)
     except ValidationError as error:

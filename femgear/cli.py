@@ -105,6 +105,12 @@ def _given(error: CycloptsError) -> list[str]:
     return ["--output" if token == "-o" else token for token in error.root_input_tokens or ()]
 
 
+def _warn(sentences) -> None:
+    """Print what deserves a look on standard error, as `show_warning` does."""
+    for text in sentences:
+        print(f"warning: {text}", file=sys.stderr)
+
+
 def show_warning(message, category, filename, lineno, file=None, line=None) -> None:
     """Print a warning as one line on standard error; takes the place of `warnings.showwarning`."""
     text = message if category is UserWarning else f"{message} ({category.__name__}, {filename}:{lineno})"
@@ -161,13 +167,16 @@ def run(
     from femgear.run_stages import check_case
     from femgear.storage import open_results, run_folder
     from femgear.summary import describe_results
+    from femgear.summary_warnings import case_warnings, result_warnings
 
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
+    _warn(case_warnings(data))
     with run_folder(output, force=force) as folder, _Progress() as progress:
         run_case(data, folder, only=only, pictures=pictures, progress=progress)
     results = open_results(output)
     _print(describe_results(results))
+    _warn(result_warnings(results))
     print(f"results: {output}")
     if "report.html" in results.manifest.files:
         print(f"report:  {output / 'report.html'}")

@@ -6,28 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.datasets import RPM, dataset
+
 if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.analysis_drivetrain import DrivetrainModesResult, SpectrumResult, TransientResult
 
-RPM = np.pi / 30.0
 # Share of rotations in the kinetic energy above which a mode is torsional; bending below what is left.
 _TORSION = 0.9
-
-
-def _variable(dims, values, units, long_name):
-    return dims, np.asarray(values), {"units": units, "long_name": long_name}
-
-
-def _dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
-    import xarray as xr
-
-    return xr.Dataset(
-        {name: _variable(*entry) for name, entry in variables.items()},
-        coords={name: _variable(*entry) for name, entry in coords.items()},
-        attrs=attrs,
-    )
 
 
 def _names(name: str, values, long_name: str) -> tuple:
@@ -76,7 +63,7 @@ def drivetrain_modes_dataset(result: DrivetrainModesResult) -> xr.Dataset:
         "campbell_speed": (("campbell_speed",), found.speed / RPM, "rpm", "speed of the first body"),
     }
     attrs = {"title": "modes of the drivetrain, mean mesh stiffness", "unknowns": len(modes.shape)}
-    return _dataset(variables, coords, attrs)
+    return dataset(variables, coords, attrs)
 
 
 def _energies(model, shape):
@@ -109,6 +96,7 @@ def transient_dataset(result: TransientResult) -> xr.Dataset:
     for history in result.torques:
         torque[:, bodies.index(history.body)] += history.at(first.time)
     speed = [run.spin_speed[:, None] * ratio + run.velocity for run in runs]
+    negative = "on the back flank" if first.contact_loss else "where the linear mesh pulls"
     books = {
         "energy_error": ([run.ledger.error for run in runs], "error of the energy balance, relative"),
         "momentum_error": ([run.momentum for run in runs], "error of the angular momentum, relative"),
@@ -124,7 +112,7 @@ def transient_dataset(result: TransientResult) -> xr.Dataset:
         ),
         "mesh_force": (
             ("variant", "time", "mesh"), [run.force for run in runs], "N",
-            "mesh force along the line of action; negative where the linear mesh pulls",
+            f"mesh force along the line of action; negative {negative}",
         ),
         "least_force": (
             ("variant", "mesh"), [run.extremes[0] for run in runs], "N", "least mesh force at any step",
@@ -134,6 +122,13 @@ def transient_dataset(result: TransientResult) -> xr.Dataset:
         ),
         "pulling": (
             ("variant", "mesh"), [run.pulling for run in runs], "1", "share of steps with a negative force",
+        ),
+        "lost": (
+            ("variant", "mesh"), [run.lost for run in runs], "1", "share of steps in which no flank touches",
+        ),
+        "growth": (
+            ("variant",), [run.growth for run in runs], "1/s",
+            "mean rate of the logarithm of the free motion: above zero it grows",
         ),
         "torque": (("time", "body"), torque, "N m", "external torque"),
         "ratio": (("body",), ratio, "1", "speed over that of the first body"),
@@ -151,9 +146,10 @@ def transient_dataset(result: TransientResult) -> xr.Dataset:
         "step": first.step,
         "steps": first.steps,
         "every": every,
+        "contact": "separating" if first.contact_loss else "linear",
         "filter": "linear-phase low pass, 0.8 to 1.0 of half the record rate, 80 dB" if every > 1 else "none",
     }
-    return _dataset(variables, coords, attrs)
+    return dataset(variables, coords, attrs)
 
 
 def spectrum_dataset(result: SpectrumResult) -> xr.Dataset:
@@ -213,4 +209,4 @@ def spectrum_dataset(result: SpectrumResult) -> xr.Dataset:
         "speed": result.speed,
         "planetary_stages": len(model.train.planetary),
     }
-    return _dataset(variables, coords, attrs)
+    return dataset(variables, coords, attrs)

@@ -44,7 +44,7 @@ def write_drivetrain_pictures(
     if "transient" in data:
         figures |= plots.transient_figures(data["transient"])
     if "spectrum" in data:
-        figures |= plots.spectrum_figures(data["spectrum"])
+        figures |= plots.spectrum_figures(data["spectrum"], data.get("transient"))
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
     if progress is not None:
@@ -53,21 +53,23 @@ def write_drivetrain_pictures(
 
 
 def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
-    """The lowest elastic modes as PNG files; returns their names."""
-    from femgear.models.drivetrain_layout import drivetrain_layout, layout_motion
-    from femgear.scene.drivetrain import drivetrain_picture
+    """The lowest elastic modes as PNG files; returns their names.
+
+    Modes have the numbers of the table: the free spin, which is not drawn, is the first.
+    """
+    from femgear.models.drivetrain_layout import drivetrain_layout, layout_motion, shaft_lines
+    from femgear.scene.drivetrain import ModeView, drivetrain_pictures
 
     layout = drivetrain_layout(model.train)
     wheels = [(w.centre, w.radius, w.width, w.body) for w in layout.wheels]
-    elastic = np.flatnonzero(modes["kind"].values.astype(str) != "rigid")[:count]
-    names = []
-    for number, mode in enumerate(elastic, 1):
-        move, turn = layout_motion(model, layout, modes["shape"].values[:, mode])
-        name = f"drivetrain_mode_{number}.png"
-        hertz, kind = float(modes["frequency"][mode]), str(modes["kind"].values[mode])
-        drivetrain_picture(
-            folder / name, wheels=wheels, centres=layout.centre, shafts=layout.shafts, move=move, turn=turn,
-            names=layout.names, title=f"mode {number}: {hertz:.2f} Hz, {kind}",
-        )  # fmt: skip
-        names.append(name)
+    kinds, hertz = modes["kind"].values.astype(str), modes["frequency"].values
+    names, views = [], []
+    for mode in np.flatnonzero(kinds != "rigid")[:count].tolist():
+        shape = modes["shape"].values[:, mode]
+        title = f"mode {mode + 1}: {hertz[mode]:.2f} Hz, {kinds[mode]}"
+        names.append(f"drivetrain_mode_{mode + 1}.png")
+        moved = layout_motion(model, layout, shape)
+        views.append(ModeView(folder / names[-1], title, *moved, shaft_lines(model, layout, shape)))
+    if views:
+        drivetrain_pictures(views, wheels=wheels, centres=layout.centre, names=layout.names)
     return names

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -15,8 +14,8 @@ from femgear.files import checksum, storage_errors, write_text
 from femgear.report_captions import SECTIONS, caption_of, comparisons
 from femgear.storage import Results, open_results
 from femgear.summary import Block, describe, describe_results
-from femgear.summary_drivetrain import transient_warnings
-from femgear.summary_planar import planar_verdicts, published_modes
+from femgear.summary_planar import published_modes
+from femgear.summary_warnings import case_warnings, result_warnings
 
 _LARGEST_PICTURE = 8_000_000  # bytes
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
@@ -86,8 +85,7 @@ def page(results: Results) -> str:
     case = results.case
     pictures, skipped = _pictures(results)
     title, *geometry = describe(case)
-    warnings = [note for block in geometry if block.title == "Warnings" for note in block.notes]
-    warnings = [text for text in warnings if text != "none"] + list(_verdicts(results)) + skipped
+    warnings = [*case_warnings(case), *result_warnings(results), *skipped]
     numbers = {block.title: block for block in describe_results(results)}
     head = "".join(
         (
@@ -130,28 +128,6 @@ def _warnings(warnings) -> str:
     if not warnings:
         return ""
     return '<ul class="warnings">\n' + "".join(f"<li>{escape(text)}</li>\n" for text in warnings) + "</ul>\n"
-
-
-def _verdicts(results: Results) -> Iterator[str]:
-    """What the solvers say against their own results."""
-    branch, response = (
-        getattr(results, stage) if stage in results.stages else None for stage in ("branch", "response")
-    )
-    yield from planar_verdicts(branch, response)
-    if "transient" in results.stages:
-        yield from transient_warnings(results.transient)
-    if "dynamics" not in results.stages:
-        return
-    data = results.dynamics
-    speed = data["speed"].values
-    for bad, text in (
-        (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),
-        (~data["stable"].values.astype(bool), "the periodic solution is unstable at"),
-    ):
-        if bad.any():
-            shown = ", ".join(f"{value:.6g}" for value in speed[bad][:8])
-            more = f" and {np.count_nonzero(bad) - 8} more speeds" if np.count_nonzero(bad) > 8 else ""
-            yield f"{text} {shown} rpm{more}"
 
 
 def _section(name: str, numbers, pictures, results: Results) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from femgear.case import Case
+    from femgear.casefile.drivetrain import DrivetrainCase
 
 # stem of a file, its section, its caption; {} stands for what follows the stem
 CAPTIONS = (
@@ -180,37 +181,44 @@ CAPTIONS = (
     (
         "drivetrain_mode",
         "Modes",
-        "Mode shape of the drivetrain ({}), magnified; at rest in grey. The rays show how far each wheel "
-        "turns. The drawing is a scheme: bodies without gears have a radius that is not theirs.",
+        "Mode shape of the drivetrain ({}), by the number in the table, where the free spin is the first; "
+        "magnified, at rest in grey. The rays show how far each wheel turns. Shafts of elements are drawn "
+        "through their stations, others as two links with a joint. The drawing is a scheme: bodies without "
+        "gears have a radius that is not theirs.",
     ),
     (
         "transient_speeds",
         "Transient",
-        "Speed of the first and of the last body.",
+        "Speed of the first and of the last body, low-passed to the rate of the records. Where the records "
+        "are denser than the pixels, the band of their values is drawn.",
     ),
     (
         "transient_deviations",
         "Transient",
         "Rotation of the bodies less that of the free spin, which is the motion of the rigid chain under the "
-        "same torques.",
+        "same torques; low-passed to the rate of the records. Bands: least to largest record.",
     ),
     (
         "transient_forces",
         "Transient",
-        "Mesh forces along the lines of action, low-passed to the rate of the records. Negative: the mesh "
-        "is linear and pulls; real teeth would part.",
+        "Mesh forces along the lines of action, low-passed to the rate of the records: peaks that are "
+        "shorter are higher than here, the least and the largest force of all steps stand in the table. "
+        "Bands: least to largest record.",
     ),
     (
         "mesh_force_spectrum",
         "Spectrum",
         "Amplitude spectra of mesh forces after the start: segments under Hann's window that overlap by "
-        "half, root of the mean square, peak values. Dotted: mesh frequencies at the mean speed.",
+        "half, root of the mean square, peak values. Dotted: mesh frequencies and their second and third "
+        "harmonics at the mean speed. Where the speed changes, which the title tells, lines smear over "
+        "frequency; over orders they do not.",
     ),
     (
         "side_bands",
         "Spectrum",
-        "Mesh force around a mesh line over orders of the first body, in one segment ({}). Dotted: "
-        "distances of the carrier's turn, or of the mesh line of the planetary stage.",
+        "Mesh force around a mesh line over orders of the first body, in one segment ({}); a change of the "
+        "speed does not smear them. Dotted: distances of the carrier's turn, or of the mesh line of the "
+        "planetary stage.",
     ),
     (
         "weight_response",
@@ -302,9 +310,11 @@ _OF_RESPONSE = (
 _OF_SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "tooth_loads")
 
 
-def comparisons(case: Case, stem: str) -> Iterator[str]:
+def comparisons(case: Case | DrivetrainCase, stem: str) -> Iterator[str]:
     """What the case file adds to a caption: how to read the picture of this case, and published ones."""
     planar = case.planar
+    if stem == "transient_forces":
+        yield _contact(case)
     if case.helical is not None and stem in _OF_SPUR_TEETH:
         yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
     if planar is not None and stem in _BY_STABILITY and planar.branch is not None:
@@ -318,3 +328,10 @@ def comparisons(case: Case, stem: str) -> Iterator[str]:
     for entry in case.planar.published if case.planar is not None else ():
         if entry.figure is not None and (stem == entry.figure or stem.startswith(f"{entry.figure}_")):
             yield f"Beside {entry.source}: {entry.comparison}"
+
+
+def _contact(case: DrivetrainCase) -> str:
+    """What a force without its usual sign means."""
+    if case.simulation.contact_loss:
+        return "Zero: the teeth are apart; negative: their back flanks touch."
+    return "Negative: the mesh is linear and pulls; real teeth would part."

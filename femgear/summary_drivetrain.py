@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.models.drivetrain_rates import GOOD_STEPS, highest_mesh
 from femgear.models.drivetrain_record import PASS_BAND
 from femgear.summary_block import Block
 
@@ -16,13 +17,18 @@ if TYPE_CHECKING:
 
     from femgear.casefile.drivetrain import DrivetrainCase
     from femgear.models.drivetrain import DrivetrainModel
+    from femgear.models.drivetrain_rates import SpeedRange
 
 RPM = math.pi / 30
 _SHOWN = 16
-# Average acceleration lowers a frequency by (2 pi / steps)^2 / 12: 0.4 %, and 1.5 % at the second harmonic.
-_STEPS = 30
-# The step rule keeps the energy exactly: more is rounding that grew, or a motion that runs away.
+# A speed that changes by more is worth a remark.
+_CHANGE = 2.0
+# The step rule keeps energy and momentum exactly: more is rounding that grew, or a motion that runs away.
 _BALANCE = 1e-6
+# Linear meshes: a free motion that grows by more than this over a run is no longer small.
+_GROWN = 10.0
+# A force that is rounding [N].
+_NOTHING = 1e-6
 
 
 def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
@@ -42,26 +48,59 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
         _shafts(model),
         _stages(case, model),
         _operation(case, model),
-        Block("Warnings", notes=(*case.notices, *_rates(case, model)) or ("none",)),
+        Block("Warnings", notes=drivetrain_warnings(case, model) or ("none",)),
     )
 
 
-def _rates(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
-    """Steps and records that are too slow for the highest mesh frequency."""
-    bases = np.unique(model.mesh_base)
-    hertz = model.frequencies(case.operation.speed)[bases] / (2.0 * np.pi)
-    if not len(hertz):
+def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = None) -> tuple[str, ...]:
+    """What is allowed but deserves a look, in sentences; the model is made where it is not given.
+
+    Raises
+    ------
+    CaseError
+        As `femgear.models.drivetrain_case.check_drivetrain`, without a model.
+    """
+    from femgear.models.drivetrain_case import case_speeds, check_drivetrain
+
+    model = model or check_drivetrain(case)
+    speeds = case_speeds(case, model)
+    return (*case.notices, *_runaway(case, speeds), *_rates(case, model, speeds))
+
+
+def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
+    """Torques that change the speed more than a run is meant for."""
+    first = speeds.first
+    if speeds.highest <= _CHANGE * first and speeds.lowest >= first / _CHANGE:
         return
-    name, top = model.bases[bases[np.argmax(hertz)]], float(hertz.max())
-    if case.simulation.rate < _STEPS * top:
+    rpm = [f"{value / RPM:.6g}" for value in (first, speeds.last, speeds.lowest, speeds.highest)]
+    between = (
+        "" if speeds.last in (speeds.lowest, speeds.highest) else f" ({rpm[2]} to {rpm[3]} rpm on the way)"
+    )
+    turns = " and turn it back" if speeds.lowest < 0.0 else ""
+    yield (
+        f"[W-SPEED] operation.torque: the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
+        f"{case.simulation.duration:g} s{between}{turns}; share = 1.0 on another body balances them"
+    )
+
+
+def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[str]:
+    """Steps and records that are too slow for the highest mesh frequency, at the fastest speed."""
+    from femgear.models.drivetrain_case import record_rate
+
+    name, top = highest_mesh(model, speeds.fastest)
+    rate, record = case.simulation.rate, record_rate(case, model)
+    where = f"{top:.4g} Hz"
+    if speeds.fastest > 1.01 * speeds.first:
+        where += f" at {speeds.fastest / RPM:.6g} rpm, the fastest"
+    if rate < GOOD_STEPS * top:
         yield (
-            f"[W-RATE] simulation.rate: {case.simulation.rate / top:.3g} steps a period of the {name} "
-            f"({top:.4g} Hz) shift and damp it; take {_STEPS} or more"
+            f"[W-RATE] simulation.rate: {rate / top:.3g} steps a period of the {name} ({where}) shift and "
+            f"damp it; take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz"
         )
-    if 0.5 * PASS_BAND * case.record_rate < top:
+    if 0.5 * PASS_BAND * record < top:
         yield (
-            f"[W-RECORD] simulation.record: records of {case.record_rate:g} Hz end at "
-            f"{0.5 * PASS_BAND * case.record_rate:g} Hz, below the {name} ({top:.4g} Hz)"
+            f"[W-RECORD] simulation.record: records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, "
+            f"below the {name} ({where})"
         )
 
 
@@ -75,7 +114,7 @@ def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
                 f"{body.inertia:.6g}",
                 f"{body.mass:.6g}",
                 f"{body.transverse_inertia:.6g}" if body.tilts else "-",
-                f"{sum(one.radial for one in held):.3g}" if held else "-",
+                _spring(sum(one.radial for one in held), 3) if held else "-",
                 f"{model.ratio[body.name]:.6g}",
                 f"{model.ratio[body.name] * case.operation.speed / RPM:.4f}",
             )
@@ -95,10 +134,14 @@ def _shafts(model: DrivetrainModel) -> Block:
     for one in model.train.shafts:
         s = one.springs
         kind = f"beam, {one.elements} elements" if one.elements else "joint"
-        values = (f"{value:.4g}" for value in (s.bending, s.torsion, s.shear))
+        values = (_spring(value, 4) for value in (s.bending, s.torsion, s.shear))
         rows.append((f"{one.first} - {one.second}", f"{one.length:.4g}", *values, kind))
     header = ("", "length [m]", "bending [N m/rad]", "torsion [N m/rad]", "shear [N/m]", "model")
     return Block("Shafts", header, tuple(rows))
+
+
+def _spring(stiffness: float, digits: int) -> str:
+    return "rigid" if math.isinf(stiffness) else f"{stiffness:.{digits}g}"
 
 
 def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
@@ -128,7 +171,7 @@ def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
 
 
 def _operation(case: DrivetrainCase, model: DrivetrainModel) -> Block:
-    from femgear.models.drivetrain_case import torque_histories
+    from femgear.models.drivetrain_case import case_speeds, record_rate, torque_histories
 
     rows, drive = [], 0.0
     for one in torque_histories(case, model.ratio):
@@ -137,10 +180,13 @@ def _operation(case: DrivetrainCase, model: DrivetrainModel) -> Block:
         rows.append((one.body, text))
         drive += float(one.values[0]) * model.ratio[one.body]
     s = case.simulation
+    contact = "meshes part" if s.contact_loss else "meshes keep contact"
+    change, last = drive / model.inertia / RPM, case_speeds(case, model).last / RPM
     notes = (
-        f"first body {case.operation.speed / RPM:.6g} rpm; at the start the torques change its speed by "
-        f"{round(drive / model.inertia / RPM, 6) + 0.0:.4g} rpm a second",
-        f"{s.duration:g} s at {s.rate:g} steps a second, {case.record_rate:g} records a second",
+        f"first body {case.operation.speed / RPM:.6g} rpm at the start, where the torques change it by "
+        f"{round(change, 6) + 0.0:.4g} rpm a second; {last:.6g} rpm at the end",
+        f"{s.duration:g} s at {s.rate:g} steps a second, {record_rate(case, model):g} records a second; "
+        f"{contact}",
     )
     return Block("Operation", ("torque on", "[N m]"), tuple(rows), notes)
 
@@ -169,36 +215,78 @@ def describe_transient(data: xr.Dataset) -> Block:
     """Table of transient.nc: mesh forces, speeds, balances."""
     rows, mean = [], data["mesh_force"].values.mean(axis=1)
     least, largest, pulling = (data[name].values for name in ("least_force", "largest_force", "pulling"))
+    parts = _parts(data)
     for v, variant in enumerate(data["variant"].values):
         for m, mesh in enumerate(data["mesh"].values):
-            forces = (f"{1e-3 * values[v, m]:.4f}" for values in (mean, least, largest))
-            rows.append((str(variant), str(mesh), *forces, f"{100.0 * pulling[v, m]:.2f}"))
-    header = ("model", "mesh", "mean [kN]", "least [kN]", "largest [kN]", "pulling [% of time]")
+            forces = [f"{1e-3 * values[v, m]:.4f}" for values in (mean, least, largest)]
+            shares = [f"{100.0 * pulling[v, m]:.2f}"]
+            if parts:
+                shares.insert(0, f"{100.0 * float(data['lost'][v, m]):.2f}")
+            rows.append((str(variant), str(mesh), *forces, *shares))
+    shares = ("no contact [% of time]", "back flank [% of time]") if parts else ("pulling [% of time]",)
+    header = ("model", "mesh", "mean [kN]", "least [kN]", "largest [kN]", *shares)
     speed, body = data["speed"].values[0], str(data["body"].values[0])
     notes = [
         f"{data.attrs['steps']} steps, at any of which least and largest force may be; {body} from "
         f"{speed[0, 0] / RPM:.4f} to {speed[-1, 0] / RPM:.4f} rpm",
         f"energy balance {float(data['energy_error'].max()):.1e}, angular momentum "
         f"{float(data['momentum_error'].max()):.1e}",
+        *_growth_notes(data),
     ]
-    if pulling.any():
+    if pulling.any() and not parts:
         notes.append("these meshes are linear and keep contact: where they pull, real teeth part")
     return Block("Transient", header, tuple(rows), tuple(notes))
+
+
+def _parts(data: xr.Dataset) -> bool:
+    """Whether the meshes of transient.nc lose contact."""
+    return data.attrs.get("contact", "linear") == "separating"
+
+
+def _growths(data: xr.Dataset) -> Iterator[tuple[str, float]]:
+    """Variants and the rates of their free motions [1/s]; results of earlier runs have none."""
+    if "growth" in data:
+        yield from zip(map(str, data["variant"].values), map(float, data["growth"].values))
+
+
+def _growth_notes(data: xr.Dataset) -> Iterator[str]:
+    for variant, rate in _growths(data):
+        if not math.isfinite(rate):
+            continue
+        if _parts(data):
+            words = "move apart: the motion is chaotic or unstable" if rate > 0.0 else "draw together"
+            yield f"{variant}: neighbouring motions {words} (Lyapunov exponent {rate:.4g} 1/s)"
+        else:
+            yield f"{variant}: the free motion {'grows' if rate > 0.0 else 'decays'} with {abs(rate):.4g} 1/s"
 
 
 def transient_warnings(data: xr.Dataset) -> Iterator[str]:
     """What transient.nc says against itself."""
     pulling, least = data["pulling"].values, data["least_force"].values
     for v, variant in enumerate(data["variant"].values):
-        if pulling[v].any():
+        if pulling[v].any() and least[v].min() < -_NOTHING and not _parts(data):
             worst, lowest = int(np.argmax(pulling[v])), int(np.argmin(least[v]))
             yield (
-                f"{variant}: {data['mesh'].values[worst]} pulls for {pulling[v, worst]:.2%} of the time, "
-                f"{data['mesh'].values[lowest]} with up to {-1e-3 * least[v, lowest]:.4g} kN: real teeth "
-                "would part"
+                f"[W-PULL] {variant}: {data['mesh'].values[worst]} pulls for {pulling[v, worst]:.2%} of the "
+                f"time, {data['mesh'].values[lowest]} with up to {-1e-3 * least[v, lowest]:.4g} kN: real "
+                "teeth would part (simulation.contact_loss)"
             )
-    if (error := float(data["energy_error"].max())) > _BALANCE:
-        yield f"the energy balance misses {error:.1e} of its largest term"
+    yield from _growth_warnings(data)
+    for name, words in (("energy_error", "energy"), ("momentum_error", "angular momentum")):
+        if not (error := float(data[name].max())) <= _BALANCE:
+            yield f"[W-BALANCE] the balance of {words} misses {error:.1e} of its largest term"
+
+
+def _growth_warnings(data: xr.Dataset) -> Iterator[str]:
+    duration = float(data.attrs["steps"]) * float(data.attrs["step"])
+    for variant, rate in () if _parts(data) else _growths(data):
+        if rate * duration > math.log(_GROWN):
+            power = rate * duration / math.log(10.0)
+            times = f"{10.0**power:.3g}" if power < 300.0 else f"1e{power:.0f}"
+            yield (
+                f"[W-GROWTH] {variant}: the free motion grows with {rate:.4g} 1/s, {times} times over the "
+                "run: a parametric resonance; give more damping or another speed, or contact_loss = true"
+            )
 
 
 def describe_spectrum(data: xr.Dataset) -> Block:

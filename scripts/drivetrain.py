@@ -63,17 +63,17 @@ def main(
     if modes is not None:
         data = with_value(data, "simulation.modes", modes)
     data = with_value(data, "simulation.torsional", torsional)
-    balance = with_balance(data)
-    data = balance if balanced else data
+    data = with_balance(data) if balanced else data
     blocks = describe_drivetrain(data)  # refuse before the folder is touched
-    folder, figures = ready_folder(output), {}
+    folder, figures, apart = ready_folder(output), {}, ""
     with Progress() as progress:
         found = {"modes": solve_drivetrain_modes(data)}
         found["transient"] = solve_transient_run(data, progress=progress)
         found["spectrum"] = solve_spectrum(data, found["transient"])
         sets = {name: stage.dataset() for name, stage in found.items()}
         names = write_drivetrain_pictures(folder, data, sets, progress=progress)
-        figures["backlash"] = backlash_figure(balance, found["modes"].model)
+        if found["modes"].model.meshes:
+            figures["backlash"], apart = backlash_figure(data, found["modes"].model)
         if sensitivity and _is_paper(data, paper):
             figures["sensitivity"] = sensitivity_figure(progress)
     for name, figure in figures.items():
@@ -85,6 +85,8 @@ def main(
         print_table(block.title, block.header, block.rows)
         for note in block.notes:
             print(f"  {note}")
+    if apart:
+        print(f"contact loss: {apart}")
     if _is_paper(data, paper):
         _kinematics()
     _write_forces(folder, sets["transient"])

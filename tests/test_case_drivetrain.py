@@ -9,9 +9,13 @@ import pytest
 from femgear.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value
 from femgear.casefile import tomlfile
 from femgear.casefile.drivetrain import DrivetrainCase
-from femgear.casefile.torque_series import read_torques
 from femgear.errors import CaseError
-from femgear.models.drivetrain_case import case_model, check_drivetrain, drivetrain_of, torque_histories
+from femgear.models.drivetrain_case import (
+    case_model,
+    check_drivetrain,
+    drivetrain_of,
+    torque_histories,
+)
 from femgear.models.wind_turbine_drivetrain import paper_torques, ratio_of_radii, wind_turbine_drivetrain
 from femgear.summary import describe
 
@@ -123,6 +127,10 @@ def refused(case, **changes):
         ("bearing[0].body", None, "E-CHOICE", "bearing[0].shaft"),
         ("bearing[0].station", 1, "E-CHOICE", "bearing[0].body"),
         ("bearing[0].radial", "rigit", "E-UNIT", "bearing[0].radial"),
+        # a spring against the rotation of a chain that turns
+        ("bearing[0].torsion", "1e3 N m/rad", "E-KEY-UNKNOWN", "bearing[0].torsion"),
+        ("shaft[1].density", "0 kg/m^3", "E-RANGE", "shaft[1].density"),
+        ("shaft[0].torsion", "rigid", "E-CHOICE", "shaft[0].torsion"),
         ("operation.torque[0].body", "mtor", "E-BODY", "operation.torque[0].body"),
         ("operation.torque[0].torque", "5 N m", "E-CHOICE", "operation.torque[0].torque"),
         ("operation.torque[1].body", "motor", "E-DUPLICATE", "operation.torque[1].body"),
@@ -132,6 +140,7 @@ def refused(case, **changes):
         ("simulation.settle", "3 s", "E-RANGE", "simulation.settle"),
         ("simulation.resolution", "0.01 Hz", "E-RANGE", "simulation.resolution"),
         ("simulation.duration", "9e4 s", "E-RANGE", "simulation.duration"),
+        ("simulation.contact_loss", "yes", "E-TYPE", "simulation.contact_loss"),
         ("model", "drivetrian", "E-CHOICE", "model"),
         ("model", 3, "E-TYPE", "model"),
     ],
@@ -238,42 +247,6 @@ def refused_model(case):
     return info.value
 
 
-@pytest.mark.parametrize(
-    ("text", "code", "words"),
-    [
-        ("time [s],torque [N m]\n0,1\n1,nan\n", "E-CSV", "not a finite number"),
-        ("time [s],torque [N m]\n0,1\n2,1\n1,1\n", "E-CSV", "do not ascend"),
-        ("time [s],torque [N m]\n0,1\n0,2\n", "E-CSV", "do not ascend"),
-        ("time [s],torque [kg]\n0,1\n", "E-CSV", "not a unit of torque"),
-        ("time [m],torque [N m]\n0,1\n", "E-CSV", "not a unit of time"),
-        ("time,torque\n0,1\n", "E-CSV", "no known name"),
-        ("time [s],torque [N m]\n0,1,2\n", "E-CSV", "3 numbers"),
-        ("time [s],torque [N m]\n0,one\n", "E-CSV", "not a finite number"),
-        ("time [s],time [s]\n0,1\n", "E-CSV", "columns are time"),
-        ("time [s],torque [N m]\n", "E-CSV", "no points"),
-        (None, "E-FILE", "cannot open"),
-    ],
-)
-def test_wrong_torque_files(tmp_path, text, code, words):
-    case = OWN.read_text(encoding="utf-8")
-    (tmp_path / "case.toml").write_text(case, encoding="utf-8")
-    if text is not None:
-        (tmp_path / "own_chain_motor.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(CaseError, match=words) as info:
-        read_case(tmp_path / "case.toml")
-    assert info.value.code == code and info.value.key == "operation.torque[0].file"
-    assert "own_chain_motor.csv" in info.value.file
-
-
-def test_torque_files_carry_their_units(tmp_path):
-    path = tmp_path / "torque.csv"
-    path.write_text("# gusts\ntorque [kN m];time [min]\n15;0\n16,5;1\n", encoding="utf-8")
-    assert read_torques(path) == ([0.0, 60.0], [15e3, pytest.approx(16.5e3)])
-    text = OWN.read_text(encoding="utf-8").replace("own_chain_motor.csv", "../torque.csv")
-    with pytest.raises(CaseError, match="in the folder of the case"):
-        parse_case(text, name=str(tmp_path / "case.toml"))
-
-
 def test_other_cases_are_read_as_before(own):
     assert not isinstance(read_case(CASES / "planetary_27_40_108.toml"), DrivetrainCase)
     assert "shaft" in case_schema("drivetrain")["properties"] and "sun" in case_schema()["properties"]
@@ -288,10 +261,3 @@ def test_check_prints_the_chain(paper):
     stages = {row[0]: row for row in blocks["Gear stages"].rows}
     assert stages["carrier-sun"][-1] == "18.4000" and stages["gear 2-gear 3"][-1] == "128.8766"
     assert any("W-TEETH" in note for note in blocks["Warnings"].notes)
-
-
-def test_slow_steps_and_records_are_said(own):
-    slow = with_value(with_value(own, "simulation.rate", "10 kHz"), "simulation.record", "1 kHz")
-    for case, wanted in ((own, set()), (slow, {"W-RATE", "W-RECORD"})):
-        notes = " ".join(describe(case)[-1].notes)
-        assert {code for code in ("W-RATE", "W-RECORD") if code in notes} == wanted

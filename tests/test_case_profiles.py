@@ -49,7 +49,7 @@ def test_a_measured_profile_has_material_positive(folder):
     "csv",
     [
         "\ufeffroll angle [deg];deviation [µm]\r\n15;-2,5\r\n20;1,5\r\n30;-4\r\n",
-        "roll_angle [deg]\tdeviation [mm]\n30\t-0,004\n20\t.0015\n15\t-0.0025\n",
+        "roll_angle [deg]\tdeviation [mm]\n30\t-0,004\n20\t,0015\n15\t-0,0025\n",
         "Deviation (um), Roll Angle (rad)\n-2.5,.2617993877991\n1.5,.3490658503989\n-4,.5235987755983",
     ],
     ids=["semicolons", "tabs, descending", "columns exchanged"],
@@ -86,7 +86,8 @@ def test_the_points_are_kept_with_the_case(folder, tmp_path):
         ("roll angle [mm], deviation [um]\n15, 1\n20, 2\n", "not a unit of angle", 1),
         ("roll angle [deg], diameter [mm]\n15, 1\n20, 2\n", "the columns are", 1),
         ("roll angle [deg], deviation [um], x [mm]\n15, 1\n20, 2\n", "no known name", 1),
-        ("roll angle [deg], deviation [um]\n15, 1\n20, 2, 3\n", "3 numbers", 3),
+        ("roll angle [deg], deviation [um]\n15, 1\n20, 2, 3\n", "3 entries", 3),
+        ("roll angle [deg]; deviation [um]\n15; 1,5\n20; 1.500\n", "decimal commas and points", 3),
         ("roll angle [deg], deviation [um]\n15, 1\n20, abc\n", "not a finite number", 3),
         ("roll angle [deg], deviation [um]\n15, nan\n20, 1\n", "not a finite number", 2),
         ("roll angle [deg], deviation [um]\n15, 1e999\n20, 1\n", "not a finite number", 2),

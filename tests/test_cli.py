@@ -286,6 +286,18 @@ def test_run_writes_and_sums_up(tmp_path, capsys, pipeline):
     assert (out / "case.toml").read_text(encoding="utf-8") == TEXT
 
 
+def test_run_prints_its_warnings_before_it_computes(tmp_path, capsys, pipeline):
+    path = tmp_path / "case.toml"
+    path.write_text(edited(("sun.tip_diameter", "45.6 mm"), ("housing.points", 7)), encoding="utf-8")
+    assert cli.main(["run", str(path), "-o", str(tmp_path / "out")]) == 0
+    printed = capsys.readouterr()
+    lines = printed.err.splitlines()
+    assert [line.split("]")[0] for line in lines[:2]] == ["warning: [W-CLEARANCE", "warning: [W-POINTS"]
+    assert "W-" not in "".join(lines[2:]) + printed.out and "static" in lines
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "clean")]) == 0
+    assert "warning:" not in capsys.readouterr().err
+
+
 def test_run_of_one_stage(tmp_path, capsys, pipeline):
     out = tmp_path / "out"
     assert cli.main(["run", str(CASE), "--output", str(out), "--only", "static", "--no-pictures"]) == 0

@@ -71,7 +71,7 @@ def test_shipped_cases_run(name, tmp_path):
 def test_files_figures_and_report(results, own):
     names = set(results.manifest.files)
     figures = {"stiffness_series", "campbell", "transient_speeds", "transient_deviations", "transient_forces"}
-    assert names >= {f"{name}.png" for name in (*figures, "mesh_force_spectrum", "drivetrain_mode_1")}
+    assert names >= {f"{name}.png" for name in (*figures, "mesh_force_spectrum", "drivetrain_mode_2")}
     assert results.manifest.complete and results.manifest.convergence["transient"]["energy"] < 1e-9
     page = (results.folder / "report.html").read_text(encoding="utf-8")
     for text in ("Gear stages", "Transient", "Spectrum", "pinion-wheel", "Other pictures"):
@@ -266,19 +266,42 @@ def test_command_line(tmp_path, capsys, own):
     assert cli.main(["schema", "--model", "drivetrain"]) == 0 and "ring_teeth" in capsys.readouterr().out
 
 
-def test_a_motion_that_grows_without_end_is_refused(own, monkeypatch):
-    from femgear.models import drivetrain_march
+def example():
+    """The case of the page."""
+    (text,) = re.findall(
+        r"^```toml\n(.*?)^```", section_of("drivetrain.md", "## Case file"), flags=re.MULTILINE | re.DOTALL
+    )
+    return parse_case(text)
 
-    def endless(*arguments, **options):
-        from dataclasses import replace
 
-        run = march(*arguments, **options)
-        return replace(run, force=np.full_like(run.force, np.nan))
+@pytest.fixture(scope="module")
+def resonant():
+    """The example of the page in its parametric resonance, without damping."""
+    case = with_value(example(), "operation.speed", "992.338 rpm")
+    changes = {"damping_ratio": 0.0, "duration": "4 s", "torsional": True, "record": "5 kHz"}
+    for key, value in changes.items():
+        case = with_value(case, f"simulation.{key}", value)
+    return case
 
-    march = drivetrain_march.march_drivetrain
-    monkeypatch.setattr(drivetrain_march, "march_drivetrain", endless)
-    with pytest.raises(ConvergenceError, match="E-DIVERGED"):
-        solve_transient_run(own)
+
+def test_a_motion_that_grows_without_end_is_refused(resonant):
+    with pytest.raises(ConvergenceError, match="E-DIVERGED") as caught:
+        solve_transient_run(resonant)
+    text = str(caught.value)
+    for part in ("damping_ratio", "with bending", "motor-fan", "parametric resonance", "contact_loss"):
+        assert part in text
+
+
+def test_growth_and_contact_loss_in_the_results(resonant):
+    short = with_value(resonant, "simulation.duration", "0.2 s")
+    linear = solve_transient_run(short).dataset()
+    assert linear.attrs["contact"] == "linear" and float(linear["lost"].max()) == 0.0
+    assert np.all(linear["growth"].values[1:] > 10.0) and linear["growth"].attrs["units"] == "1/s"
+    longer = with_value(resonant, "simulation.duration", "0.5 s")
+    apart = solve_transient_run(with_value(longer, "simulation.contact_loss", True)).dataset()
+    assert apart.attrs["contact"] == "separating"
+    assert np.all(apart["lost"].values[1] > 0.01) and float(apart["least_force"][1].min()) >= 0.0
+    assert float(apart["energy_error"].max()) < 1e-6 and float(apart["momentum_error"].max()) < 1e-6
 
 
 def test_a_chain_that_turns_back_has_no_orders(own):
@@ -315,8 +338,7 @@ def test_page_names_every_key_and_its_example_runs():
     cells = re.findall(r"^\|([^|]*)\|", text, flags=re.MULTILINE)
     named = {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
     assert named == keys_of(DrivetrainCase)
-    (example,) = re.findall(r"^```toml\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
-    case = parse_case(example)
+    case = example()
     assert solve_spectrum(case, solve_transient_run(with_value(case, "simulation.rate", "5 kHz"))).lines
 
 

@@ -251,6 +251,7 @@ def test_harris_map_of_one_negative_torque(quick_case, tmp_path):
     np.testing.assert_allclose(*peaks, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_optimum_of_a_coarse_map_has_no_way_down(quick_case, tmp_path):
     """The smallest amount of this map is 2.7 um, on which the simplex collapses; the valley is at 3.0 um."""
     arguments = ("--points", "3", "--positions", "16", "--largest", "8 um", "--also", "150 N m")
@@ -404,5 +405,6 @@ def test_drivetrain_takes_a_case_of_its_own(tmp_path):
     done = run("drivetrain.py", own, "--duration", "0.2 s", "--modes", "0", "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "pinion-wheel" in done.stdout and "ratio of the radii" not in done.stdout
+    assert "contact loss: pinion-wheel parts first" in done.stdout and (tmp_path / "backlash.png").exists()
     done = run("drivetrain.py", CASE, "-o", tmp_path / "none", folder=tmp_path)
     assert done.returncode == 2 and "E-MODEL" in done.stderr and not (tmp_path / "none").exists()

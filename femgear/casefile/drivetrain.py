@@ -6,10 +6,10 @@ import math
 import re
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool
 
 from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
-from femgear.casefile.tomlfile import line_of
+from femgear.casefile.origin import ReadCase
 from femgear.casefile.units import (
     ACCELERATION,
     ANGLE,
@@ -31,6 +31,7 @@ MODEL = "drivetrain"
 FORMAT = 1
 MOST_PARTS = 200
 MOST_POINTS = 20_000
+LARGEST_TORQUE, LATEST, FASTEST_RATE = 1e9, 1e6, 1e7
 RIGID = "rigid"
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
 
@@ -76,8 +77,8 @@ Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
 PressureAngle = Quantity(ANGLE, math.radians(5), math.radians(45))
 Teeth = Count(4, 5000)
 Joint = Stiffness(TORSION, 1e-3, 1e15)
-Torque = Quantity(TORQUE, -1e9, 1e9)
-Time = Quantity(TIME, 0.0, 1e6)
+Torque = Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)
+Time = Quantity(TIME, 0.0, LATEST)
 Frequency = Quantity(FREQUENCY, 1e-3, 1e7)
 
 
@@ -186,7 +187,6 @@ class BearingSection(_Section):
     radial: Stiffness(STIFFNESS, 0.0, 1e15) = 0.0
     tilt: Stiffness(TORSION, 0.0, 1e15) = 0.0
     offset: Offset = 0.0
-    torsion: Quantity(TORSION, 0.0, 1e15) = 0.0
 
 
 class GravitySection(_Section):
@@ -217,19 +217,20 @@ class SimulationSection(_Section):
     """Integration in time, what is kept of it, and its spectra."""
 
     duration: Quantity(TIME, 1e-3, 1e5)
-    rate: Quantity(FREQUENCY, 10.0, 1e7) = 20_000.0
-    record: Quantity(FREQUENCY, 1.0, 1e7) | None = None
+    rate: Quantity(FREQUENCY, 10.0, FASTEST_RATE) = 20_000.0
+    record: Quantity(FREQUENCY, 1.0, FASTEST_RATE) | None = None
     start: Literal["static", "zero"] = "static"
     harmonics: Count(1, 200) = 15
     damping_ratio: Number(0.0, 1.0, open_high=True) = 0.0
     turning: StrictBool = True
     torsional: StrictBool = False
+    contact_loss: StrictBool = False
     modes: Count(0, 24) = 4
     settle: Time | None = None
     resolution: Frequency | None = None
 
 
-class DrivetrainCase(_Section):
+class DrivetrainCase(_Section, ReadCase):
     """A chain of bodies, its operation and how to integrate it, in SI units.
 
     The fields carry the names of the case file; ``source`` is the text that gives this case, ``notices`` what
@@ -251,49 +252,3 @@ class DrivetrainCase(_Section):
     gravity: GravitySection | None = None
     operation: OperationSection
     simulation: SimulationSection
-
-    _source: str = PrivateAttr(default="")
-    _lines: str = PrivateAttr(default="")
-    _name: str = PrivateAttr(default="")
-    _notices: tuple[str, ...] = PrivateAttr(default=())
-    _profile_files: dict[str, str] = PrivateAttr(default_factory=dict)
-
-    def __eq__(self, other: object) -> bool:
-        """Whether the values agree, from whatever text they came."""
-        return isinstance(other, DrivetrainCase) and self.model_dump() == other.model_dump()
-
-    @property
-    def source(self) -> str:
-        """TOML text that gives this case."""
-        return self._source
-
-    @property
-    def name(self) -> str:
-        """Name of the file, for messages."""
-        return self._name
-
-    def location(self, key: str) -> str | None:
-        """File, and line where the file gives it, of a dotted key."""
-        line = line_of(self._lines, key) if key else None
-        return f"{self._name}:{line}" if self._name and line else self._name or None
-
-    @property
-    def profile_files(self) -> dict[str, str]:
-        """Files of torque series, by the key of their entry."""
-        return self._profile_files
-
-    @property
-    def notices(self) -> tuple[str, ...]:
-        """Remarks on how the file was read."""
-        return self._notices
-
-    @property
-    def every(self) -> int:
-        """Steps a record."""
-        return max(1, round(self.simulation.rate / self.record_rate))
-
-    @property
-    def record_rate(self) -> float:
-        """Records a second [Hz]: as given, or the largest whole part of the rate up to 1 kHz."""
-        rate = self.simulation.rate
-        return self.simulation.record or rate / max(1, math.ceil(rate / 1000.0 - 1e-9))

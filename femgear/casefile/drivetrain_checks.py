@@ -8,16 +8,14 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from femgear.casefile.drivetrain import DrivetrainCase, PlanetarySection, ShaftSection
+from femgear.casefile.drivetrain_sizes import check_sizes, given_of
 from femgear.casefile.units import FREQUENCY, LENGTH, TIME
 from femgear.errors import CaseError
 
-# Ratios of radii and teeth that differ by more belong to no gears; profile shifts explain the rest.
-RATIO_TOLERANCE = 0.01
-# Above this the difference is worth a remark.
-_REMARK = 1e-4
 MOST_STEPS = 1e8
 MOST_VALUES = 2.5e8
 LEAST_RECORDS = 64
+MOST_COORDINATES = 1500
 
 
 def cross_check(case: DrivetrainCase) -> list[CaseError]:
@@ -97,11 +95,10 @@ def _bodies(case: DrivetrainCase) -> Iterator[CaseError]:
     for i, body in enumerate(case.body):
         if body.tilts and body.transverse_inertia == 0.0:
             yield CaseError(
-                "a body that tilts needs an inertia about a diameter",
-                code="E-KEY-MISSING",
+                "a body that tilts needs an inertia about a diameter", code="E-KEY-MISSING",
                 key=f"body[{i}].transverse_inertia",
                 remedy="give it (a flat disc has half its inertia about the axis), or tilts = false",
-            )
+            )  # fmt: skip
     elements = {shaft.between: shaft.elements for shaft in case.shaft}
     for i, one in enumerate(case.bearing):
         inside = (one.shaft is not None, one.station is not None)
@@ -123,23 +120,17 @@ def _bodies(case: DrivetrainCase) -> Iterator[CaseError]:
                 if stations > 0
                 else "a [[shaft]] with this between and 2 elements or more",
             )
-        if one.radial == one.tilt == one.torsion == 0.0:
+        if one.radial == one.tilt == 0.0:
             yield CaseError(
-                "a bearing without stiffness",
-                code="E-RANGE",
-                key=f"bearing[{i}].radial",
-                value="0 N/m",
-                limit="one of radial, tilt and torsion above 0",
-            )
+                "a bearing without stiffness", code="E-RANGE", key=f"bearing[{i}].radial", value="0 N/m",
+                limit="one of radial and tilt above 0", remedy="give it, or leave the [[bearing]] out",
+            )  # fmt: skip
         if math.isinf(one.radial) and one.offset:
             yield CaseError(
-                "a rigid bearing beside the centre of its body",
-                code="E-CHOICE",
-                key=f"bearing[{i}].offset",
-                value=LENGTH.show(one.offset),
-                limit="0 mm where radial is rigid",
+                "a rigid bearing beside the centre of its body", code="E-CHOICE", key=f"bearing[{i}].offset",
+                value=LENGTH.show(one.offset), limit="0 mm where radial is rigid",
                 remedy="give a finite stiffness",
-            )
+            )  # fmt: skip
 
 
 def _shafts(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -160,6 +151,18 @@ def _shafts(case: DrivetrainCase) -> Iterator[CaseError]:
                 value=LENGTH.show(shaft.inner_diameter),
                 limit=f"below {LENGTH.show(shaft.outer_diameter)}",
             )
+        if shaft.torsion is not None and math.isinf(shaft.torsion):
+            yield CaseError(
+                "a shaft that is rigid in torsion makes one body of two", code="E-CHOICE",
+                key=f"shaft[{i}].torsion", value="rigid", limit="a finite spring",
+                remedy="give a spring, or one body with the inertia of both",
+            )  # fmt: skip
+        if shaft.elements > 1 and shaft.density == 0.0:
+            yield CaseError(
+                "stations inside a shaft without mass", code="E-RANGE", key=f"shaft[{i}].density",
+                value="0 kg/m^3", limit="above 0 kg/m^3 with 2 elements or more",
+                remedy="give its density, or elements = 0",
+            )  # fmt: skip
 
 
 def _shaft_problem(shaft: ShaftSection, springs: list[str]) -> str:
@@ -170,118 +173,12 @@ def _shaft_problem(shaft: ShaftSection, springs: list[str]) -> str:
     return f"the shaft has a section and {' and '.join(springs)}" if springs else ""
 
 
-def _sizes(case: DrivetrainCase) -> Iterator[CaseError]:
-    for i, stage in enumerate(case.parallel):
-        key, given = f"parallel[{i}]", _given(stage, ("radii", "base_radii", "module"))
-        if len(given) != 1:
-            yield _one_of(f"{key}.{given[0] if given else 'radii'}", "radii, base_radii or module")
-            continue
-        radii = stage.radii or stage.base_radii
-        if radii and (problem := _mismatch(radii[1] / radii[0], stage.teeth[1] / stage.teeth[0])):
-            yield _unfit(f"{key}.teeth", problem)
-    for i, stage in enumerate(case.planetary):
-        yield from _planetary_sizes(stage, f"planetary[{i}]")
-
-
-def _planetary_sizes(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
-    pitch = _given(stage, ("sun_radius", "planet_radius"))
-    base = _given(stage, ("sun_base_radius", "planet_base_radius"))
-    ways = [pitch, base, _given(stage, ("module",))]
-    if [len(way) for way in ways] not in ([2, 0, 0], [0, 2, 0], [0, 0, 1]):
-        words = "sun_radius and planet_radius, sun_base_radius and planet_base_radius, or module"
-        yield _one_of(f"{key}.{next((way[0] for way in ways if way), 'sun_radius')}", words)
-    elif pitch or base:
-        sun, planet = (getattr(stage, name) for name in (pitch or base))
-        pairs = [("ring_teeth", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)]
-        if stage.planet_teeth is not None:
-            pairs.append(("planet_teeth", planet / sun, stage.planet_teeth / stage.sun_teeth))
-        for name, radii, teeth in pairs:
-            if problem := _mismatch(radii, teeth):
-                yield _unfit(f"{key}.{name}", problem)
-    if not stage.sun_teeth < stage.ring_teeth:
-        yield CaseError(
-            "the ring has no more teeth than the sun",
-            code="E-TEETH",
-            key=f"{key}.ring_teeth",
-            value=stage.ring_teeth,
-            limit=f"more than {stage.sun_teeth}",
-        )
-    yield from _assembly(stage, key)
-
-
-def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
-    both, angles = stage.ring_teeth + stage.sun_teeth, stage.planet_angles
-    if angles is None:
-        if both % stage.planets:
-            yield CaseError(
-                f"{stage.planets} equally spaced planets do not assemble",
-                code="E-ASSEMBLY",
-                key=f"{key}.planets",
-                value=stage.planets,
-                limit=f"a divisor of ring_teeth + sun_teeth = {both}",
-            )
-        yield from _neighbours(stage, key, 2.0 * math.pi / stage.planets)
-        return
-    if any(b <= a for a, b in pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi - 1e-9:
-        yield CaseError(
-            "the planet angles do not ascend within one turn", code="E-RANGE", key=f"{key}.planet_angles"
-        )
-    yield from _neighbours(stage, key, min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi))))
-    steps = [(angle - angles[0]) * both / (2.0 * math.pi) for angle in angles]
-    if any(abs(step - round(step)) > 1e-3 for step in steps):
-        yield CaseError(
-            "the planets do not assemble at these angles",
-            code="E-ASSEMBLY",
-            key=f"{key}.planet_angles",
-            limit=f"whole multiples of 360 deg / {both} from one another",
-        )
-
-
-def _neighbours(stage: PlanetarySection, key: str, apart: float) -> Iterator[CaseError]:
-    """Pitch circles of neighbouring planets must not overlap; sizes by the teeth."""
-    share = (stage.ring_teeth - stage.sun_teeth) / (stage.ring_teeth + stage.sun_teeth)
-    if share > 0.0 and math.sin(0.5 * min(apart, math.pi)) <= share:
-        most = math.degrees(2.0 * math.asin(share))
-        yield CaseError(
-            "neighbouring planets overlap",
-            code="E-NEIGHBOURS",
-            key=f"{key}.{'planets' if stage.planet_angles is None else 'planet_angles'}",
-            value=f"{math.degrees(apart):.4g} deg from one to the next",
-            limit=f"more than {most:.4g} deg",
-            remedy="take fewer planets, or smaller ones",
-        )
-
-
-def _given(section, names) -> list[str]:
-    return [name for name in names if getattr(section, name) is not None]
-
-
-def _one_of(key: str, words: str) -> CaseError:
-    return CaseError("the sizes of the gears are needed once", code="E-CHOICE", key=key, limit=words)
-
-
-def _mismatch(radii: float, teeth: float) -> str:
-    if abs(teeth / radii - 1.0) <= RATIO_TOLERANCE:
-        return ""
-    return f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}"
-
-
-def _unfit(key: str, message: str) -> CaseError:
-    return CaseError(
-        message,
-        code="E-TEETH",
-        key=key,
-        limit=f"ratios within {RATIO_TOLERANCE:.0%} of one another",
-        remedy="correct the teeth or the radii, or give module in place of the radii",
-    )
-
-
 def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
     shares, bodies = [], []
     for i, one in enumerate(case.operation.torque):
         key = f"operation.torque[{i}]"
-        series = len(_given(one, ("times", "torques")))
-        given = _given(one, ("torque", "file", "share")) + ["times"] * bool(series)
+        series = len(given_of(one, ("times", "torques")))
+        given = given_of(one, ("torque", "file", "share")) + ["times"] * bool(series)
         if len(given) != 1 or series == 1:
             yield CaseError(
                 "the torque on a body is given in one way",
@@ -312,40 +209,81 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
 
 def _simulation(case: DrivetrainCase) -> Iterator[CaseError]:
     s = case.simulation
-    ratio = s.rate / case.record_rate
+    steps = s.duration * s.rate
+    if steps > MOST_STEPS:
+        yield CaseError(
+            f"{steps:.3g} steps are too many", code="E-RANGE", key="simulation.duration",
+            value=TIME.show(s.duration), limit=f"{MOST_STEPS:g} steps: {TIME.show(MOST_STEPS / s.rate)}",
+            remedy="take a shorter duration or a lower simulation.rate",
+        )  # fmt: skip
+    if s.settle is not None and not s.settle < s.duration:
+        yield CaseError(
+            "the spectra would leave out the whole run", code="E-RANGE", key="simulation.settle",
+            value=TIME.show(s.settle), limit=f"below {TIME.show(s.duration)} (simulation.duration)",
+        )  # fmt: skip
+    elif s.record is not None:
+        yield from record_problems(case, s.record)
+
+
+def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
+    """What the records of a run cannot hold.
+
+    Parameters
+    ----------
+    case : DrivetrainCase
+    record : float
+        Records a second [Hz]: as given, or what `femgear.models.drivetrain_rates` takes for it.
+    """
+    s, ratio = case.simulation, case.simulation.rate / record
     if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:
         yield CaseError(
-            "a record is kept after a whole number of steps",
-            code="E-RANGE",
-            key="simulation.record",
-            value=FREQUENCY.show(case.record_rate),
+            "a record is kept after a whole number of steps", code="E-RANGE", key="simulation.record",
+            value=FREQUENCY.show(record),
             limit=f"{FREQUENCY.show(s.rate)} (simulation.rate) over a whole number",
-        )
-    for key, size, most, words in (
-        ("duration", s.duration * s.rate, MOST_STEPS, "steps"),
-        ("record", s.duration * case.record_rate * (2 * len(case.body) + 8), MOST_VALUES, "kept numbers"),
-    ):
-        if size > most:
-            yield CaseError(
-                f"{size:.3g} {words} are too many", code="E-RANGE", key=f"simulation.{key}", limit=f"{most:g}"
-            )
-    late = s.duration - settle_time(case)
-    if late * case.record_rate < LEAST_RECORDS:
+            remedy=f"take {FREQUENCY.show(s.rate / max(1, round(ratio)))}",
+        )  # fmt: skip
+    # motion, velocity and torque of a body, a force and an approach of a mesh
+    meshes = len(case.parallel) + sum(2 * _planets(stage) for stage in case.planetary)
+    size = s.duration * record * (2 * len(case.body) + 2 * meshes + 2)
+    if size > MOST_VALUES:
         yield CaseError(
-            "hardly anything is left for the spectra",
-            code="E-RANGE",
-            key="simulation.settle" if s.settle is not None else "simulation.duration",
-            value=TIME.show(settle_time(case)) if s.settle is not None else TIME.show(s.duration),
+            f"{size:.3g} kept numbers are too many", code="E-RANGE", key="simulation.record",
+            value=FREQUENCY.show(record), limit=f"{MOST_VALUES:g} numbers",
+            remedy=f"take {FREQUENCY.show(record * MOST_VALUES / size)} or less, or a shorter duration",
+        )  # fmt: skip
+    late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
+    if late * record < LEAST_RECORDS:
+        yield CaseError(
+            f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
+            key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
             limit=f"{LEAST_RECORDS} records or more after simulation.settle",
-        )
-    elif s.resolution is not None and not 1.0 / late <= s.resolution <= case.record_rate / 16.0:
+            remedy="take a longer duration, a shorter settle or more records a second",
+        )  # fmt: skip
+    elif s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
         yield CaseError(
-            "the record has no such resolution",
-            code="E-RANGE",
-            key="simulation.resolution",
+            "the record has no such resolution", code="E-RANGE", key="simulation.resolution",
             value=FREQUENCY.show(s.resolution),
-            limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(case.record_rate / 16.0)}",
-        )
+            limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(record / 16.0)}",
+        )  # fmt: skip
+
+
+def _planets(stage: PlanetarySection) -> int:
+    return stage.planets if stage.planet_angles is None else len(stage.planet_angles)
+
+
+def _size(case: DrivetrainCase) -> Iterator[CaseError]:
+    """The matrices are dense."""
+    stations = [max(shaft.elements - 1, 0) for shaft in case.shaft]
+    planets = sum(_planets(stage) for stage in case.planetary)
+    count = 5 * len(case.body) + 5 * sum(stations) + 3 * planets
+    if count > MOST_COORDINATES:
+        longest = stations.index(max(stations)) if any(stations) else None
+        yield CaseError(
+            f"{count} coordinates are too many", code="E-RANGE",
+            key="body" if longest is None else f"shaft[{longest}].elements",
+            limit=f"{MOST_COORDINATES}: 5 a body and a station inside a shaft, 3 a planet",
+            remedy="take fewer elements",
+        )  # fmt: skip
 
 
 def settle_time(case: DrivetrainCase) -> float:
@@ -354,31 +292,4 @@ def settle_time(case: DrivetrainCase) -> float:
     return 0.3 * s.duration if s.settle is None else s.settle
 
 
-def notices(case: DrivetrainCase) -> tuple[str, ...]:
-    """Remarks on a case that was checked."""
-    found = []
-    for i, stage in enumerate(case.parallel):
-        radii = stage.radii or stage.base_radii
-        if radii:
-            found.append((f"parallel[{i}]", radii[1] / radii[0], stage.teeth[1] / stage.teeth[0]))
-    for i, stage in enumerate(case.planetary):
-        for sun, planet in (
-            (stage.sun_radius, stage.planet_radius),
-            (stage.sun_base_radius, stage.planet_base_radius),
-        ):
-            if sun is not None:
-                found.append(
-                    (f"planetary[{i}]", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)
-                )
-    said = [
-        f"[W-TEETH] {key}.teeth: the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
-        "the radii, mesh frequencies the teeth of the first gear or of the ring"
-        for key, radii, teeth in found
-        if abs(teeth / radii - 1.0) > _REMARK
-    ]
-    if not case.bearing:
-        said.append("[W-BEARING] there is no [[bearing]]")
-    return tuple(said)
-
-
-_CHECKS = (_bodies, _shafts, _sizes, _torques, _simulation)
+_CHECKS = (_bodies, _shafts, check_sizes, _torques, _simulation, _size)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, model_validator
 
 from femgear.casefile.deviations import (
     CarrierErrors,
@@ -18,8 +18,8 @@ from femgear.casefile.deviations import (
 )
 from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
 from femgear.casefile.helical import HelicalSection
+from femgear.casefile.origin import ReadCase
 from femgear.casefile.planar import PlanarSection
-from femgear.casefile.tomlfile import line_of
 from femgear.casefile.units import (
     ANGLE,
     DENSITY,
@@ -240,7 +240,7 @@ class HousingSection(_Section):
     published: tuple[PublishedLines, ...] = ()
 
 
-class Case(_Section):
+class Case(_Section, ReadCase):
     """A planetary gear set, its operation and how to compute it, in SI units.
 
     The sections carry the names of the case file. ``source`` is the text that gives this case,
@@ -274,42 +274,6 @@ class Case(_Section):
             loose = {"foundation_radial": "0 N/m^3", "foundation_tangential": "0 N/m^3"}
             return data | {"ring": loose | data["ring"]}
         return data
-
-    _source: str = PrivateAttr(default="")
-    _lines: str = PrivateAttr(default="")
-    _name: str = PrivateAttr(default="")
-    _notices: tuple[str, ...] = PrivateAttr(default=())
-    _profile_files: dict[str, str] = PrivateAttr(default_factory=dict)
-
-    def __eq__(self, other: object) -> bool:
-        """Whether the values agree, from whatever text they came."""
-        return isinstance(other, Case) and self.model_dump() == other.model_dump()
-
-    @property
-    def source(self) -> str:
-        """TOML text that gives this case."""
-        return self._source
-
-    @property
-    def name(self) -> str:
-        """Name of the file, for messages."""
-        return self._name
-
-    def location(self, key: str) -> str | None:
-        """File, and line where the file gives it, of a dotted key; of ``rack.x`` for ``sun.rack.x``."""
-        found = (line_of(self._lines, name) for name in (key, key.partition(".")[2]) if name)
-        line = next((number for number in found if number), None)
-        return f"{self._name}:{line}" if self._name and line else self._name or None
-
-    @property
-    def profile_files(self) -> dict[str, str]:
-        """Files of measured profiles, by the key of their modification."""
-        return self._profile_files
-
-    @property
-    def notices(self) -> tuple[str, ...]:
-        """Remarks on how the file was read."""
-        return self._notices
 
     @property
     def response_harmonics(self) -> int:

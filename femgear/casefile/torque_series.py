@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import os
-import re
 from itertools import pairwise
-from pathlib import PurePath
 
 from femgear.casefile import tomlfile
-from femgear.casefile.drivetrain import MOST_POINTS
-from femgear.casefile.units import TIME, TORQUE, to_si
-from femgear.errors import CaseError
+from femgear.casefile.columns import Columns, embedded, read_columns
+from femgear.casefile.drivetrain import LARGEST_TORQUE, LATEST, MOST_POINTS
+from femgear.casefile.units import TIME, TORQUE
 
-_HEADING = re.compile(r"\s*(?P<name>[A-Za-z]+)\s*[\[(](?P<unit>[^\])]+)[\])]\s*")
 _DIMENSIONS = {"time": TIME, "torque": TORQUE}
-_REMEDY = "the first line names two columns: time [s] and torque [N m] (or other units)"
+_LIMITS = {"time": (0.0, LATEST), "torque": (-LARGEST_TORQUE, LARGEST_TORQUE)}
+_COLUMNS = "the first line names two columns: time [s] and torque [N m] (or other units)"
+# Times and torques are written into the case with so many digits.
+_DIGITS = ".13g"
 
 
 def embed_torques(data: dict, name: str) -> dict[str, str]:
@@ -48,29 +47,11 @@ def embed_torques(data: dict, name: str) -> dict[str, str]:
             continue
         key = f"operation.torque[{i}]"
         file = table.pop("file")
-        times, torques = _points(file, name, f"{key}.file")
-        table["times"] = [f"{value:.13g} s" for value in times]
-        table["torques"] = [f"{value:.13g} N m" for value in torques]
+        times, torques = embedded(file, name, f"{key}.file", read_torques)
+        table["times"] = [f"{value:{_DIGITS}} s" for value in times]
+        table["torques"] = [f"{value:{_DIGITS}} N m" for value in torques]
         found[key] = tomlfile.printable(file)
     return found
-
-
-def _points(file: str, name: str, key: str) -> tuple[list[float], list[float]]:
-    path = PurePath(file)
-    if path.is_absolute() or ".." in path.parts or not path.parts:
-        raise CaseError(
-            "the file must lie in the folder of the case or below",
-            code="E-FILE",
-            key=key,
-            value=tomlfile.printable(file),
-            file=name or None,
-            remedy="copy it there and name it relative to the case file",
-        )
-    try:
-        return read_torques(os.path.join(os.path.dirname(name), file))
-    except CaseError as error:
-        error.key = key
-        raise
 
 
 def read_torques(path: str | os.PathLike) -> tuple[list[float], list[float]]:
@@ -81,74 +62,35 @@ def read_torques(path: str | os.PathLike) -> tuple[list[float], list[float]]:
     path : path-like
         Text in two columns, divided by comma, semicolon or tab (with semicolon or tab the numbers may have
         decimal commas); the first line names them with their units, such as ``time [s]`` and
-        ``torque [kN m]``. Empty lines and those that begin with ``#`` are skipped.
+        ``torque [kN m]``, in either order. Empty lines and those that begin with ``#`` are skipped.
 
     Raises
     ------
     CaseError
         ``E-FILE``, ``E-FILE-ENC`` (see `tomlfile.read_text`); ``E-CSV`` with the number of the line: unknown
-        columns or units, numbers that are none or not finite, times that do not ascend.
+        columns or units, numbers that are none, not finite or beyond the limits of a case file, decimal
+        commas beside decimal points, times that do not ascend.
     """
-    name = tomlfile.printable(os.fsdecode(path))
-    text = tomlfile.read_text(path)
-    lines = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
-    lines = [(i, line) for i, line in lines if not line.lstrip().startswith("#")]
-    if len(lines) < 2:
-        raise _problem("no points", name, None, limit="one or more under the heading")
-    if len(lines) - 1 > MOST_POINTS:
-        raise _problem(f"{len(lines) - 1} points are too many", name, None, limit=f"{MOST_POINTS} points")
-    divider = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
-    columns = _heading(lines[0][1].split(divider), name, lines[0][0])
-    rows = [_row(line.split(divider), divider, name, i) for i, line in lines[1:]]
-    at, factor = columns["time"]
-    times = [row[at] * factor for row in rows]
-    for (before, after), (line, _) in zip(pairwise(times), lines[2:], strict=True):
+    found = read_columns(path, _DIMENSIONS, least=1, most=MOST_POINTS, remedy=_COLUMNS)
+    times, torques = (_column(found, key) for key in ("time", "torque"))
+    for (before, after), line in zip(pairwise(times), found.lines[1:], strict=True):
         if not after > before:
-            raise _problem("the times do not ascend", name, line, value=f"{after:g} s")
-    at, factor = columns["torque"]
-    return times, [row[at] * factor for row in rows]
+            raise found.problem(
+                "the times do not ascend", line, value=f"{after:g} s", limit=f"above {before:g} s",
+                remedy="sort the lines by time, and keep one line of every instant",
+            )  # fmt: skip
+    return times, torques
 
 
-def _heading(cells: list[str], name: str, line: int) -> dict[str, tuple[int, float]]:
-    """Place of every column, and the SI value of its unit."""
-    found = {}
-    for place, cell in enumerate(cells):
-        match = _HEADING.fullmatch(cell)
-        title = match["name"].lower() if match else ""
-        if title not in _DIMENSIONS:
-            raise _problem("a column has no known name with its unit", name, line, value=cell)
-        try:
-            found[title] = place, to_si(f"1 {match['unit']}", _DIMENSIONS[title])
-        except CaseError as error:
-            raise _problem(error.message, name, line, value=cell) from None
-    if len(cells) != 2 or len(found) != 2:
-        raise _problem(f"the columns are {', '.join(found)}", name, line)
-    return found
-
-
-def _row(cells: list[str], divider: str, name: str, line: int) -> tuple[float, float]:
-    if len(cells) != 2:
-        raise _problem(f"{len(cells)} numbers in a line", name, line, limit="2")
-    values = []
-    for cell in cells:
-        text = cell.strip()
-        try:
-            value = float(text if divider == "," else text.replace(",", ".")) if text.isascii() else math.nan
-        except ValueError:
-            value = math.nan
-        # underscores and words such as nan are numbers to Python alone
-        if not math.isfinite(value) or "_" in text:
-            raise _problem("not a finite number", name, line, value=text)
-        values.append(value)
-    return values[0], values[1]
-
-
-def _problem(message: str, name: str, line: int | None, *, value=None, limit=None) -> CaseError:
-    return CaseError(
-        message,
-        code="E-CSV",
-        file=f"{name}:{line}" if line else name,
-        value=value,
-        limit=limit,
-        remedy=_REMEDY,
-    )
+def _column(found: Columns, key: str) -> list[float]:
+    """One column as the case will hold it, within the limits of a case file."""
+    (low, high), dimension = _LIMITS[key], _DIMENSIONS[key]
+    values = [float(f"{value:{_DIGITS}}") for value in found.values[key]]
+    for value, line in zip(values, found.lines, strict=True):
+        if not low <= value <= high:
+            raise found.problem(
+                f"{dimension.name} of {dimension.show(value)} is not plausible", line,
+                value=dimension.show(value), limit=f"{dimension.show(low)} to {dimension.show(high)}",
+                remedy=f"check the number, and the unit of the column {key} in the heading",
+            )  # fmt: skip
+    return values

@@ -138,6 +138,6 @@ def _root(unit: str) -> tuple[float, dict[str, float]] | None:
     registry = _registry()
     try:
         quantity = registry.Quantity(1.0, registry.parse_units(unit)).to_root_units()
-    except pint.errors.PintError:
+    except (pint.errors.PintError, ValueError):
         return None
     return float(quantity.magnitude), {str(name): float(power) for name, power in quantity._units.items()}

@@ -155,9 +155,12 @@ def drivetrain_model(
     if train.damping_ratio:
         still = replace(reduced, gyroscopic=None)
         C = modal_damping(still, stiffness[:, 0].real, train.damping_ratio)
-    system = replace(reduced, C=C, load=T.T @ M @ weight)
-    ratio = {name: float(spin[first + 4]) for name, first in place.body.items()}
     rigid = np.linalg.lstsq(T, spin, rcond=None)[0]
+    load, carried = T.T @ M @ weight, reduced.M @ rigid
+    # over a turn the weight of planets that do not balance one another has no moment about the carrier
+    load = load - carried * (rigid @ load) / (rigid @ carried)
+    system = replace(reduced, C=C, load=load)
+    ratio = {name: float(spin[first + 4]) for name, first in place.body.items()}
     return DrivetrainModel(
         train, system, geometry, stiffness, backlash, bases, base_ratio, mesh_base, turning, rigid, ratio
     )

@@ -1,10 +1,10 @@
 """Settled motion of a drivetrain whose meshes keep contact: linear harmonic balance over several bases.
 
 With the stiffness of the simple motions ``G(theta) = S k S^T = mean + rest`` and their receptance F with
-the mean
-stiffness, the lines of the motion obey ``x + F(i omega) (rest * x) = x_static`` with * the convolution over
-the lattice of orders. The system is linear and there are no samples in time, of which
-four bases would need millions.
+the mean stiffness, the lines of the motion obey ``x + F(i omega) (rest * x) = x_static`` with * the
+convolution over the lattice of orders. The system is linear and there are no samples in time, of which four
+bases would need millions. It is solved by GMRES, preconditioned with what does not change in time but for
+the turn of the carriers.
 """
 
 from __future__ import annotations
@@ -16,13 +16,30 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.models.drivetrain import DrivetrainModel, torque_vector
+from femgear.models.drivetrain_checks import check_free_spin
+from femgear.models.drivetrain_coupling import LineProblem, line_problem
+from femgear.models.drivetrain_line_solver import LineEquations, line_equations
+from femgear.models.drivetrain_refinement import Estimate, estimate, refined, with_feedback
 from femgear.solvers.lines import checked_lines, distinct_lines
 from femgear.solvers.series import FourierSeries
 
+# Estimated error of the forces, and lines at most.
+TOLERANCE, MAX_LINES = 1e-2, 20_000
+_FINEST = 1e-6
 # A torque that drives the spin, relative to the largest: no settled motion.
 _UNBALANCED = 1e-9
-# Allowed residual of the equations, relative to the largest line.
-_RESIDUAL = 1e-8
+# Residual of the equations on given lines; while lines are searched and at the end, over the tolerance.
+_GIVEN, _SEARCH, _FOUND = 1e-11, 1.0, 0.1
+# Residuals above which there is no solution, and no converged one, over the one that was asked for.
+_LOST, _ENOUGH = 10.0, 1.5
+# First harmonics that the search starts with, and its longest way.
+_START, _ROUNDS = 3, 25
+# Feedback that is accepted, over the tolerance: an upper estimate, two or three times what is found.
+_FEEDBACK = 3.0
+# Smaller target of the search where the feedback of what is left out is too large.
+_CLOSER = 0.6
+# Values of waves at once.
+_VALUES = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -40,9 +57,20 @@ class SettledMotion:
     displacement : (n, L) complex array
         Of all coordinates, the spin's deviation of the mean being zero.
     residual : float
-        Of the linear equations, relative to the largest line.
-    tail : float
-        Largest line at the border of the lattice over the largest line that is not the mean.
+        Of the linear equations, relative to the static motion where lines are given, to the alternating
+        motion of the mesh with the smallest where they are searched (units of energy).
+    remainder : (n_meshes,) array
+        Estimated r.m.s. force of all lines left out over that of the alternating force of the mesh, of
+        first order.
+    feedback : (n_meshes,) array
+        Estimate of what these do to the lines kept, likewise: large near the border of an unstable
+        parametric resonance. Mostly two to three times
+        too large.
+    converged : bool
+        Whether the remainder of every mesh is within the tolerance and its feedback within three times this.
+    rounds : int
+        Solutions until the lines were found, one for given lines.
+    message : str
     """
 
     model: DrivetrainModel
@@ -51,7 +79,11 @@ class SettledMotion:
     motion: np.ndarray
     displacement: np.ndarray
     residual: float
-    tail: float
+    remainder: np.ndarray
+    feedback: np.ndarray
+    converged: bool
+    rounds: int
+    message: str
 
     @property
     def line_frequency(self) -> np.ndarray:
@@ -60,9 +92,13 @@ class SettledMotion:
 
     def at(self, times) -> tuple[np.ndarray, np.ndarray]:
         """Approach [m] and force [N] of the meshes (n_times, n_meshes)."""
-        theta = np.asarray(times, float)[:, None] * self.frequency
-        x = (np.exp(1j * theta @ self.orders.T) @ self.motion.T).real
-        geometry, model = self.model.geometry, self.model
+        times, geometry, model = np.asarray(times, float), self.model.geometry, self.model
+        theta, omega = times[:, None] * self.frequency, self.line_frequency
+        x = np.empty((len(times), len(self.motion)))
+        block = max(1, _VALUES // len(omega))
+        for first in range(0, len(times), block):
+            waves = np.exp(1j * np.multiply.outer(times[first : first + block], omega))
+            x[first : first + block] = (waves @ self.motion.T).real
         turns = theta[:, : 2 * len(geometry.even) : 2] * float(model.turning)
         approach = np.einsum("tmj,tm->tj", geometry.selection(turns), x)
         series = FourierSeries(model.stiffness)
@@ -126,9 +162,18 @@ def drivetrain_lines(
 
 
 def settled_motion(
-    model: DrivetrainModel, torques: dict[str, float], *, speed: float, orders=None, gyroscopic: bool = True
+    model: DrivetrainModel,
+    torques: dict[str, float],
+    *,
+    speed: float,
+    orders=None,
+    tolerance: float = TOLERANCE,
+    max_lines: int = MAX_LINES,
+    gyroscopic: bool = True,
 ) -> SettledMotion:
     """Motion under constant torques that balance, at a constant speed of the first body.
+
+    It obeys the equations; whether a small disturbance dies out is not asked.
 
     Parameters
     ----------
@@ -138,17 +183,63 @@ def settled_motion(
     speed : float
         [rad/s]
     orders : (L, n_bases) int array, optional
-        From `drivetrain_lines`, its defaults when not given.
+        Lines, for example from `drivetrain_lines`; when not given they are searched.
+    tolerance : float
+        Of the `remainder` of every mesh.
+    max_lines : int
+        Where the search stops; `converged` and `message` tell.
     gyroscopic : bool
         With the gyroscopic terms at this speed.
 
     Raises
     ------
     CaseError
-        Torques that drive the spin (E-LOAD-BALANCE).
+        Torques that drive the spin (E-LOAD-BALANCE), a tolerance or number of lines that is none (E-RANGE),
+        orders that are no lines or too high (E-LINES), bearings that hold the rotation (E-BEARING).
     ConvergenceError
-        The equations are singular: an unstable parametric resonance, or no damping.
+        The equations are singular (E-SINGULAR, E-RESONANCE): no damping, or the border of an unstable
+        parametric resonance.
     """
+    _check(tolerance, max_lines)
+    check_free_spin(model)
+    problem = line_problem(model, _balanced_load(model, torques), speed, gyroscopic=gyroscopic)
+    if orders is None:
+        found = _searched(problem, tolerance, int(max_lines))
+        orders = distinct_lines(problem.codes.orders(found.lines))
+    else:
+        orders = checked_lines(orders)
+        found = _given(problem, orders, tolerance)
+    codes = orders @ problem.codes.stride
+    at, turned = np.searchsorted(found.lines, np.abs(codes)), codes < 0
+    sides = np.where(codes == 0, 1.0, 2.0)
+    x, q = (
+        (np.where(turned[:, None], v[at].conj(), v[at]) * sides[:, None]).T
+        for v in (found.x, _displacements(problem, found))
+    )
+    left, fed_back = found.estimate.remainder, found.estimate.feedback
+    converged = bool(left.max() <= tolerance and fed_back.max() <= _FEEDBACK * tolerance and found.solved)
+    message = _message(model, found, converged, tolerance, max_lines)
+    return SettledMotion(
+        model, orders, problem.frequency, x, q, found.residual, left, fed_back, converged, found.rounds,
+        message,
+    )  # fmt: skip
+
+
+def _check(tolerance, max_lines) -> None:
+    if not (np.isscalar(tolerance) and np.isreal(tolerance) and _FINEST <= tolerance < 1.0):
+        raise CaseError(
+            f"a tolerance of {tolerance!r}", code="E-RANGE", key="tolerance", limit=f"{_FINEST:g} to below 1"
+        )
+    if not (np.isscalar(max_lines) and np.isreal(max_lines) and 1 <= max_lines <= 1e6):
+        raise CaseError(f"{max_lines!r} lines", code="E-RANGE", key="max_lines", limit="1 to 1 000 000")
+
+
+def _balanced_load(model: DrivetrainModel, torques) -> np.ndarray:
+    if not model.meshes:
+        raise CaseError(
+            "a chain without gears has no lines", code="E-DRIVETRAIN", limit="one mesh or more",
+            remedy="it stands at its static deflection",
+        )  # fmt: skip
     load = model.system.load + torque_vector(model, torques)
     size = np.abs(model.rigid * load).max(initial=0.0)
     if abs(model.rigid @ load) > _UNBALANCED * max(size, 1e-300):
@@ -156,115 +247,90 @@ def settled_motion(
             f"the torques leave {model.rigid @ load:.6g} N m that drive the spin", code="E-LOAD-BALANCE",
             remedy="balance them (balanced_torque), or integrate in time",
         )  # fmt: skip
-    orders = checked_lines(drivetrain_lines(model) if orders is None else orders)
-    frequency = model.frequencies(speed)
-    both = np.vstack([orders, -orders[1:]])
-    rest, mean = stiffness_lines(model)
-    receptance, solve = receptances(model, mean, both @ frequency, speed if gyroscopic else 0.0)
-    m = model.geometry.basic.shape[1]
-    coupling = _coupling(both, rest, m)
-    static = np.zeros(len(both) * m, complex)
-    static[:m] = model.geometry.basic.T @ solve(0, load)
-    x, residual = _solved(receptance, coupling, static)
-    if not residual < _RESIDUAL:
+    return load
+
+
+@dataclass(frozen=True)
+class _Solution:
+    equations: LineEquations
+    x: np.ndarray
+    residual: float
+    estimate: Estimate
+    rounds: int
+    solved: bool
+
+    @property
+    def lines(self) -> np.ndarray:
+        return self.equations.lines
+
+
+def _given(problem: LineProblem, orders, tolerance) -> _Solution:
+    lines = problem.codes.of(orders)
+    if not np.all(np.abs(orders) <= problem.codes.largest):
+        raise CaseError(
+            f"orders up to {np.abs(orders).max(axis=0).tolist()}", code="E-LINES", key="orders",
+            limit=f"{problem.codes.largest.tolist()}, one a base",
+        )  # fmt: skip
+    start = np.zeros((len(lines), problem.basic.shape[1]), complex)
+    return _solution(problem, lines, start, _GIVEN, tolerance, 1, feedback=True)
+
+
+def _searched(problem: LineProblem, tolerance, most: int) -> _Solution:
+    """Solve, estimate what is beyond, take in what matters, until what is left does not matter."""
+    lines = np.unique(np.multiply.outer(np.arange(_START + 1), problem.codes.stride))[:most]
+    x = np.zeros((len(lines), problem.basic.shape[1]), complex)
+    accuracy, finest, target, size = _SEARCH * tolerance, _FOUND * tolerance, tolerance, None
+    for rounds in range(1, _ROUNDS + 1):
+        fine, full = accuracy == finest, rounds > 1 and len(lines) == most
+        found = _solution(problem, lines, x, accuracy, tolerance, rounds, feedback=fine, size=size)
+        size = found.estimate.energy(problem)
+        left, fed_back = found.estimate.remainder.max(), found.estimate.feedback.max()
+        if fine and left <= tolerance and fed_back <= _FEEDBACK * tolerance:
+            break
+        # the neighbours were small enough, what they do is not
+        target *= _CLOSER if fine else 1.0
+        wider, x = refined(problem, lines, found.x, found.estimate, target, most)
+        stuck = full or np.array_equal(wider, lines) or rounds >= _ROUNDS - 1
+        if fine and stuck:
+            break
+        if stuck or left <= target:
+            accuracy, x = finest, found.x
+        else:
+            accuracy, lines = _SEARCH * tolerance, wider
+    return found
+
+
+def _solution(problem, lines, start, accuracy, tolerance, rounds, *, feedback, size=None) -> _Solution:
+    equations = line_equations(problem, lines)
+    static = np.zeros_like(start)
+    static[0] = problem.static
+    x, residual = equations.solve(static, start, accuracy, size=size)
+    if not residual <= _LOST * accuracy:
         raise ConvergenceError(
             f"the lines of the settled motion have a residual of {residual:.2g}", code="E-SINGULAR",
-            remedy="add damping, or change the speed",
+            limit=f"{accuracy:.1g}", remedy="add damping, or change the speed",
         )  # fmt: skip
-    forces = (coupling @ x).reshape(len(both), m)
-    lines = x.reshape(len(both), m)[: len(orders)].T.copy()
-    # two-sided to one-sided lines
-    lines[:, 1:] *= 2.0
-    q = [solve(l, (load if l == 0 else 0.0) - model.geometry.basic @ forces[l]) for l in range(len(orders))]
-    q = np.array(q).T
-    q[:, 1:] *= 2.0
-    return SettledMotion(model, orders, frequency, lines, q, residual, _tail(orders, lines))
+    found = estimate(equations, x, tolerance)
+    found = with_feedback(equations, found) if feedback else found
+    return _Solution(equations, x, residual, found, rounds, residual <= _ENOUGH * accuracy)
 
 
-def _tail(orders, lines) -> float:
-    top = np.abs(orders).max(axis=0)
-    border = np.any((np.abs(orders) == top) & (top > 2), axis=1)
-    size = np.abs(lines[:, 1:]).max(initial=0.0)
-    return float(np.abs(lines[:, border]).max(initial=0.0) / size) if size else 0.0
+def _displacements(problem: LineProblem, found: _Solution) -> np.ndarray:
+    """Two-sided lines (L, n) of all coordinates."""
+    forces = found.equations.table.forces(found.x)
+    q = -problem.response(found.lines, forces, np.eye(len(problem.basic)))
+    q[0] += problem.displaced
+    return q
 
 
-def stiffness_lines(model: DrivetrainModel):
-    """Two-sided lines {orders: (m, m)} of ``S k S^T`` less its mean, and the mean."""
-    geometry, n = model.geometry, len(model.bases)
-    total: dict[tuple, np.ndarray] = {}
-    for j, base in enumerate(model.mesh_base):
-        stage = geometry.stage[j]
-        half = model.stiffness[j].copy()
-        half[1:] *= 0.5
-        waves = [(h, half[h]) for h in range(len(half))] + [(-h, half[h].conj()) for h in range(1, len(half))]
-        for shift, direction in _direction_lines(model, j, stage):
-            for h, k in waves:
-                order = [0] * n
-                order[base] += h
-                if shift:
-                    order[2 * stage] += shift
-                key = tuple(order)
-                total[key] = total.get(key, 0.0) + k * direction
-    size = max(np.abs(t).max() for t in total.values())
-    total = {key: t for key, t in total.items() if np.abs(t).max() > 1e-15 * size}
-    mean = total.pop((0,) * n)
-    return total, mean.real
-
-
-def _direction_lines(model, j, stage):
-    """Lines of ``S_j S_j^T`` over the carrier's turn: (order, (m, m))."""
-    geometry = model.geometry
-    fixed = geometry.fixed[:, j]
-    if stage >= len(geometry.even):
-        return [(0, np.outer(fixed, fixed))]
-    even, odd = geometry.even[stage][:, j], geometry.odd[stage][:, j]
-    if not model.turning:
-        return [(0, np.outer(fixed + even, fixed + even))]
-    vectors = {0: fixed, 1: 0.5 * (even - 1j * odd), -1: 0.5 * (even + 1j * odd)}
-    lines: dict[int, np.ndarray] = {}
-    for (a, u), (b, v) in itertools.product(vectors.items(), vectors.items()):
-        lines[a + b] = lines.get(a + b, 0.0) + np.outer(u, v)
-    return list(lines.items())
-
-
-def receptances(model, mean, omega, speed):
-    """``U^T Z^-1 U`` (lines, m, m) with the mean stiffness, and a solver for one line."""
-    system, U = model.system, model.geometry.basic
-    K = system.K + U @ mean @ U.T
-    D = system.C + speed * system.gyroscopic
-    carried = system.M @ model.rigid
-    # no force of a mesh acts on the spin: any stiffness that holds its mean does
-    held = K + np.abs(K).max() / np.abs(carried).max() ** 2 * np.outer(carried, carried)
-    dynamic = K - omega[:, None, None] ** 2 * system.M + 1j * omega[:, None, None] * D
-    dynamic[omega == 0.0] = held
-    table = np.matmul(U.T, np.linalg.solve(dynamic, np.broadcast_to(U, (len(omega), *U.shape))))
-    return table, lambda line, force: np.linalg.solve(dynamic[line], force)
-
-
-def _coupling(orders, rest, m: int):
-    """The convolution with ``rest`` as a sparse matrix over lines and simple motions."""
-    from scipy import sparse
-
-    at = {tuple(order): number for number, order in enumerate(orders.tolist())}
-    rows, columns, values = [], [], []
-    for key, stiffness in rest.items():
-        i, j = np.nonzero(stiffness)
-        pairs = [(at.get(tuple(a + b for a, b in zip(order, key))), column) for order, column in at.items()]
-        row, column = np.array([pair for pair in pairs if pair[0] is not None], int).reshape(-1, 2).T
-        rows.append((row[:, None] * m + i).ravel())
-        columns.append((column[:, None] * m + j).ravel())
-        values.append(np.tile(stiffness[i, j], len(row)))
-    size = len(orders) * m
-    table = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    return sparse.coo_array(table, shape=(size, size)).tocsr()
-
-
-def _solved(receptance, coupling, static):
-    """Lines (2 L - 1, m) of ``x + F (rest * x) = static`` by one sparse factorisation, and the residual."""
-    from scipy import sparse
-    from scipy.sparse.linalg import splu
-
-    transfer = sparse.block_diag(list(receptance), format="csr")
-    matrix = (sparse.eye_array(static.size, format="csr") + transfer @ coupling).tocsc()
-    x = splu(matrix).solve(static)
-    return x, float(np.abs(matrix @ x - static).max() / np.abs(x).max())
+def _message(model, found: _Solution, converged: bool, tolerance, max_lines) -> str:
+    left, fed_back = found.estimate.remainder, found.estimate.feedback
+    worst = int(np.argmax(np.maximum(left, fed_back / _FEEDBACK)))
+    text = f"{len(found.lines)} lines leave out {left[worst]:.2g} of the alternating force of "
+    text += f"{model.meshes[worst]}, which changes the rest by {fed_back[worst]:.2g}"
+    if converged:
+        return text
+    if not found.solved:
+        return f"{text}; GMRES stopped at a residual of {found.residual:.2g}"
+    why = f"max_lines is {max_lines}" if len(found.lines) >= max_lines else f"after {found.rounds} rounds"
+    return f"{text}; the tolerance is {tolerance:g}, {why}"

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from femgear.casefile import drivetrain as sections
 from femgear.casefile.drivetrain import DrivetrainCase
+from femgear.casefile.drivetrain_checks import record_problems
+from femgear.casefile.units import FREQUENCY, SPEED
 from femgear.errors import CaseError
 from femgear.models.drivetrain import DrivetrainModel, drivetrain_model
 from femgear.models.drivetrain_data import (
@@ -20,13 +23,21 @@ from femgear.models.drivetrain_data import (
     ParallelStage,
     PlanetaryStage,
 )
+from femgear.models.drivetrain_mechanism import loose_motions
+from femgear.models.drivetrain_rates import (
+    GOOD_STEPS,
+    LEAST_STEPS,
+    SpeedRange,
+    default_record_rate,
+    highest_mesh,
+    speed_range,
+)
 from femgear.models.drivetrain_torque import TorqueHistory
 from femgear.models.drivetrain_torsional import torsional_model
 from femgear.models.shaft import ShaftSection
+from femgear.solvers.series import FourierSeries
 
 BENDING, TORSIONAL = "with bending", "torsional"
-# Natural frequencies below this share of the largest belong to motions that nothing holds.
-_FREE = 1e-7
 
 
 def drivetrain_of(case: DrivetrainCase) -> Drivetrain:
@@ -69,9 +80,7 @@ def _wave(one: sections.MeshSection) -> MeshWave:
 
 def _bearing(one: sections.BearingSection) -> ChainBearing:
     place = one.shaft or (one.body, None)
-    return ChainBearing(
-        place[0], one.radial, one.tilt, one.offset, one.torsion, other=place[1], station=one.station or 0
-    )
+    return ChainBearing(place[0], one.radial, one.tilt, one.offset, other=place[1], station=one.station or 0)
 
 
 def _parallel(one: sections.ParallelSection) -> ParallelStage:
@@ -144,10 +153,35 @@ def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
     try:
         return build(drivetrain_of(case), **options)
     except CaseError as error:
-        if error.code == "E-TURNING":
-            error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
-        error.file = case.location(error.key or "")
-        raise
+        raise _located(error, case) from None
+
+
+def _located(error: CaseError, case: DrivetrainCase) -> CaseError:
+    """The error of a model in terms of the case file."""
+    if error.code == "E-TURNING":
+        error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
+    error.file = case.location(error.key or "")
+    return error
+
+
+def case_speeds(case: DrivetrainCase, model: DrivetrainModel) -> SpeedRange:
+    """Speeds of the first body over the run, without its deviation."""
+    torques = torque_histories(case, model.ratio)
+    return speed_range(model, torques, duration=case.simulation.duration, speed=case.operation.speed)
+
+
+def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:
+    """Steps a record: as given, or what the highest mesh frequency of the run asks for."""
+    s = case.simulation
+    record = s.record
+    if record is None:
+        record = default_record_rate(s.rate, highest_mesh(model, case_speeds(case, model).fastest)[1])
+    return max(1, round(s.rate / record))
+
+
+def record_rate(case: DrivetrainCase, model: DrivetrainModel) -> float:
+    """Records a second [Hz]; see `record_every`."""
+    return case.simulation.rate / record_every(case, model)
 
 
 def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
@@ -156,24 +190,101 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
     Raises
     ------
     CaseError
-        As `case_model`; bodies that nothing holds across their axis or against tilting (E-MECHANISM).
+        As `case_model`; bodies that nothing holds across their axis or against tilting (E-MECHANISM);
+        natural frequencies too far apart for double precision (E-SPREAD); steps that cannot follow the
+        meshes (E-RATE); records that the spectra cannot use (E-RANGE).
     """
-    from femgear.solvers.modal import solve_modes
-
-    model = case_model(case)
-    modes = solve_modes(model.still, model.mean_stiffness)
-    free = np.flatnonzero(modes.frequency < _FREE * modes.frequency.max())
-    # the free spin is one of them
-    if len(modes.frequency) > 1 and len(free) > 1:
-        size = np.abs(modes.shape[:, free]).max(axis=1) * np.sqrt(np.diag(model.system.M))
-        names = [name for name in model.system.dofs if not name.endswith("rotation")]
-        names.sort(key=lambda name: -size[model.index(name)])
+    try:
+        count, names = loose_motions(drivetrain_of(case), turning=case.simulation.turning)
+    except CaseError as error:
+        raise _located(error, case) from None
+    if count:
         raise CaseError(
-            f"nothing holds {len(free) - 1} motions, such as {', '.join(names[:3])}",
-            code="E-MECHANISM",
-            key="bearing",
+            f"nothing holds {count} motion{'s' if count > 1 else ''}, such as {', '.join(names[:3])}",
+            code="E-MECHANISM", key="bearing", file=case.location("bearing"),
             limit="bearings and shafts that leave the common rotation alone free",
             remedy="add a [[bearing]] or its stiffness, or tilts = false",
-            file=case.location("bearing"),
-        )
+        )  # fmt: skip
+    _check_spread(case)
+    model = case_model(case)
+    _check_stiffness(case, model)
+    _check_rate(case, model)
+    if case.simulation.record is None:
+        for problem in record_problems(case, record_rate(case, model)):
+            problem.file = case.location(problem.key)
+            raise problem
     return model
+
+
+def _check_spread(case: DrivetrainCase) -> None:
+    """Refuse slow motions that rounding hides beside the free spin."""
+    from scipy import linalg
+
+    model = drivetrain_model(replace(drivetrain_of(case), damping_ratio=0.0), turning=case.simulation.turning)
+    n, mass = len(model.rigid), model.system.M
+    stiffness = model.system.K + (model.system.W * model.mean_stiffness) @ model.system.W.T
+    values = linalg.eigvalsh(stiffness, mass)
+    # what femgear.solvers.modal takes for rigid: a share of a norm, which is up to sqrt(n) above the largest
+    share = math.sqrt(n) * max(1e-12, 10.0 * n * np.finfo(float).eps)
+    if n == 1 or values[1] > share * values[-1]:
+        return
+    own = np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2.0 * math.pi)
+    fast = int(np.argmax(own))
+    slow = linalg.eigh(stiffness, mass, subset_by_index=(0, 1))[1]
+    slow = slow - np.outer(model.rigid, model.rigid @ mass @ slow) / model.inertia
+    energy = np.abs(slow * (mass @ slow)).max(axis=1)
+    first, second = (model.system.dofs[i] for i in (fast, int(np.argmax(energy))))
+    names, factor = [body.name for body in case.body], f"a factor of {1.0 / math.sqrt(share):.1g}"
+    members = [name.split(":")[0] for name in (first, second)]
+    key = f"body[{names.index(members[0])}]" if members[0] in names else "shaft"
+    raise CaseError(
+        f"natural frequencies are too far apart for double precision: {first} by itself has {own[fast]:.3g} "
+        f"Hz, and {second} moves slower by more than {factor}",
+        code="E-SPREAD", key=key, file=case.location(key), limit=f"frequencies within {factor}",
+        remedy=f"give {members[0]} more mass or inertia or rigid springs, or stiffen what holds {members[1]}",
+    )  # fmt: skip
+
+
+def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
+    """Refuse meshes whose cut series turns negative: no real mesh pushes the other way."""
+    if not len(model.meshes):
+        return
+    phase = 2.0 * math.pi * np.arange(4096)[:, None] / 4096
+    least = np.array(FourierSeries(model.stiffness).at(phase)).min(axis=0)
+    wrong = np.flatnonzero(least <= 0.0)
+    if not len(wrong):
+        return
+    keys = []
+    for i, one in enumerate(model.train.planetary):
+        for which in ("sun_mesh", "ring_mesh"):
+            keys += [f"planetary[{i}].{which}.low_share"] * len(one.planet_angles)
+    keys += [f"parallel[{i}].mesh.low_share" for i in range(len(model.train.parallel))]
+    key = keys[wrong[0]]
+    raise CaseError(
+        f"the series of the stiffness of {model.meshes[wrong[0]]} falls to {least[wrong[0]]:.3g} N/m: with "
+        f"{case.simulation.harmonics} terms it overshoots the jump by about 9 %",
+        code="E-STIFFNESS", key=key, file=case.location(key), limit="above 0 N/m at any time",
+        remedy="give a larger low_share",
+    )  # fmt: skip
+
+
+def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
+    speeds, rate = case_speeds(case, model), case.simulation.rate
+    name, hertz = highest_mesh(model, speeds.fastest)
+    if rate >= LEAST_STEPS * hertz:
+        return
+    first = case.body[0].name
+    good = FREQUENCY.show(GOOD_STEPS * hertz)
+    key, value, remedy = "simulation.rate", FREQUENCY.show(rate), f"take {good} or more"
+    if LEAST_STEPS * hertz > sections.FASTEST_RATE:
+        remedy = "take a lower speed, or fewer teeth: no simulation.rate is fast enough"
+    if speeds.fastest > 1.01 * speeds.first:
+        key, value = "operation.torque", None
+        remedy = f"give torques that balance (share = 1.0), a shorter duration, or a rate of {good}"
+    raise CaseError(
+        f"{rate / hertz:.3g} steps a period ({FREQUENCY.show(rate)}) cannot follow the {name}, "
+        f"{FREQUENCY.show(hertz)} at {SPEED.show(speeds.fastest)} of {first}",
+        code="E-RATE", key=key, value=value, file=case.location(key),
+        limit=f"{LEAST_STEPS} steps a period at any time: {FREQUENCY.show(LEAST_STEPS * hertz)} or more",
+        remedy=remedy,
+    )  # fmt: skip

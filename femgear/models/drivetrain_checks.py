@@ -5,7 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 
+import numpy as np
+
 from femgear.errors import CaseError
+
+# Stiffness against the spin, over that of the rotations, that is rounding.
+_FREE = 1e-9
 
 
 def check_numbers(name: str, data, *, positive, least) -> None:
@@ -17,6 +22,17 @@ def check_numbers(name: str, data, *, positive, least) -> None:
                 f"{key} of {name} is {value}", code="E-DRIVETRAIN", key=key,
                 limit="finite, above 0" if key in positive else "finite, 0 or more",
             )  # fmt: skip
+
+
+def check_free_spin(model) -> None:
+    """Refuse a chain that turns in bearings with a torsion spring, which would not see the spin."""
+    K, rigid = model.system.K, model.rigid
+    if np.any(np.abs(K @ rigid) > _FREE * (np.abs(K) @ np.abs(rigid)).max(initial=0.0)):
+        raise CaseError(
+            "a bearing holds the rotation of a chain that turns", code="E-BEARING", key="bearing.torsion",
+            limit="no torsion stiffness against the housing",
+            remedy="leave it out; a torque on the body takes its place",
+        )  # fmt: skip
 
 
 def check_train(train) -> None:

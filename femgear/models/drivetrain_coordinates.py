@@ -176,4 +176,8 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
         )  # fmt: skip
     spin = np.zeros(place.count)
     spin[rotations] = vectors[-1] / vectors[-1, rotations.index(turn[train.bodies[0].name])]
+    for stage, planets in zip(train.planetary, place.planets):
+        if math.isfinite(stage.planet_bearing):
+            # planets that are not fixed to their pins have tangential coordinates of their own
+            spin[planets[:, 1]] = stage.centre_distance * spin[turn[stage.carrier]]
     return spin

@@ -268,7 +268,7 @@ class ChainBearing:
     offset : float
         Place along z from the centre of the body [m].
     torsion : float
-        Against rotation [N m/rad].
+        Against rotation [N m/rad], for modes alone: `march_drivetrain` and `settled_motion` refuse it.
     other : str, optional
         Second body of the shaft.
     station : int

@@ -109,9 +109,7 @@ def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.nda
     Planets fixed to their pins follow the carrier, at its angle zero.
     """
     train = model.train
-    place = coordinates_of(train)
-    T, _ = free_coordinates(train, place)
-    full = T @ np.asarray(shape, float)
+    place, full = _all_coordinates(model, shape)
     move, turn = np.zeros((2, len(layout.names), 3))
     for row, body in enumerate(train.bodies):
         x, y, *turns = full[place.body[body.name] : place.body[body.name] + 5]
@@ -125,3 +123,83 @@ def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.nda
             turn[row] = *turn[at][:2], full[planet[2]]
             row += 1
     return move, turn
+
+
+def shaft_lines(
+    model: DrivetrainModel, layout: Layout, shape, *, points: int = 8
+) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """Centre lines of the shafts under a motion: places at rest and displacements, (k, 3) each.
+
+    A joint has two straight links, which part where it shears. A beam passes through its stations, between
+    them by the shape functions of its elements.
+
+    Parameters
+    ----------
+    model : DrivetrainModel
+    layout : Layout
+        Of ``model.train``.
+    shape : (n_free,) array
+        Motion of the free coordinates.
+    points : int
+        Pieces of an element of a beam.
+
+    Returns
+    -------
+    tuple of (rest, displacement)
+        In the order of the shafts of the chain [m].
+    """
+    place, full = _all_coordinates(model, shape)
+    found = []
+    for shaft, inner, ends in zip(model.train.shafts, place.inner, layout.shafts):
+        first = np.array([place.body[shaft.first], *inner, place.body[shaft.second]])
+        stations = full[first[:, None] + np.arange(5)]
+        share, across = _beam_line(shaft, stations, points) if shaft.elements else _links(shaft, stations)
+        one, two = layout.centre[list(ends)]
+        rest = one + share[:, None] * (two - one)
+        found.append((rest, np.column_stack([across, np.zeros(len(share))])))
+    return tuple(found)
+
+
+def _all_coordinates(model: DrivetrainModel, shape):
+    """Places of all coordinates, and their values (n,) under a motion of the free ones."""
+    place = coordinates_of(model.train)
+    T, _ = free_coordinates(model.train, place)
+    return place, T @ np.asarray(shape, float)
+
+
+def _links(shaft, stations) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the length (4,) and displacements (4, 2) of two rigid links with a joint between."""
+    arm = 0.5 * shaft.length * np.array([stations[0], -stations[1]])
+    middle = stations[:, :2] + np.column_stack([arm[:, 3], -arm[:, 2]])
+    return np.array([0.0, 0.5, 0.5, 1.0]), np.array([stations[0, :2], *middle, stations[1, :2]])
+
+
+def _beam_line(shaft, stations, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the length (k,) and displacements (k, 2) of a beam through its stations (n + 1, 5)."""
+    count, length = shaft.elements, shaft.length / shaft.elements
+    share = np.linspace(0.0, 1.0, count * points + 1)
+    element = np.minimum(np.arange(len(share)) // points, count - 1)
+    N = beam_shape(share * count - element, length, shaft.section.shear_ratio(length))
+    # a tilt about y is the slope of x, one about x minus that of y
+    ends = np.stack([stations[element], stations[element + 1]], axis=1)
+    x = np.einsum("kn,kn->k", N, ends[:, :, [0, 3]].reshape(-1, 4))
+    y = np.einsum("kn,kn->k", N, (ends[:, :, [1, 2]] * np.array([1.0, -1.0])).reshape(-1, 4))
+    return share, np.column_stack([x, y])
+
+
+def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
+    """Deflection (k, 4) of a Timoshenko element per unit of (w, slope) at its first and second end.
+
+    Exact for an element without load; ``xi`` (k,) runs from 0 to 1, ``slope`` is the turn of the section.
+    These are the functions behind the consistent mass of `femgear.models.shaft.beam_element`
+    (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 11.3; Z. Friedman and
+    J. B. Kosmatka, Comput. Struct. 47, 1993, 473-481).
+    """
+    xi, phi = np.asarray(xi, float), shear_ratio
+    rest = 1.0 - xi
+    return np.stack([
+        1.0 - 3.0 * xi**2 + 2.0 * xi**3 + phi * rest,
+        length * (xi * rest**2 + 0.5 * phi * xi * rest),
+        3.0 * xi**2 - 2.0 * xi**3 + phi * xi,
+        -length * (xi**2 * rest + 0.5 * phi * xi * rest),
+    ], axis=-1) / (1.0 + phi)  # fmt: skip

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from femgear.models.drivetrain_meshes import mesh_force
+
 # The pass band ends at this share of half the record rate, where the stop band begins.
 PASS_BAND = 0.8
 # Attenuation of the stop band [dB].
@@ -78,8 +80,9 @@ class Decimator:
 class Record:
     """What a run keeps: coordinates, meshes, spin."""
 
-    def __init__(self, model, count: int, every: int, at, *, lowpass: bool):
+    def __init__(self, model, count: int, every: int, at, *, lowpass: bool, contact_loss: bool):
         self.every, self.at, self.basic = every, at, model.geometry.basic
+        self.backlash, self.separates = model.backlash, contact_loss
         rows, meshes = count // every + 1, len(model.meshes)
         widths = [len(at), len(at), meshes, meshes, 1, 1]
         self.cuts = np.cumsum(widths)[:-1]
@@ -87,36 +90,35 @@ class Record:
         self.decimator = Decimator(every, count) if lowpass and every > 1 else None
         self.filled, self.steps = 0, 0
         self.extremes = np.array([np.full(meshes, np.inf), np.full(meshes, -np.inf)])
-        self.pulled = np.zeros(meshes)
+        self.pulled, self.lost = np.zeros((2, meshes))
 
     def take(self, first: int, number: int, states, block) -> None:
         """Rows of a block of `number` steps; that of its start comes with the first block alone."""
         begin = min(first, 1)
-        force = self._forces(np.arange(begin, number + 1), states, block)[1]
-        self.extremes[0] = np.minimum(self.extremes[0], force.min(axis=0, initial=np.inf))
-        self.extremes[1] = np.maximum(self.extremes[1], force.max(axis=0, initial=-np.inf))
-        self.pulled += np.count_nonzero(force < 0.0, axis=0)
-        self.steps += len(force)
+        approach = np.einsum("tmj,tm->tj", block.selection, states[:, : len(self.basic)] @ self.basic)
+        force, _ = mesh_force(approach, block.stiffness, self.backlash, separates=self.separates)
+        self._count(approach[begin:], force[begin:])
         if self.decimator is None:
             at = (-first % self.every) or self.every if first else 0
-            new = self._rows(np.arange(at, number + 1, self.every), states, block)
+            kept = slice(at, None, self.every)
         else:
-            new = self.decimator.push(self._rows(np.arange(begin, number + 1), states, block))
+            kept = slice(begin, None)
+        n = len(self.basic)
+        motion, velocity = states[kept, :n][:, self.at], states[kept, n : 2 * n][:, self.at]
+        spin = block.angle[kept, None], block.speed[kept, None]
+        new = np.hstack([motion, velocity, approach[kept], force[kept], *spin])
+        if self.decimator is not None:
+            new = self.decimator.push(new)
         self.table[self.filled : self.filled + len(new)] = new
         self.filled += len(new)
 
-    def _forces(self, steps, states, block) -> tuple[np.ndarray, np.ndarray]:
-        """Approaches and forces (n, n_meshes)."""
-        approach = np.einsum(
-            "tmj,tm->tj", block.selection[steps], states[steps, : len(self.basic)] @ self.basic
-        )
-        return approach, block.stiffness[steps] * approach
-
-    def _rows(self, steps, states, block) -> np.ndarray:
-        n = len(self.basic)
-        motion, velocity = states[steps, :n][:, self.at], states[steps, n : 2 * n][:, self.at]
-        spin = block.angle[steps, None], block.speed[steps, None]
-        return np.hstack([motion, velocity, *self._forces(steps, states, block), *spin])
+    def _count(self, approach, force) -> None:
+        self.extremes[0] = np.minimum(self.extremes[0], force.min(axis=0, initial=np.inf))
+        self.extremes[1] = np.maximum(self.extremes[1], force.max(axis=0, initial=-np.inf))
+        self.pulled += np.count_nonzero(force < 0.0, axis=0)
+        if self.separates:
+            self.lost += np.count_nonzero((approach < 0.0) & (approach > -self.backlash), axis=0)
+        self.steps += len(force)
 
     def columns(self) -> tuple[np.ndarray, ...]:
         """Motion, velocity, approach, force (n, c each), spin angle and speed (n,)."""

@@ -6,7 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from femgear.plots.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure
+from femgear.plots.drivetrain_panels import (
+    draw_over_time,
+    draw_spectrum,
+    drawable,
+    finished,
+    name_lines,
+    panels,
+    show_changes,
+)
+from femgear.plots.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
 
 
 def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, title: str = ""):
@@ -23,66 +32,88 @@ def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, 
     -------
     Figure
     """
-    figure, axes = new_figure(rows=1, columns=len(curves), width=4.2 * len(curves), height=3.8)
-    for number, (ax, (text, values), (_, wave)) in enumerate(zip(axes, curves, steps)):
-        scale, unit = (1e-9, "GN/m") if np.max(values) > 5e8 else (1e-6, "MN/m")
+    figure, axes = panels(
+        [text for text, _ in curves], columns=len(curves), width=3.1, height=2.4, x="mesh period [1]",
+        y=[f"stiffness [{_unit(values)[1]}]" for _, values in curves], title=title,
+    )  # fmt: skip
+    for number, (ax, (_, values), (_, wave)) in enumerate(zip(axes, curves, steps)):
+        scale, colour = _unit(values)[0], COLOURS[number % len(COLOURS)]
         ax.plot(phase, scale * np.asarray(wave), color=GREY, linewidth=1.4, label="rectangular")
-        ax.plot(phase, scale * np.asarray(values), color=COLOURS[number], label="series")
+        ax.plot(phase, scale * np.asarray(values), color=colour, label="series")
         ax.set_xlim(phase[0], phase[-1])
-        label(ax, "mesh period [1]", f"stiffness [{unit}]", text)
-    if title:
-        figure.suptitle(title, fontsize=SIZE)
-    legend_below(figure)
-    return figure
+    return finished(figure)
 
 
-def over_time(time, panels: Sequence[tuple], *, unit: str, factor: float = 1.0, columns: int = 1):
-    """Signals of several runs over time, one panel each.
+def _unit(values) -> tuple[float, str]:
+    return (1e-9, "GN/m") if np.max(values) > 5e8 else (1e-6, "MN/m")
+
+
+def over_time(
+    time,
+    signals: Sequence[tuple],
+    *,
+    unit: str,
+    factor: float = 1.0,
+    columns: int = 1,
+    title: str = "",
+    zero: bool = True,
+):
+    """Signals of several runs over time, one panel each; the first run stands in front.
+
+    Where there are many more instants than pixels, the band between the least and the largest value of every
+    column of pixels is drawn.
 
     Parameters
     ----------
     time : (n,) array
         [s]
-    panels : sequence of (title, curves)
+    signals : sequence of (title, curves)
         With curves a sequence of (text, values (n,)).
     unit : str
         After the factor, with the quantity.
     columns : int
+    title : str
+        Above all panels.
+    zero : bool
+        Draw zero; False shows changes of what is far from it.
 
     Returns
     -------
     Figure
     """
-    rows = -(-len(panels) // columns)
-    figure, axes = new_figure(rows=rows, columns=columns, width=5.2 * columns + 3.0, height=2.2 * rows + 0.8)
-    for number, (ax, (title, curves)) in enumerate(zip(axes, panels)):
-        for index, (text, values) in enumerate(curves):
-            ax.plot(time, factor * np.asarray(values), color=COLOURS[index], linewidth=0.8, label=text)
-        ax.axhline(0.0, color=GREY, linewidth=0.8)
+    figure, axes = panels(
+        [text for text, _ in signals], columns=columns, width=7.0 if columns == 1 else 5.2, x="time [s]",
+        y=[unit] * len(signals), title=title,
+    )  # fmt: skip
+    time = np.asarray(time)
+    for ax, (_, curves) in zip(axes, signals):
+        for index, (name, values) in enumerate(curves):
+            draw_over_time(ax, time, factor * drawable(values), index, name)
         ax.set_xlim(time[0], time[-1])
-        label(ax, "time [s]" if number >= len(panels) - columns else "", unit, title)
-    for ax in axes[len(panels) :]:
-        ax.set_visible(False)
-    legend_below(figure)
-    return figure
+        if zero:
+            ax.axhline(0.0, color=GREY, linewidth=0.8)
+        else:
+            show_changes(ax)
+    return finished(figure)
 
 
 def spectra(
     frequency,
-    panels: Sequence[tuple],
+    signals: Sequence[tuple],
     *,
     lines: Sequence[tuple] = (),
     unit: str,
     factor: float = 1.0,
     x: str = "",
+    title: str = "",
 ):
-    """Amplitude spectra of several runs, one panel each, with named lines.
+    """Amplitude spectra of several runs, one panel each, with named lines; the first run stands in front.
 
     Parameters
     ----------
     frequency : (F,) array
         [Hz] or orders.
-    panels : sequence of (title, curves)
+    signals : sequence of (title, curves)
         With curves a sequence of (text, amplitude (F,)).
     lines : sequence of (text, frequency)
         Marked above the first panel and drawn through all.
@@ -90,34 +121,26 @@ def spectra(
     factor : float
     x : str
         Label of the abscissa, the frequency when not given.
+    title : str
+        Above all panels.
 
     Returns
     -------
     Figure
     """
-    figure, axes = new_figure(rows=len(panels), width=9.5, height=2.3 * len(panels) + 1.2, sharex=True)
-    for ax, (title, curves) in zip(axes, panels):
-        for index, (text, values) in enumerate(curves):
-            ax.semilogy(
-                frequency, factor * np.asarray(values), linewidth=0.9, color=COLOURS[index], label=text
-            )
-        top = max(factor * np.max(values) for _, values in curves)
-        ax.set_ylim(1e-5 * top, 2.0 * top)
-        ax.set_xlim(frequency[0], frequency[-1])
+    frequency = np.asarray(frequency)
+    lines = [(text, at) for text, at in lines if frequency[0] <= at <= frequency[-1]]
+    figure, axes = panels(
+        [text for text, _ in signals], width=8.3, x=x or "frequency [Hz]", y=[unit] * len(signals),
+        title=title, named=bool(lines),
+    )  # fmt: skip
+    for ax, (_, curves) in zip(axes, signals):
+        draw_spectrum(ax, frequency, [(name, factor * drawable(values)) for name, values in curves])
         for _, at in lines:
             ax.axvline(at, color=GREY, linewidth=0.7, linestyle=":")
-        label(ax, y=unit, title=title)
-    for text, at in lines:
-        if frequency[0] <= at <= frequency[-1]:
-            axes[0].text(
-                at, 1.02, text, transform=axes[0].get_xaxis_transform(), rotation=90, fontsize=SIZE - 3,
-                ha="center", va="bottom",
-            )  # fmt: skip
-    if lines:
-        axes[0].set_title(panels[0][0], fontsize=SIZE, loc="left", pad=34)
-    label(axes[-1], x or "frequency [Hz]")
-    legend_below(figure)
-    return figure
+    axes[0].set_xlim(frequency[0], frequency[-1])
+    name_lines(axes[0], lines, float(np.ptp(frequency)))
+    return finished(figure)
 
 
 def sensitivity(names: Sequence[str], quantities: Sequence[tuple], *, title: str = ""):
@@ -153,7 +176,7 @@ def sensitivity(names: Sequence[str], quantities: Sequence[tuple], *, title: str
 
 
 def backlash_forces(time, curves: Sequence[tuple], *, title: str = ""):
-    """Mesh force over a short time with and without contact loss.
+    """Mesh force over a short time with and without contact loss; the first run stands in front.
 
     Parameters
     ----------
@@ -165,11 +188,4 @@ def backlash_forces(time, curves: Sequence[tuple], *, title: str = ""):
     -------
     Figure
     """
-    figure, (ax,) = new_figure(width=9.0, height=3.8)
-    for number, (text, force) in enumerate(curves):
-        ax.plot(time, 1e-3 * np.asarray(force), linewidth=1.2, label=text, **line_style(number))
-    ax.axhline(0.0, color=GREY, linewidth=0.8)
-    ax.set_xlim(time[0], time[-1])
-    label(ax, "time [s]", "mesh force [kN]", title)
-    legend_below(figure)
-    return figure
+    return over_time(time, [(title, curves)], unit="mesh force [kN]", factor=1e-3)

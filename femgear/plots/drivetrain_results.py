@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.models.drivetrain_record import PASS_BAND
 from femgear.plots.drivetrain import over_time, spectra, stiffness_series
 from femgear.plots.frequency import campbell
 
@@ -17,8 +18,11 @@ if TYPE_CHECKING:
 
 RPM = np.pi / 30.0
 _MOST_PANELS = 6
-# Reach of spectra over the highest mesh line, of side bands in turns or planetary mesh lines.
-_REACH, _TURNS, _BESIDE = 2.4, 8.0, 1.3
+# Harmonics of the mesh lines that are marked, and how far beyond the last of the highest line spectra reach.
+_HARMONICS = 3
+_REACH = 1.04 * _HARMONICS
+# Reach of side bands in turns or planetary mesh lines.
+_TURNS, _BESIDE = 8.0, 1.3
 # Fewer lines are no picture of side bands.
 _LEAST_LINES = 24
 _PLANET = re.compile(r"(?:^|-)planet (\d+)(?:-ring of |$)")
@@ -47,7 +51,7 @@ def stiffness_figure(model: DrivetrainModel):
         low, high, share = stiffness_levels(wave)
         inside = (phase + wave.phase + 0.5 * share) % 1.0 < share
         steps.append((text, np.where(inside, high, low)))
-    return stiffness_series(phase, curves, steps, title=f"{model.stiffness.shape[1] - 1} terms")
+    return stiffness_series(phase, curves, steps, title=f"series of {model.stiffness.shape[1] - 1} terms")
 
 
 def campbell_figure(modes: xr.Dataset):
@@ -75,35 +79,59 @@ def chosen_meshes(data: xr.Dataset) -> list[int]:
 
 def transient_figures(data: xr.Dataset) -> dict:
     """Speeds, deviations and mesh forces over time, by name."""
-    time = data["time"].values
-    variants = [str(name) for name in data["variant"].values]
-    bodies = [str(name) for name in data["body"].values]
-    ends = sorted({0, len(bodies) - 1})
-
-    def panels(name: str, places, titles):
-        values = data[name].values
-        return [
-            (title, [(text, values[v, :, i]) for v, text in enumerate(variants)])
-            for i, title in zip(places, titles)
-        ]
-
+    bodies, names = ([str(name) for name in data[key].values] for key in ("body", "mesh"))
+    ends, meshes = sorted({0, len(bodies) - 1}), chosen_meshes(data)
     shown = [i for i in range(len(bodies)) if i][-_MOST_PANELS:] or [0]
-    meshes = chosen_meshes(data)
+    passed = _pass_band(data)
+    turned = [f"{bodies[i]}: rotation less the free spin" for i in shown]
     figures = {
-        "transient_speeds": over_time(
-            time, panels("speed", ends, [bodies[i] for i in ends]), unit="speed [rpm]", factor=1.0 / RPM
+        "transient_speeds": _signals(
+            data,
+            "speed",
+            ends,
+            [bodies[i] for i in ends],
+            unit="speed [rpm]",
+            factor=1.0 / RPM,
+            title=passed,
+            zero=False,
         ),
-        "transient_deviations": over_time(
-            time, panels("deviation", shown, [f"{bodies[i]}: rotation less the free spin" for i in shown]),
-            unit="deviation [mrad]", factor=1e3,
+        "transient_deviations": _signals(
+            data, "deviation", shown, turned, unit="deviation [mrad]", factor=1e3, title=passed
         ),
-    }  # fmt: skip
+    }
     if meshes:
-        names = [str(data["mesh"].values[i]) for i in meshes]
-        figures["transient_forces"] = over_time(
-            time, panels("mesh_force", meshes, names), unit="force [kN]", factor=1e-3
-        )
+        contact = "linear meshes keep contact"
+        if separates(data):
+            contact = f"meshes part, for up to {float(data['lost'].max()):.2%} of the time"
+        notes = (contact, passed, passed and "least and largest force of all steps in the table")
+        figures["transient_forces"] = _signals(
+            data, "mesh_force", meshes, [names[i] for i in meshes], unit="force [kN]", factor=1e-3,
+            title="; ".join(filter(None, notes)),
+        )  # fmt: skip
     return figures
+
+
+def _signals(data: xr.Dataset, name: str, columns, titles, **options):
+    """Columns of a variable over time, those of all variants in one panel."""
+    values, variants = data[name].values, [str(text) for text in data["variant"].values]
+    panels = [
+        (title, [(text, values[v, :, i]) for v, text in enumerate(variants)])
+        for i, title in zip(columns, titles)
+    ]
+    return over_time(data["time"].values, panels, **options)
+
+
+def _pass_band(data: xr.Dataset) -> str:
+    """What the low pass of the records of transient.nc leaves."""
+    attrs = data.attrs
+    if attrs["filter"] == "none":
+        return ""
+    return f"low-passed to {0.5 * PASS_BAND / (attrs['step'] * attrs['every']):.4g} Hz"
+
+
+def separates(data: xr.Dataset) -> bool:
+    """Whether the meshes of transient.nc part and meet their back flanks."""
+    return data.attrs.get("contact") == "separating"
 
 
 def symbols(data: xr.Dataset) -> list[str]:
@@ -118,29 +146,56 @@ def symbols(data: xr.Dataset) -> list[str]:
     return found
 
 
-def spectrum_figures(data: xr.Dataset) -> dict:
-    """Spectra over frequency, and side bands over orders, by name; none without meshes."""
+def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> dict:
+    """Spectra over frequency, and side bands over orders, by name; none without meshes.
+
+    Parameters
+    ----------
+    data : Dataset
+        spectrum.nc
+    transient : Dataset, optional
+        transient.nc, for the speeds between which the spectra were taken.
+    """
     meshes = chosen_meshes(data)
     if not meshes:
         return {}
     lines = _mesh_lines(data)
     frequency, hertz = data["frequency"].values, data["line_frequency"].values
-    top = min(frequency[-1], _REACH * max(hertz[line] for line in lines.values()))
+    top = min(PASS_BAND * frequency[-1], _REACH * max(hertz[line] for line in lines.values()))
     low = frequency <= top
     bases, short = [str(name).removesuffix(" mesh") for name in data["base"].values], symbols(data)
-    marks = [(short[base], hertz[line]) for base, line in lines.items()]
+    marks = [
+        (short[base] if h == 1 else f"{h} {short[base]}", h * hertz[line])
+        for base, line in lines.items()
+        for h in range(1, _HARMONICS + 1)
+    ]
     (title, curves), *others = _panels(data, "amplitude", meshes, low)
     title += f"      ({', '.join(f'{short[base]}: {bases[base]}' for base in lines)})"
+    from_to, changes = _speeds(data, transient)
     figures = {
         "mesh_force_spectrum": spectra(
-            frequency[low], [(title, curves), *others], lines=_apart(marks, top),
-            unit="force [kN]", factor=1e-3,
+            frequency[low], [(title, curves), *others], lines=marks, unit="force [kN]", factor=1e-3,
+            title=f"{from_to}: lines smear over frequency, not over orders" if changes else from_to,
         )
     }  # fmt: skip
     for base in lines:
-        if (figure := _side_bands(data, base, lines)) is not None:
+        if (figure := _side_bands(data, base, lines, from_to)) is not None:
             figures[f"side_bands_{bases[base].replace(' ', '_')}"] = figure
     return figures
+
+
+def _speeds(data: xr.Dataset, transient: xr.Dataset | None) -> tuple[str, bool]:
+    """Speeds of the first body in the spectra, and whether its change shifts a mesh line by a line."""
+    settle, mean = float(data.attrs["settle"]), float(data.attrs["speed"])
+    if transient is None or "spin" not in transient:
+        return f"after {settle:g} s, mean speed {mean / RPM:.4g} rpm", False
+    time, spin = transient["time"].values, transient["spin"].values[0]
+    speed = np.gradient(spin, time, edge_order=2)[time >= settle]
+    body, low, high = str(transient["body"].values[0]), speed.min(), speed.max()
+    hertz = data["line_frequency"].values[list(_mesh_lines(data).values())].max(initial=0.0)
+    if hertz * (high - low) / mean < float(data.attrs["resolution"]):
+        return f"after {settle:g} s, {body} at {mean / RPM:.4g} rpm", False
+    return f"after {settle:g} s, {body} from {low / RPM:.4g} to {high / RPM:.4g} rpm", True
 
 
 def _mesh_lines(data) -> dict[int, int]:
@@ -161,7 +216,7 @@ def _panels(data, name: str, meshes, kept):
     ]
 
 
-def _side_bands(data, base: int, lines):
+def _side_bands(data, base: int, lines, title: str):
     """Orders around a mesh line: turns of its own carrier, or mesh lines of the first planetary stage."""
     planetary = int(data.attrs["planetary_stages"])
     if not planetary:
@@ -183,14 +238,5 @@ def _side_bands(data, base: int, lines):
     return spectra(
         all_orders[near], _panels(data, "order_amplitude", [mesh], near),
         lines=[mark for mark in marks if abs(mark[1] - centre) <= width], unit="force [kN]", factor=1e-3,
-        x="order of the first body [1]",
+        x="order of the first body [1]", title=title,
     )  # fmt: skip
-
-
-def _apart(marks, top: float):
-    """Marks whose names do not cover one another."""
-    found = []
-    for text, at in sorted(marks, key=lambda mark: mark[1]):
-        if at <= top and (not found or at - found[-1][1] > 0.02 * top):
-            found.append((text, at))
-    return found

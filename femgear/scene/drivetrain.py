@@ -2,112 +2,195 @@
 
 from __future__ import annotations
 
+import io
+import itertools
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.scene.drawing import add_coloured, add_text, write_png
+from femgear.files import replace_file
+from femgear.scene.drawing import add_coloured
 from femgear.scene.library import load_pyvista
 
+_EDGES = {"boundary_edges": True, "feature_edges": True, "manifold_edges": False, "non_manifold_edges": False}
+_REST, _MOVED = "#B0B0B0", "#D55E00"
+_COLOURS = "displacement over the largest"
+_VIEW = np.array([1.0, 0.55, -0.9])
+# Lines stand this share of the size in front of the faces that they lie on; from afar nothing is shifted.
+_FRONT = 3e-3
+# Height of the picture over its width.
+_HEIGHT = 0.72
+# Shares of the height between which the drivetrain stands.
+_ROOM = (0.22, 0.88)
 
-def drivetrain_picture(
-    path: str | os.PathLike,
-    *,
-    wheels: Sequence[tuple],
-    centres,
-    shafts: Sequence[tuple[int, int]],
-    move,
-    turn,
-    names: Sequence[str] = (),
-    title: str = "",
-    share: float = 0.12,
-    size: int = 1000,
-) -> float:
-    """Picture of a mode shape: every disc moves as a rigid body, shafts are two straight links.
+
+@dataclass(frozen=True)
+class ModeView:
+    """One picture of a mode shape.
 
     Parameters
     ----------
     path : path-like
         PNG file.
+    title : str
+    move, turn : (n, 3) arrays
+        Translation and rotation vector of every place, in the proportions of the mode.
+    shafts : sequence of (rest (k, 3), displacement (k, 3))
+        Centre lines [m].
+    """
+
+    path: str | os.PathLike
+    title: str
+    move: np.ndarray
+    turn: np.ndarray
+    shafts: Sequence[tuple[np.ndarray, np.ndarray]] = ()
+
+
+def drivetrain_pictures(
+    views: Iterable[ModeView],
+    *,
+    wheels: Sequence[tuple],
+    centres,
+    names: Sequence[str] = (),
+    share: float = 0.12,
+    size: int = 1000,
+) -> list[float]:
+    """Pictures of mode shapes: every disc moves as a rigid body, shafts are the lines that they are given.
+
+    Parameters
+    ----------
+    views : iterable of ModeView
     wheels : sequence of (centre (3,), radius, width, place)
         Discs, and the number of the place they are fixed to [m].
     centres : (n, 3) array
         Places [m].
-    shafts : sequence of (place, place)
-    move, turn : (n, 3) arrays
-        Translation and rotation vector of every place, in the proportions of the mode.
     names : (n,) sequence of str
         Written beside the places.
-    title : str
     share : float
         Largest displacement over the size of the drivetrain.
     size : int
-        Width and height in pixels.
+        Width in pixels.
 
     Returns
     -------
-    float
-        The factor of the shape.
+    list of float
+        The factors of the shapes.
+
+    Raises
+    ------
+    FemgearError
+        See `load_pyvista`.
+    StorageError
+        When a file cannot be written.
     """
-    pv = load_pyvista()
-    centres, move, turn = (np.asarray(one, float) for one in (centres, move, turn))
+    pv, centres = load_pyvista(), np.asarray(centres, float)
     discs = [_disc(pv, *wheel[:3]) for wheel in wheels]
-    fields = [move[p] + np.cross(turn[p], d.points - centres[p]) for d, (*_, p) in zip(discs, wheels)]
-    largest = max(np.linalg.norm(field, axis=1).max() for field in fields)
-    extent = np.ptp(np.vstack([disc.points for disc in discs]), axis=0).max()
-    # the joint of a shaft may move more than any disc
-    joints = [_links(0.0 * centres, move, turn, *ends, 1.0, arms=centres) for ends in shafts]
-    reach = max(largest, *(np.linalg.norm(one, axis=1).max() for one in joints)) if joints else largest
-    scale = share * extent / reach if reach > 0.0 else 0.0
-    plotter = pv.Plotter(off_screen=True, window_size=(size, size))
+    # one window for all: opening it takes as long as drawing
+    plotter = pv.Plotter(off_screen=True, window_size=(size, round(_HEIGHT * size)))
     plotter.enable_anti_aliasing("ssaa")
-    text = "displacement over the largest"
-    moved = pv.MultiBlock()
-    for disc, field, (centre, radius, width, place) in zip(discs, fields, wheels):
-        rest = disc.extract_feature_edges(**_EDGES)
-        plotter.add_mesh(rest, color="#B0B0B0", line_width=1.0, lighting=False)
-        one = disc.copy()
-        one.points = _moved(disc.points, centres[place], scale * move[place], scale * turn[place])
-        one[text] = np.linalg.norm(field, axis=1) / largest
-        plotter.add_mesh(one.extract_feature_edges(**_EDGES), color="black", line_width=1.0, lighting=False)
-        moved.append(one)
-        for part, colour in ((0.0, "#B0B0B0"), (scale, "#D55E00")):
-            spoke = _moved(
-                _spoke(centre, radius, width), centres[place], part * move[place], part * turn[place]
-            )
-            plotter.add_mesh(pv.lines_from_points(spoke), color=colour, line_width=3.0, lighting=False)
-    surface = moved.combine().extract_surface(algorithm=None)
-    add_coloured(plotter, surface, text, size, cmap="cividis", limits=(0.0, 1.0))
-    for first, second in shafts:
-        for factor, colour, width in ((0.0, "#B0B0B0", 2.0), (scale, "#D55E00", 5.0)):
-            line = _links(centres, move, turn, first, second, factor)
-            plotter.add_mesh(pv.lines_from_points(line), color=colour, line_width=width, lighting=False)
+    plotter.set_background("white")
+    plotter.enable_parallel_projection()
+    found = []
+    try:
+        for view in views:
+            plotter.suppress_rendering = True
+            plotter.clear()
+            scale, points = _add_shape(pv, plotter, view, discs, wheels, centres, share, size)
+            _add_texts(plotter, view.title, names, centres, wheels, size)
+            _frame(plotter, points)
+            plotter.suppress_rendering = False
+            plotter.render()
+            _write(plotter, view.path)
+            found.append(scale)
+    finally:
+        plotter.close()
+    return found
+
+
+def _add_shape(pv, plotter, view: ModeView, discs, wheels, centres, share, size):
+    """Discs and shafts, at rest and moved; the factor of the shape, and all points of the discs (n, 3)."""
+    move, turn = np.asarray(view.move, float), np.asarray(view.turn, float)
+    lines = [tuple(np.asarray(one, float) for one in pair) for pair in view.shafts]
+    fields = [move[p] + np.cross(turn[p], d.points - centres[p]) for d, (*_, p) in zip(discs, wheels)]
+    lengths = [np.linalg.norm(one, axis=1) for one in (*fields, *(across for _, across in lines))]
+    extent = np.ptp(np.vstack([disc.points for disc in discs]), axis=0).max()
+    # a shaft may move more than any disc
+    reach = max(length.max() for length in lengths)
+    scale = share * extent / reach if reach > 0.0 else 0.0
+    moves = [(centres[p], scale * move[p], scale * turn[p]) for *_, p in wheels]
+    rest, whole = pv.merge(discs, merge_points=False), pv.merge(discs, merge_points=False)
+    whole.points = np.vstack([_moved(disc.points, *own) for disc, own in zip(discs, moves)])
+    length = np.concatenate(lengths[: len(discs)])
+    whole[_COLOURS] = length / (length.max() or 1.0)
+    add_coloured(plotter, whole, _COLOURS, size, cmap="cividis", limits=(0.0, 1.0))
+    spokes = [_spoke(*wheel[:3]) for wheel in wheels]
+    turned = [_moved(spoke, *own) for spoke, own in zip(spokes, moves)]
+    for mesh, colour, width, front in (
+        (rest.extract_feature_edges(**_EDGES), _REST, 2.0, 0.0),
+        (_polylines(pv, [*spokes, *(line for line, _ in lines)]), _REST, 3.0, 0.0),
+        (whole.extract_feature_edges(**_EDGES), "black", 2.0, _FRONT),
+        (_polylines(pv, turned), _MOVED, 6.0, _FRONT),
+        (_polylines(pv, [line + scale * across for line, across in lines]), _MOVED, 9.0, 0.0),
+    ):
+        if mesh.n_points:
+            mesh.points = mesh.points + front * extent * _VIEW
+            plotter.add_mesh(mesh, color=colour, line_width=width, lighting=False)
+    return float(scale), np.vstack([rest.points, whole.points])
+
+
+def _add_texts(plotter, title: str, names, centres, wheels, size: int) -> None:
+    """Title, names beside the places, and the colour bar where this flat picture has room for it."""
+    height = round(_HEIGHT * size)
+    bar = plotter.scalar_bars[" "]
+    bar.SetPosition(0.2, 0.065)
     if len(names):
         labels = centres + np.array([0.0, 1.0, 0.0]) * _heights(wheels, len(centres))[:, None] * 1.15
         plotter.add_point_labels(
-            labels, list(names), font_size=max(size // 60, 10), shape=None, show_points=False,
-            text_color="black",
-            always_visible=True,
+            labels, list(names), font_size=max(size // 60, 10), shape="rect", shape_color="white",
+            shape_opacity=0.6, margin=1, show_points=False, text_color="black", always_visible=True,
         )  # fmt: skip
     if title:
-        add_text(plotter, title, size)
-    plotter.set_background("white")
-    plotter.enable_parallel_projection()
-    plotter.view_vector((1.0, 0.55, -0.9), viewup=(0.0, 1.0, 0.0))
-    plotter.camera.zoom(1.05)
-    write_png(plotter, path)
-    return float(scale)
+        place = (0.02 * size, height - 0.045 * size)
+        plotter.add_text(title, position=place, font_size=max(size / 75, 7.0), color="black", name="title")
 
 
-_EDGES = {"boundary_edges": True, "feature_edges": True, "manifold_edges": False, "non_manifold_edges": False}
+def _frame(plotter, points) -> None:
+    """Parallel view that holds all points (n, 3), with room for title and colour bar."""
+    away = _VIEW / np.linalg.norm(_VIEW)
+    right = np.cross([0.0, 1.0, 0.0], away)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(away, right), away])
+    low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+    half = 0.5 * (high - low)
+    camera, bottom, top = plotter.camera, *_ROOM
+    scale = max(half[1] / (top - bottom), 1.06 * _HEIGHT * half[0])
+    middle = 0.5 * (low + high) - [0.0, (bottom + top - 1.0) * scale, 0.0]
+    camera.focal_point = middle @ axes
+    camera.position = camera.focal_point + 10.0 * half.max() * away
+    camera.up, camera.parallel_scale = (0.0, 1.0, 0.0), scale
+    plotter.reset_camera_clipping_range()
+
+
+def _write(plotter, path) -> None:
+    """The picture whole or not at all; the window stays open."""
+    import imageio.v3 as iio
+
+    stream, image = io.BytesIO(), plotter.screenshot(filename=None, return_img=True)
+    iio.imwrite(stream, image, extension=".png", compress_level=4)
+    data = stream.getvalue()
+    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
 
 
 def _moved(points, centre, shift, turn) -> np.ndarray:
     """Points turned by a rotation vector about a centre, and shifted: rigid, however large the angle."""
-    from scipy.spatial.transform import Rotation
+    from pyvista.core.utilities.transformations import axis_angle_rotation
 
-    return centre + shift + Rotation.from_rotvec(turn).apply(points - centre)
+    angle = float(np.linalg.norm(turn))
+    if angle > 0.0:
+        points = centre + (points - centre) @ axis_angle_rotation(turn / angle, angle, deg=False)[:3, :3].T
+    return points + shift
 
 
 def _spoke(centre, radius, width) -> np.ndarray:
@@ -122,17 +205,11 @@ def _disc(pv, centre, radius, width):
     return disc.triangulate()
 
 
-def _links(centres, move, turn, first, second, scale, *, arms=None) -> np.ndarray:
-    """Ends and the two sides of the joint of a shaft (4, 3); ``arms`` are the places where they differ."""
-    one, two = centres[first], centres[second]
-    arms = centres if arms is None else arms
-    half, rest = 0.5 * (arms[second] - arms[first]), 0.5 * (two - one)
-    return np.array([
-        one + scale * move[first],
-        one + rest + scale * (move[first] + np.cross(turn[first], half)),
-        two - rest + scale * (move[second] - np.cross(turn[second], half)),
-        two + scale * move[second],
-    ])  # fmt: skip
+def _polylines(pv, lines):
+    """Several lines (k, 3) as one mesh."""
+    ends = np.cumsum([0, *(len(line) for line in lines)])
+    cells = [np.append(b - a, np.arange(a, b)) for a, b in itertools.pairwise(ends)]
+    return pv.PolyData(np.vstack(lines), lines=np.concatenate(cells)) if lines else pv.PolyData()
 
 
 def _heights(wheels, count: int) -> np.ndarray:

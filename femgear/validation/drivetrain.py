@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.models.drivetrain import balanced_torque, drivetrain_model
-from femgear.models.drivetrain_data import ChainBearing, Drivetrain, MeshWave
+from femgear.models.drivetrain_data import ChainBearing, ChainBody, Drivetrain, MeshWave, ParallelStage
 from femgear.models.drivetrain_march import march_drivetrain
 from femgear.models.drivetrain_meshes import planar_of, rectangular_series
 from femgear.models.drivetrain_torque import constant_torques
@@ -30,6 +30,8 @@ PAPER = "Dynamic analysis of the wind turbine drivetrain considering shaft bendi
 LIBRARY = "ross-rotordynamics 2.3.0, the same 24 elements"
 SECTION, LENGTH, COUNT = ShaftSection(0.1, 0.02), 1.0, 24
 DISCS = (Disc(6, 20.0, 0.18, 0.10), Disc(16, 35.0, 0.50, 0.30))
+# two wheels and one mesh: mean stiffness [N/m], teeth
+STIFFNESS, TEETH = 2e8, 20
 # bending modes by that library [Hz]: free, free with discs, with discs in bearings of 5e7 and 8e7 N/m
 FREE = ("452.333793", "1189.288296", "2195.991369")
 WITH_DISCS = ("377.474134", "835.190445", "1324.163334")
@@ -159,4 +161,62 @@ def torques() -> tuple[Row, ...]:
     wanted = PRINTED.torque / ((1 + 43 / 11) * (29 / 9.5) * (18.5 / 8))
     return (
         within("torques", "kinematics", "generator torque that holds the speed [N m]", wanted, ours, 1e-12),
+    )
+
+
+def _pair(harmonics: int):
+    """Two wheels on held axes, one mesh, and its natural frequency [rad/s]."""
+    stage = ParallelStage("a", "b", 0.05, 0.1, TEETH, MeshWave(STIFFNESS, 1.5, 0.8))
+    bodies = (ChainBody("a", 10.0, 0.2, tilts=False), ChainBody("b", 20.0, 0.9, tilts=False))
+    held = (ChainBearing("a", math.inf), ChainBearing("b", math.inf))
+    model = drivetrain_model(
+        Drivetrain(bodies, parallel=(stage,), bearings=held, gravity=0.0), harmonics=harmonics
+    )
+    frequency = solve_modes(model.still, model.mean_stiffness).frequency[-1]
+    return model, 2.0 * math.pi * float(frequency)
+
+
+def growth() -> tuple[Row, ...]:
+    """Free motion in the middle of the principal instability: Mathieu's equation."""
+    from scipy.integrate import solve_ivp
+
+    model, natural = _pair(1)
+    share = abs(model.stiffness[0, 1]) / model.mean_stiffness[0]
+
+    def rate(t, y):
+        return [y[2], y[3], *(-(1.0 + share * math.cos(2.0 * t)) * y[:2])]
+
+    found = solve_ivp(rate, (0.0, math.pi), [1.0, 0.0, 0.0, 1.0], method="DOP853", rtol=1e-11, atol=1e-12)
+    largest = np.abs(np.linalg.eigvals(found.y[:, -1].reshape(2, 2))).max()
+    wanted = math.log(largest) / math.pi * natural
+    period = math.pi / natural
+    run = march_drivetrain(
+        model, (), duration=150 * period, step=period / 200, speed=2.0 * natural / TEETH, start="zero"
+    )
+    text = "free motion of one mesh at twice its natural frequency, 200 steps a period: growth [1/s]"
+    return (within("growth", "Mathieu's equation by DOP853", text, wanted, run.growth, 1e-3),)
+
+
+def contact_loss() -> tuple[Row, ...]:
+    """Free flight and impact of one mesh: a parabola and a sine, three times."""
+    model, w = _pair(0)
+    mass, load, speed = STIFFNESS / w**2, 5000.0, 0.1
+    rest = load / STIFFNESS
+    flight = 2.0 * speed * mass / load
+    period = flight + (2.0 * math.pi - 2.0 * math.atan(speed / (w * rest))) / w
+    torques = balanced_torque(model, "a", load * 0.05 * math.cos(math.radians(20.0)), "b")
+    column = model.system.W[:, 0]
+    start = np.zeros(len(column)), -speed * mass * np.linalg.solve(model.system.M, column)
+    run = march_drivetrain(
+        model, constant_torques(torques), duration=3.0 * period, step=period / 800, speed=10.0,
+        start=start, contact_loss=True,
+    )  # fmt: skip
+    t = run.time % period
+    touch = rest * (1.0 - np.cos(w * (t - flight))) + speed / w * np.sin(w * (t - flight))
+    wanted = np.where(t < flight, -speed * t + 0.5 * load / mass * t**2, touch)
+    error = np.abs(run.approach[:, 0] - wanted).max() / np.ptp(wanted)
+    text = "flight and impact, 800 steps a period, three periods:"
+    return (
+        at_most("contact loss", "closed form", f"{text} approach over its range", 1e-4, error),
+        at_most("contact loss", "theory", f"{text} energy balance", 1e-9, run.ledger.error),
     )

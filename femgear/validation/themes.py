@@ -218,6 +218,8 @@ THEMES = (
             drivetrain.reductions,
             drivetrain.balances,
             drivetrain.torques,
+            drivetrain.growth,
+            drivetrain.contact_loss,
         ),
         (drivetrain.minute,),
     ),

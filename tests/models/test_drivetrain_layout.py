@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from femgear.models.drivetrain import drivetrain_model
-from femgear.models.drivetrain_layout import drivetrain_layout, layout_motion
+from femgear.models.drivetrain_data import ChainBearing, ChainBody, ChainShaft, Drivetrain
+from femgear.models.drivetrain_layout import beam_shape, drivetrain_layout, layout_motion, shaft_lines
+from femgear.models.shaft import ShaftSection
 from femgear.models.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
@@ -49,3 +51,65 @@ def test_tilting_carrier_takes_the_planets_along():
         at = LAYOUT.names.index(f"planet {p}")
         arm = LAYOUT.centre[at] - place("carrier")
         assert move[at] == pytest.approx([0.0, 0.0, arm[1]]) and turn[at, 0] == 1.0
+
+
+SECTION, LENGTH, ELEMENTS = ShaftSection(0.07), 0.6, 3
+
+
+def shaft_of(**options):
+    """Two bodies on a shaft, and its layout."""
+    train = Drivetrain(
+        (ChainBody("a", 1.0, 1.0, 1.0), ChainBody("b", 1.0, 1.0, 1.0)),
+        shafts=(ChainShaft("a", "b", LENGTH, **options),),
+        bearings=tuple(ChainBearing(name, 1e8, 1e6) for name in "ab"),
+    )
+    return drivetrain_model(train), drivetrain_layout(train)
+
+
+def moved(model, layout, deflection, slope):
+    """Line of the shaft with stations on a deflection x(z) and y(z) = -2 x(z): shares, displacements."""
+    shape = np.zeros(len(model.rigid))
+    stations = {"a": 0.0, "b": LENGTH}
+    stations |= {f"shaft a-b {i}": i * LENGTH / ELEMENTS for i in range(1, ELEMENTS)}
+    for name, z in stations.items():
+        if f"{name}: x" in model.system.dofs:
+            values = {
+                "x": deflection(z),
+                "tilt y": slope(z),
+                "y": -2.0 * deflection(z),
+                "tilt x": 2.0 * slope(z),
+            }
+            for axis, value in values.items():
+                shape[model.index(f"{name}: {axis}")] = value
+    ((rest, across),) = shaft_lines(model, layout, shape)
+    assert not across[:, 2].any() and np.allclose(across[:, 1], -2.0 * across[:, 0])
+    return rest[:, 2] - layout.centre[0, 2], across[:, 0]
+
+
+@pytest.mark.parametrize("shear_ratio", [0.0, 0.7])
+def test_beam_between_stations_is_a_cantilever(shear_ratio):
+    """Tip force: w = F z^2 (3 l - z) / (6 E I) + F z / (kappa G A), turned by F z (2 l - z) / (2 E I)."""
+    l, bending = 0.4, 3.0
+    shear = 12.0 * bending / (shear_ratio * l**2) if shear_ratio else np.inf
+    z = np.linspace(0.0, l, 11)
+    w = z**2 * (3.0 * l - z) / (6.0 * bending) + z / shear
+    tip = np.array([0.0, 0.0, w[-1], l**2 / (2.0 * bending)])
+    assert beam_shape(z / l, l, shear_ratio) @ tip == pytest.approx(w, rel=1e-12)
+
+
+def test_beams_bend_through_their_stations():
+    model, layout = shaft_of(section=SECTION, elements=ELEMENTS)
+    # pure bending: a parabola, which a joint in the middle does not have
+    z, x = moved(model, layout, lambda z: 0.5 * z**2, lambda z: z)
+    assert len(z) > 4 * ELEMENTS and z[-1] == pytest.approx(LENGTH)
+    assert x == pytest.approx(0.5 * z**2, abs=1e-14)
+    z, x = moved(model, layout, lambda z: 0.2 + 3.0 * z, lambda z: 3.0)
+    assert x == pytest.approx(0.2 + 3.0 * z)
+
+
+def test_joints_have_two_links():
+    model, layout = shaft_of(section=SECTION)
+    z, x = moved(model, layout, lambda z: 0.5 * z**2, lambda z: z)
+    assert z == pytest.approx([0.0, 0.3, 0.3, 0.6])
+    # the second link stands along its body's tilt, the first does not move: they meet
+    assert x == pytest.approx([0.0, 0.0, 0.5 * 0.36 - 0.3 * 0.6, 0.18], abs=1e-15)
