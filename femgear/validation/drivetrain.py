@@ -25,8 +25,10 @@ from femgear.models.wind_turbine_drivetrain import (
 )
 from femgear.solvers.modal import solve_modes
 from femgear.validation.rows import Row, at_most, information, printed, within
+from femgear.validation.timoshenko import free_bending
 
 PAPER = "Dynamic analysis of the wind turbine drivetrain considering shaft bending effect"
+TRANSFER = "zeros of the exact transfer matrix"
 LIBRARY = "ross-rotordynamics 2.3.0, the same 24 elements"
 SECTION, LENGTH, COUNT = ShaftSection(0.1, 0.02), 1.0, 24
 DISCS = (Disc(6, 20.0, 0.18, 0.10), Disc(16, 35.0, 0.50, 0.30))
@@ -57,6 +59,16 @@ def shafts() -> tuple[Row, ...]:
         wanted = math.sqrt(square) / (2.0 * math.pi)
         text = f"simply supported Timoshenko shaft, 96 elements, mode {number} [Hz]"
         rows.append(within("shaft", "closed form", text, wanted, _nearest(ours, wanted), 1e-3))
+    for text, discs, top in (
+        ("free-free shaft", (), 2500.0),
+        ("free-free shaft with two discs", DISCS, 1400.0),
+    ):
+        stations = tuple(replace(disc, station=4 * disc.station) for disc in discs)
+        places = [(disc.station / COUNT * LENGTH, disc) for disc in discs]
+        ours = _shaft(4 * COUNT, discs=stations)
+        for number, wanted in enumerate(free_bending(SECTION, LENGTH, 100.0, top, discs=places), 1):
+            name = f"free-free shaft{words}, 96 elements, bending {number} [Hz]"
+            rows.append(within("shaft", TRANSFER, name, wanted, _nearest(ours, wanted), 1e-3))
     cases = (
         ("free-free shaft", {}, FREE),
         ("free-free shaft with two discs", {"discs": DISCS}, WITH_DISCS),

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh, eigvals, expm
-from scipy.optimize import brentq
+from scipy.linalg import eigh, eigvals
 
 from femgear.errors import CaseError
 from femgear.models.shaft import (
@@ -17,6 +16,7 @@ from femgear.models.shaft import (
     joint_springs,
     shaft_system,
 )
+from femgear.validation.timoshenko import free_bending
 
 SECTION = ShaftSection(0.1, 0.02)
 LENGTH, COUNT = 1.0, 24
@@ -30,38 +30,6 @@ def shaft(count=COUNT, **options):
 def natural(system):
     """[Hz], ascending."""
     return np.sqrt(np.abs(eigh(system.K, system.M, eigvals_only=True))) / (2.0 * np.pi)
-
-
-def exact_bending(low, high, discs=(), count=400):
-    """Frequencies [Hz] of a free-free Timoshenko shaft: zeros of the exact transfer matrix.
-
-    ``w' = psi + V / (kappa G A)``, ``psi' = M / (E I)``, ``M' = -V - rho I omega^2 psi``, ``V' = -rho A
-    omega^2
-    w``; a disc adds ``-I_t omega^2 psi`` to M and ``-m omega^2 w`` to V.
-    """
-    s = SECTION
-    shear, bend = s.shear_coefficient * s.shear_modulus * s.area, s.young * s.second_moment
-    stops = [(d.station / COUNT * LENGTH, d) for d in discs] + [(LENGTH, None)]
-
-    def residue(hertz):
-        square = (2.0 * np.pi * hertz) ** 2
-        field = np.zeros((4, 4))
-        field[0, 1], field[0, 3], field[1, 2] = 1.0, 1.0 / shear, 1.0 / bend
-        field[2, 1], field[2, 3] = -s.density * s.second_moment * square, -1.0
-        field[3, 0] = -s.density * s.area * square
-        total, here = np.eye(4), 0.0
-        for place, disc in stops:
-            total = expm(field * (place - here)) @ total
-            here = place
-            if disc is not None:
-                point = np.eye(4)
-                point[2, 1], point[3, 0] = -disc.transverse * square, -disc.mass * square
-                total = point @ total
-        return np.linalg.det(total[2:, :2])
-
-    grid = np.linspace(low, high, count)
-    values = [residue(h) for h in grid]
-    return [brentq(residue, a, b) for a, b, u, v in zip(grid, grid[1:], values, values[1:]) if u * v < 0.0]
 
 
 def test_rigid_motions_have_the_exact_mass():
@@ -84,7 +52,8 @@ def test_rigid_motions_have_the_exact_mass():
 
 @pytest.mark.parametrize(("discs", "top"), [((), 2500.0), (DISCS, 2150.0)])
 def test_free_shaft_against_the_characteristic_equation(discs, top):
-    wanted = np.array(exact_bending(100.0, top, discs))
+    places = [(d.station / COUNT * LENGTH, d) for d in discs]
+    wanted = np.array(free_bending(SECTION, LENGTH, 100.0, top, discs=places))
     assert len(wanted) >= 3
     errors = []
     for factor in (2, 4):
