@@ -3,14 +3,14 @@
 With the stiffness of the simple motions ``G(theta) = S k S^T = mean + rest`` and their receptance F with
 the mean stiffness, the lines of the motion obey ``x + F(i omega) (rest * x) = x_static`` with * the
 convolution over the lattice of orders. The system is linear and there are no samples in time, of which four
-bases would need millions. It is solved by GMRES, preconditioned with what does not change in time but for
-the turn of the carriers.
+bases would need millions. Lines that are given are solved for so; where lines are searched, the unknowns are
+the mesh forces (`femgear.models.drivetrain_force_lines`), which need fewer.
 """
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.models.drivetrain import DrivetrainModel, torque_vector
 from femgear.models.drivetrain_checks import check_free_spin
 from femgear.models.drivetrain_coupling import LineProblem, line_problem
-from femgear.models.drivetrain_line_solver import LineEquations, line_equations
-from femgear.models.drivetrain_refinement import Estimate, estimate, refined, with_feedback
+from femgear.models.drivetrain_force_lines import ForceEquations, force_equations
+from femgear.models.drivetrain_line_solver import line_equations
+from femgear.models.drivetrain_refinement import Estimate, estimate, refined, strong_lines, with_feedback
 from femgear.solvers.lines import checked_lines, distinct_lines
 from femgear.solvers.series import FourierSeries
 
@@ -29,15 +30,18 @@ _FINEST = 1e-6
 # A torque that drives the spin, relative to the largest: no settled motion.
 _UNBALANCED = 1e-9
 # Residual of the equations on given lines; while lines are searched and at the end, over the tolerance.
-_GIVEN, _SEARCH, _FOUND = 1e-11, 1.0, 0.1
+_GIVEN, _SEARCH, _FOUND = 1e-11, 1.0, 0.2
 # Residuals above which there is no solution, and no converged one, over the one that was asked for.
 _LOST, _ENOUGH = 10.0, 1.5
 # First harmonics that the search starts with, and its longest way.
 _START, _ROUNDS = 3, 25
 # Feedback that is accepted, over the tolerance: an upper estimate, two or three times what is found.
 _FEEDBACK = 3.0
-# Smaller target of the search where the feedback of what is left out is too large.
-_CLOSER = 0.6
+# Smaller target of the search where the feedback of what is left out is too large, or the remainder goes
+# down by less than this in a round.
+_CLOSER, _SLOW = 0.6, 0.5
+# Alternating force that the search begins with, over the mean.
+_GUESS = 1e-2
 # Values of waves at once.
 _VALUES = 4_000_000
 
@@ -56,9 +60,11 @@ class SettledMotion:
     motion : (m, L) complex array
     displacement : (n, L) complex array
         Of all coordinates, the spin's deviation of the mean being zero.
+    force : (n_meshes, L) complex array or None
+        Of the meshes [N], where lines are searched; approaches follow from them and have more lines.
     residual : float
-        Of the linear equations, relative to the static motion where lines are given, to the alternating
-        motion of the mesh with the smallest where they are searched (units of energy).
+        Of the linear equations, relative to the static motion where lines are given (units of energy), to
+        the alternating forces of the meshes where they are searched.
     remainder : (n_meshes,) array
         Estimated r.m.s. force of all lines left out over that of the alternating force of the mesh, of
         first order.
@@ -78,6 +84,7 @@ class SettledMotion:
     frequency: np.ndarray
     motion: np.ndarray
     displacement: np.ndarray
+    force: np.ndarray | None
     residual: float
     remainder: np.ndarray
     feedback: np.ndarray
@@ -94,18 +101,21 @@ class SettledMotion:
         """Approach [m] and force [N] of the meshes (n_times, n_meshes)."""
         times, geometry, model = np.asarray(times, float), self.model.geometry, self.model
         theta, omega = times[:, None] * self.frequency, self.line_frequency
-        x = np.empty((len(times), len(self.motion)))
+        lines = self.motion if self.force is None else self.force
+        values = np.empty((len(times), len(lines)))
         block = max(1, _VALUES // len(omega))
         for first in range(0, len(times), block):
             waves = np.exp(1j * np.multiply.outer(times[first : first + block], omega))
-            x[first : first + block] = (waves @ self.motion.T).real
-        turns = theta[:, : 2 * len(geometry.even) : 2] * float(model.turning)
-        approach = np.einsum("tmj,tm->tj", geometry.selection(turns), x)
+            values[first : first + block] = (waves @ lines.T).real
         series = FourierSeries(model.stiffness)
-        k = np.empty_like(approach)
+        k = np.empty((len(times), len(model.meshes)))
         for base in np.unique(model.mesh_base):
             own = model.mesh_base == base
             k[:, own] = series.at(theta[:, base : base + 1])[:, own]
+        if self.force is not None:
+            return values / k, values
+        turns = theta[:, : 2 * len(geometry.even) : 2] * float(model.turning)
+        approach = np.einsum("tmj,tm->tj", geometry.selection(turns), values)
         return approach, k * approach
 
 
@@ -195,7 +205,8 @@ def settled_motion(
     ------
     CaseError
         Torques that drive the spin (E-LOAD-BALANCE), a tolerance or number of lines that is none (E-RANGE),
-        orders that are no lines or too high (E-LINES), bearings that hold the rotation (E-BEARING).
+        orders that are no lines or too high (E-LINES), bearings that hold the rotation (E-BEARING), a mesh
+        whose stiffness comes near zero (E-STIFFNESS).
     ConvergenceError
         The equations are singular (E-SINGULAR, E-RESONANCE): no damping, or the border of an unstable
         parametric resonance.
@@ -203,7 +214,8 @@ def settled_motion(
     _check(tolerance, max_lines)
     check_free_spin(model)
     problem = line_problem(model, _balanced_load(model, torques), speed, gyroscopic=gyroscopic)
-    if orders is None:
+    given = orders is not None
+    if not given:
         found = _searched(problem, tolerance, int(max_lines))
         orders = distinct_lines(problem.codes.orders(found.lines))
     else:
@@ -212,16 +224,16 @@ def settled_motion(
     codes = orders @ problem.codes.stride
     at, turned = np.searchsorted(found.lines, np.abs(codes)), codes < 0
     sides = np.where(codes == 0, 1.0, 2.0)
-    x, q = (
+    x, q, force = (
         (np.where(turned[:, None], v[at].conj(), v[at]) * sides[:, None]).T
-        for v in (found.x, _displacements(problem, found))
+        for v in (found.x, _displacements(problem, found), found.forces)
     )
     left, fed_back = found.estimate.remainder, found.estimate.feedback
     converged = bool(left.max() <= tolerance and fed_back.max() <= _FEEDBACK * tolerance and found.solved)
     message = _message(model, found, converged, tolerance, max_lines)
     return SettledMotion(
-        model, orders, problem.frequency, x, q, found.residual, left, fed_back, converged, found.rounds,
-        message,
+        model, orders, problem.frequency, x, q, None if given else force, found.residual, left, fed_back,
+        converged, found.rounds, message,
     )  # fmt: skip
 
 
@@ -252,16 +264,14 @@ def _balanced_load(model: DrivetrainModel, torques) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Solution:
-    equations: LineEquations
-    x: np.ndarray
+    lines: np.ndarray
+    forces: np.ndarray
     residual: float
     estimate: Estimate
     rounds: int
     solved: bool
-
-    @property
-    def lines(self) -> np.ndarray:
-        return self.equations.lines
+    x: np.ndarray | None = None
+    on_motions: np.ndarray | None = None
 
 
 def _given(problem: LineProblem, orders, tolerance) -> _Solution:
@@ -271,54 +281,72 @@ def _given(problem: LineProblem, orders, tolerance) -> _Solution:
             f"orders up to {np.abs(orders).max(axis=0).tolist()}", code="E-LINES", key="orders",
             limit=f"{problem.codes.largest.tolist()}, one a base",
         )  # fmt: skip
-    start = np.zeros((len(lines), problem.basic.shape[1]), complex)
-    return _solution(problem, lines, start, _GIVEN, tolerance, 1, feedback=True)
+    equations = line_equations(problem, lines)
+    x, residual = equations.solve(_GIVEN)
+    _check_residual(residual, _GIVEN)
+    forces = equations.table.mesh_forces(x, lines)
+    found = with_feedback(force_equations(problem, lines), estimate(problem, lines, forces, tolerance))
+    return _Solution(
+        lines, forces, residual, found, 1, residual <= _ENOUGH * _GIVEN, x, equations.table.forces(x)
+    )
 
 
 def _searched(problem: LineProblem, tolerance, most: int) -> _Solution:
     """Solve, estimate what is beyond, take in what matters, until what is left does not matter."""
     lines = np.unique(np.multiply.outer(np.arange(_START + 1), problem.codes.stride))[:most]
-    x = np.zeros((len(lines), problem.basic.shape[1]), complex)
-    accuracy, finest, target, size = _SEARCH * tolerance, _FOUND * tolerance, tolerance, None
+    forces = np.zeros((len(lines), len(problem.stiffness)), complex)
+    accuracy, finest, target, unit = _SEARCH * tolerance, _FOUND * tolerance, tolerance, None
+    equations, before, share = force_equations(problem, lines), np.inf, 1.0
     for rounds in range(1, _ROUNDS + 1):
         fine, full = accuracy == finest, rounds > 1 and len(lines) == most
-        found = _solution(problem, lines, x, accuracy, tolerance, rounds, feedback=fine, size=size)
-        size = found.estimate.energy(problem)
-        left, fed_back = found.estimate.remainder.max(), found.estimate.feedback.max()
-        if fine and left <= tolerance and fed_back <= _FEEDBACK * tolerance:
+        found = _solution(equations, forces, accuracy, tolerance, rounds, feedback=fine, unit=unit)
+        unit, left = found.estimate.alternating, found.estimate.remainder.max()
+        if fine and left <= tolerance and found.estimate.feedback.max() <= _FEEDBACK * tolerance:
             break
         # the neighbours were small enough, what they do is not
-        target *= _CLOSER if fine else 1.0
-        wider, x = refined(problem, lines, found.x, found.estimate, target, most)
+        target = _CLOSER * min(target, left) if fine else target
+        # where lines that are left out change the others their estimates are too small
+        share *= _CLOSER if left > max(target, _SLOW * before) else 1.0
+        before = left
+        wider, forces = refined(problem, lines, found.forces, found.estimate, share * target, most)
         stuck = full or np.array_equal(wider, lines) or rounds >= _ROUNDS - 1
         if fine and stuck:
             break
         if stuck or left <= target:
-            accuracy, x = finest, found.x
+            accuracy, forces = finest, found.forces
         else:
             accuracy, lines = _SEARCH * tolerance, wider
-    return found
+            equations = force_equations(problem, lines, strong_lines(forces, unit, share * target))
+    x = equations.table.motions(found.forces)
+    pushed = equations.table.on_motions(found.forces) - x @ sum(one.mean for one in problem.families)
+    x, pushed = x[equations.table.at], pushed[equations.table.at]
+    return replace(found, x=x, on_motions=pushed)
 
 
-def _solution(problem, lines, start, accuracy, tolerance, rounds, *, feedback, size=None) -> _Solution:
-    equations = line_equations(problem, lines)
-    static = np.zeros_like(start)
-    static[0] = problem.static
-    x, residual = equations.solve(static, start, accuracy, size=size)
+def _solution(equations: ForceEquations, start, accuracy, tolerance, rounds, *, feedback, unit) -> _Solution:
+    problem, lines = equations.problem, equations.lines
+    right = equations.table.through(equations.table.still())
+    if unit is None:
+        size = np.abs(right[0])
+        unit = _GUESS * np.maximum(size, max(_GUESS * size.max(), np.finfo(float).tiny))
+    forces, residual = equations.solve(right, start, unit, accuracy)
+    _check_residual(residual, accuracy)
+    found = estimate(problem, lines, forces, tolerance)
+    found = with_feedback(equations, found) if feedback else found
+    return _Solution(lines, forces, residual, found, rounds, residual <= _ENOUGH * accuracy)
+
+
+def _check_residual(residual: float, accuracy: float) -> None:
     if not residual <= _LOST * accuracy:
         raise ConvergenceError(
             f"the lines of the settled motion have a residual of {residual:.2g}", code="E-SINGULAR",
             limit=f"{accuracy:.1g}", remedy="add damping, or change the speed",
         )  # fmt: skip
-    found = estimate(equations, x, tolerance)
-    found = with_feedback(equations, found) if feedback else found
-    return _Solution(equations, x, residual, found, rounds, residual <= _ENOUGH * accuracy)
 
 
 def _displacements(problem: LineProblem, found: _Solution) -> np.ndarray:
     """Two-sided lines (L, n) of all coordinates."""
-    forces = found.equations.table.forces(found.x)
-    q = -problem.response(found.lines, forces, np.eye(len(problem.basic)))
+    q = -problem.response(found.lines, found.on_motions, np.eye(len(problem.basic)))
     q[0] += problem.displaced
     return q
 

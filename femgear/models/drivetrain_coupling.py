@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femgear.errors import CaseError
 from femgear.models.drivetrain import DrivetrainModel
 from femgear.models.drivetrain_lattice import (
     LineCodes,
@@ -22,6 +23,12 @@ from femgear.models.drivetrain_lattice import (
 )
 from femgear.solvers.nonlinear import NonlinearSystem
 from femgear.solvers.receptance import Reduction, reduce_problem, respond
+from femgear.solvers.series import FourierSeries
+
+# Points of a mesh period for the compliance, and harmonics of it that are none.
+_POINTS, _NONE = 8192, 1e-7
+# Stiffness of a mesh over its mean below which its compliance has no series.
+_SOFTEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -37,6 +44,9 @@ class MeshFamily:
         {shift by turns: (m, g) complex array}, the lines of ``S``.
     waves : (g, 2 H + 1) complex array
         Two-sided harmonics of the stiffness [N/m].
+    compliance : (g, N) complex array
+        Two-sided harmonics of ``mean / k - 1``.
+    compliance_orders : (N,) int array
     mean : (m, m) array
         Of ``S k S^T``.
     """
@@ -46,6 +56,8 @@ class MeshFamily:
     turn: int
     directions: dict[int, np.ndarray]
     waves: np.ndarray
+    compliance: np.ndarray
+    compliance_orders: np.ndarray
     mean: np.ndarray
 
     @property
@@ -58,11 +70,6 @@ class MeshFamily:
     def stiffness(self) -> np.ndarray:
         """(g,) mean stiffness [N/m]."""
         return self.waves[:, self.waves.shape[1] // 2].real
-
-    @property
-    def square(self) -> np.ndarray:
-        """(g,) mean square of the stiffness [N^2/m^2]."""
-        return (np.abs(self.waves) ** 2).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -92,6 +99,14 @@ class LineProblem:
     basic: np.ndarray
     displaced: np.ndarray
     scale: np.ndarray
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """(n_meshes,) mean stiffness [N/m]."""
+        out = np.empty(sum(len(one.meshes) for one in self.families))
+        for one in self.families:
+            out[one.meshes] = one.stiffness
+        return out
 
     @property
     def static(self) -> np.ndarray:
@@ -147,7 +162,25 @@ def _family(model: DrivetrainModel, codes: LineCodes, base: int) -> MeshFamily:
     k = model.stiffness[own]
     waves = np.hstack([0.5 * k[:, :0:-1].conj(), k[:, :1].real, 0.5 * k[:, 1:]])
     mean = sum((v.conj() * k[:, 0].real) @ v.T for v in directions.values()).real
-    return MeshFamily(own, int(codes.stride[base]), turn, directions, waves, mean)
+    return MeshFamily(own, int(codes.stride[base]), turn, directions, waves, *_compliance(model, own), mean)
+
+
+def _compliance(model: DrivetrainModel, own) -> tuple[np.ndarray, np.ndarray]:
+    """Two-sided harmonics (g, N) of mean / k - 1 and their orders (N,)."""
+    phase = 2.0 * np.pi * np.arange(_POINTS)[:, None] / _POINTS
+    k = np.array(FourierSeries(model.stiffness[own]).at(phase))
+    mean = model.mean_stiffness[own]
+    low = k.min(axis=0) / mean
+    if low.min() < _SOFTEST:
+        raise CaseError(
+            f"the stiffness of {model.meshes[own[np.argmin(low)]]} falls to {low.min():.3g} of its mean",
+            code="E-STIFFNESS", limit=f"{_SOFTEST:g} of the mean or more at any time",
+            remedy="take a larger low_share, or more harmonics",
+        )  # fmt: skip
+    waves = np.fft.fft(mean / k - 1.0, axis=0).T / _POINTS
+    half = int(np.flatnonzero(np.abs(waves[:, : _POINTS // 2]).max(axis=0) > _NONE).max(initial=0))
+    orders = np.arange(-half, half + 1)
+    return waves[:, orders], orders
 
 
 @dataclass(frozen=True)
@@ -157,33 +190,32 @@ class FamilyCoupling:
     Parameters
     ----------
     family : MeshFamily
-    inner, outer : (E,), (E',) int arrays
-        Lines of the approaches and of the mesh forces.
+    outer : (E',) int array
+        Lines of the mesh forces.
     gather, scatter : dict
-        {shift: rows of the motions for every inner line}, {shift: rows of the mesh forces for every row}.
-    stiffness : tuple of sparse arrays
-        One a mesh: convolution from all approaches to the mesh forces (E', 2 E - 1).
+        {shift: rows of the motions for every approach}, {shift: rows of the mesh forces for every row}.
+    varying : tuple of sparse arrays
+        One a mesh: convolution with what varies, from all lines to those of the mesh forces.
     """
 
     family: MeshFamily
-    inner: np.ndarray
     outer: np.ndarray
     gather: dict[int, np.ndarray]
     scatter: dict[int, np.ndarray]
-    stiffness: tuple
+    varying: tuple
 
     def approach(self, motion) -> np.ndarray:
         """(E, g) of the two-sided motions with a row of zeros behind them."""
         return sum((motion @ v)[self.gather[a]] for a, v in self.family.directions.items())
 
-    def force(self, approach) -> np.ndarray:
-        """(E', g) [N]"""
-        both = np.asfortranarray(mirrored(approach))
-        return np.stack([k @ both[:, j] for j, k in enumerate(self.stiffness)], axis=1)
+    def times(self, values) -> np.ndarray:
+        """Convolution (E', g) of the lines (E, g): approaches by the stiffness, forces by the compliance."""
+        both = np.asfortranarray(mirrored(values))
+        return np.stack([k @ both[:, j] for j, k in enumerate(self.varying)], axis=1)
 
     def pushed(self, force) -> np.ndarray:
         """Forces on the simple motions (rows, m)."""
-        both = _with_nothing(mirrored(force))
+        both = with_nothing(mirrored(force))
         return sum(both[self.scatter[a]] @ v.T for a, v in self.family.directions.items())
 
 
@@ -206,50 +238,75 @@ class Coupling:
 
     def forces(self, x) -> np.ndarray:
         """(rows, m) [N] of the motions (L, m)."""
-        motion = _with_nothing(mirrored(x))
+        motion = with_nothing(mirrored(x))
         total = -motion[self.own] @ self.mean
         for one in self.families:
-            total += one.pushed(one.force(one.approach(motion)))
+            total += one.pushed(one.times(one.approach(motion)))
         return total
 
-    def approaches(self, x) -> tuple[np.ndarray, ...]:
-        """(E, g) of every family."""
-        motion = _with_nothing(mirrored(x))
-        return tuple(one.approach(motion) for one in self.families)
+    def mesh_forces(self, x, lines) -> np.ndarray:
+        """(L, n_meshes) [N], of these lines."""
+        motion = with_nothing(mirrored(x))
+        out = np.empty((len(lines), sum(len(one.family.meshes) for one in self.families)), complex)
+        for one in self.families:
+            out[:, one.family.meshes] = one.times(one.approach(motion))[places(one.outer, lines)]
+        return out
 
 
-def coupling(problem: LineProblem, lines, rows) -> Coupling:
-    """Tables from lines to rows, both ascending codes."""
+def coupling(problem: LineProblem, lines) -> Coupling:
+    """Tables from the lines, ascending codes, to themselves."""
     both = mirrored_codes(lines)
-    mean = sum(one.mean for one in problem.families)
-    parts = tuple(_family_coupling(one, both, lines, rows) for one in problem.families)
-    return Coupling(places(both, rows), mean, parts)
+    mean, parts = sum(one.mean for one in problem.families), []
+    for family in problem.families:
+        wide = beside(lines, family.turn)
+        table = convolution(family, wide, wide, family.harmonics, family.waves)
+        parts.append(FamilyCoupling(family, wide, *_turned(family, lines, wide), table))
+    return Coupling(places(both, lines), mean, tuple(parts))
 
 
-def _family_coupling(family: MeshFamily, both, lines, rows) -> FamilyCoupling:
-    turn = family.turn
-    inner, outer = beside(lines, turn), beside(rows, turn)
-    gather = {a: places(both, inner - a * turn) for a in family.directions}
-    scatter = {a: places(mirrored_codes(outer), rows - a * turn) for a in family.directions}
-    return FamilyCoupling(family, inner, outer, gather, scatter, _convolution(family, inner, outer))
+def _turned(family: MeshFamily, lines, wide) -> tuple[dict, dict]:
+    """Rows of the two-sided lines for every wide one, and the reverse, a turn apart."""
+    both, widened = mirrored_codes(lines), mirrored_codes(wide)
+    gather = {a: places(both, wide - a * family.turn) for a in family.directions}
+    return gather, {a: places(widened, lines - a * family.turn) for a in family.directions}
 
 
-def _convolution(family: MeshFamily, inner, outer) -> tuple:
+def force_couplings(problem: LineProblem, lines, rows, motions) -> tuple[FamilyCoupling, ...]:
+    """Tables from mesh forces on lines to what they change on rows, and from there to motions and back."""
+    return tuple(
+        FamilyCoupling(
+            one, rows, *_turned(one, motions, rows),
+            convolution(one, lines, rows, one.compliance_orders, one.compliance),
+        )
+        for one in problem.families
+    )  # fmt: skip
+
+
+def pairs(family: MeshFamily, codes, rows, orders) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, columns among the codes and numbers of the orders that lead from one to the other."""
+    found = []
+    for number, order in enumerate(orders):
+        column = places(codes, rows - order * family.step)
+        row = np.flatnonzero(column >= 0)
+        found.append((row, column[row], np.full(len(row), number)))
+    return tuple(np.concatenate(part) for part in zip(*found))
+
+
+def convolution(family: MeshFamily, lines, rows, orders, waves) -> tuple:
+    """Sparse arrays (R, 2 L - 1), one a mesh, of the waves (g, N)."""
     from scipy import sparse
 
-    both, found = mirrored_codes(inner), []
-    for number in np.flatnonzero(np.any(family.waves != 0.0, axis=0)):
-        column = places(both, outer - family.harmonics[number] * family.step)
-        row = np.flatnonzero(column >= 0)
-        found.append((row, column[row], np.full(len(row), number + 1)))
-    row, column, number = (np.concatenate(part) for part in zip(*found))
-    table = sparse.csr_array((number, (row, column)), shape=(len(outer), len(both)))
+    codes = mirrored_codes(lines)
+    used = np.flatnonzero(np.any(waves != 0.0, axis=0))
+    used = used if len(used) else np.array([0])
+    row, column, number = pairs(family, codes, rows, orders[used])
+    table = sparse.csr_array((number + 1, (row, column)), shape=(len(rows), len(codes)))
     return tuple(
-        sparse.csr_array((wave[table.data - 1], table.indices, table.indptr), shape=table.shape)
-        for wave in family.waves
+        sparse.csr_array((wave[used][table.data - 1], table.indices, table.indptr), shape=table.shape)
+        for wave in waves
     )
 
 
-def _with_nothing(values: np.ndarray) -> np.ndarray:
+def with_nothing(values: np.ndarray) -> np.ndarray:
     """With a last row of zeros, which the place -1 takes."""
     return np.concatenate([values, np.zeros_like(values[:1])])

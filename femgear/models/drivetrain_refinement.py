@@ -1,7 +1,7 @@
 """Which lines the settled motion needs: those beside the present ones whose estimate matters.
 
-On a line beyond those solved for, the motion is ``-F(i omega) (rest * x)`` to first order: one convolution
-and one receptance. Adding what has the largest estimate is the adaptive Galerkin method of A. Cohen, W.
+On a line beyond those solved for, the mesh forces are ``-D (r * f)`` to first order: one convolution and one
+pass through the chain. Adding what has the largest estimate is the adaptive Galerkin method of A. Cohen, W.
 Dahmen and R. DeVore, Math. Comput. 70 (2001) 27-75: solve, estimate, mark, refine, coarsen.
 """
 
@@ -11,16 +11,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.models.drivetrain_coupling import Coupling, LineProblem, coupling
+from femgear.models.drivetrain_coupling import LineProblem
+from femgear.models.drivetrain_force_lines import ForceEquations, force_table
 from femgear.models.drivetrain_lattice import beside, mirrored, mirrored_codes, places
-from femgear.models.drivetrain_line_solver import LineEquations
 
-# Root of the sum of squares of the neighbours that are not looked at, relative to what may be left out.
-_OVERLOOKED = 0.02
+# Root of the sum of squares of what the neighbours that are not looked at get, over the tolerance.
+_OVERLOOKED = 0.1
 # And of the lines that are left out on purpose.
 _LEFT = 0.5
+# And of the lines beside which no motion but their own is looked at.
+_STRONG = 1.0
 # Accuracy of the feedback of what is left out.
-_FEEDBACK = 0.1
+_FEEDBACK = 0.3
 # Alternating force, relative to the largest mean force, below which there is none.
 _STILL = 1e-9
 
@@ -31,25 +33,28 @@ class Estimate:
 
     Parameters
     ----------
+    alternating : (n_meshes,) array
+        Root mean square of the alternating force [N].
     effect : (L, n_meshes) array
-        Squares of the forces that the lines make, over the mean square of the alternating force.
+        Squares of the forces on the lines, over the mean square of the alternating force.
     beyond : (C,) int array
         Codes of the neighbours.
-    motion : (C, m) complex array
-        Their estimated motions.
+    force : (C, n_meshes) complex array
+        Their estimated mesh forces.
     left : (C, n_meshes) array
         Effects of the neighbours.
-    square : (n_meshes,) array
-        Mean square of the alternating force [N^2].
+    missed : (L, n_meshes) complex array
+        Residual of the equations with all motions of the neighbours.
     fed_back : (n_meshes,) array
         Effect of the neighbours by way of the lines solved for.
     """
 
+    alternating: np.ndarray
     effect: np.ndarray
     beyond: np.ndarray
-    motion: np.ndarray
+    force: np.ndarray
     left: np.ndarray
-    square: np.ndarray
+    missed: np.ndarray
     fed_back: np.ndarray
 
     @property
@@ -57,68 +62,66 @@ class Estimate:
         """(n_meshes,) r.m.s. force of all neighbours over that of the alternating force."""
         return np.sqrt(self.left.sum(axis=0))
 
-    def energy(self, problem: LineProblem) -> float:
-        """Size of the alternating motion of the mesh where it is smallest [N^0.5 m^0.5]."""
-        return float(min(np.sqrt(self.square[f.meshes] / f.stiffness).min() for f in problem.families))
-
     @property
     def feedback(self) -> np.ndarray:
         """(n_meshes,) r.m.s. force that the neighbours make by way of the lines solved for, likewise."""
         return np.sqrt(self.fed_back)
 
 
-def estimate(equations: LineEquations, x, tolerance: float) -> Estimate:
+def estimate(problem: LineProblem, lines, forces, tolerance: float) -> Estimate:
     """Effects of the lines and of their neighbours.
 
     Parameters
     ----------
-    equations : LineEquations
-    x : (L, m) complex array
-        Two-sided lines of the simple motions, their solution.
+    problem : LineProblem
+    lines : (L,) int array
+        Codes.
+    forces : (L, n_meshes) complex array
+        Two-sided lines of the mesh forces, their solution.
     tolerance : float
-        Neighbours whose mesh forces are a small share of this are not looked at.
+        Neighbours that get a small share of this are not looked at.
     """
-    problem, table = equations.problem, equations.table
-    approaches = table.approaches(x)
-    square = _alternating(problem, table, approaches)
-    effect = _effects(problem, x) / square
+    alternating = np.sqrt(2.0 * (np.abs(forces[1:]) ** 2).sum(axis=0))
+    still = max(_STILL * np.abs(forces[0]).max(), np.finfo(float).tiny)
+    alternating = np.maximum(alternating, still)
+    effect = 2.0 * np.abs(forces / alternating) ** 2
     effect[0] = 0.0
-    beyond = _neighbours(equations.lines, table, approaches, square, _OVERLOOKED * tolerance)
-    forces = coupling(problem, equations.lines, beyond).forces(x) if len(beyond) else x[:0]
-    motion = -problem.response(beyond, forces, problem.basic.T)
-    left = _effects(problem, motion) / square
-    return Estimate(effect, beyond, motion, left, square, np.zeros(len(square)))
+    beyond = _neighbours(problem, lines, forces / alternating, _OVERLOOKED * tolerance)
+    both = np.union1d(lines, beyond)
+    table = force_table(problem, lines, both, both)
+    answer = table.through(table.still()) - table.answered(forces)
+    found, missed = answer[places(both, beyond)], answer[places(both, lines)] - forces
+    left = 2.0 * np.abs(found / alternating) ** 2
+    return Estimate(alternating, effect, beyond, found, left, missed, np.zeros(len(alternating)))
 
 
-def with_feedback(equations: LineEquations, found: Estimate) -> Estimate:
+def with_feedback(equations: ForceEquations, found: Estimate) -> Estimate:
     """With what the neighbours do to the lines solved for: large where these are nearly in resonance.
 
-    One more solution, to a tenth of the feedback.
+    One more solution, to three tenths of the feedback.
     """
-    problem = equations.problem
-    if not len(found.beyond):
-        return found
-    # sets of lines begin with the mean
-    beyond = np.append(0, found.beyond)
-    motion = np.concatenate([np.zeros_like(found.motion[:1]), found.motion])
-    forces = coupling(problem, beyond, equations.lines).forces(motion)
-    right = -problem.response(equations.lines, forces, problem.basic.T)
-    change, _ = equations.solve(right, np.zeros_like(right), _FEEDBACK)
-    return replace(found, fed_back=_effects(problem, change)[1:].sum(axis=0) / found.square)
+    lines = equations.lines
+    both = np.union1d(lines, found.beyond)
+    forces = np.zeros((len(both), len(found.alternating)), complex)
+    forces[places(both, found.beyond)] = found.force
+    right = found.missed - force_table(equations.problem, both, lines, equations.motions).answered(forces)
+    unit = found.alternating * max(np.linalg.norm(right / found.alternating), np.finfo(float).tiny)
+    change, _ = equations.solve(right, np.zeros_like(right), unit, _FEEDBACK)
+    return replace(found, fed_back=2.0 * (np.abs(change[1:] / found.alternating) ** 2).sum(axis=0))
 
 
-def refined(problem: LineProblem, lines, x, found: Estimate, tolerance: float, most: int):
-    """The fewest lines that leave half the tolerance out, at most so many; their motions.
+def refined(problem: LineProblem, lines, forces, found: Estimate, tolerance: float, most: int):
+    """The fewest lines that leave half the tolerance out, at most so many; their forces.
 
     Returns
     -------
     lines : (L,) int array
-    x : (L, m) complex array
+    forces : (L, n_meshes) complex array
         Solved or estimated.
     """
     kept = problem.codes.admitted(found.beyond)
     codes = np.concatenate([lines, found.beyond[kept]])
-    motion = np.concatenate([x, found.motion[kept]])
+    forces = np.concatenate([forces, found.force[kept]])
     effect = np.concatenate([found.effect, found.left[kept]])
     size = effect.max(axis=1)
     # the mean stays
@@ -128,41 +131,30 @@ def refined(problem: LineProblem, lines, x, found: Estimate, tolerance: float, m
     first = min(np.searchsorted(left, (_LEFT * tolerance) ** 2), len(codes) - 1)
     chosen = order[max(first, len(codes) - most) :]
     chosen = chosen[np.argsort(codes[chosen])]
-    return codes[chosen], motion[chosen]
+    return codes[chosen], forces[chosen]
 
 
-def _alternating(problem: LineProblem, table: Coupling, approaches) -> np.ndarray:
-    """Mean squares (n_meshes,) of the alternating mesh forces [N^2]."""
-    square, mean = np.zeros((2, sum(len(one.meshes) for one in problem.families)))
-    for one, approach in zip(table.families, approaches):
-        force = one.force(approach)
-        square[one.family.meshes] = 2.0 * (np.abs(force[1:]) ** 2).sum(axis=0)
-        mean[one.family.meshes] = np.abs(force[0])
-    return np.maximum(square, max((_STILL * mean.max()) ** 2, np.finfo(float).tiny))
+def strong_lines(forces, alternating, tolerance: float) -> np.ndarray:
+    """Whether lines (L,) are not among the small ones whose forces add up to some tolerances."""
+    effect = 2.0 * (np.abs(forces / alternating) ** 2).max(axis=1)
+    effect[0] = np.inf
+    order = np.argsort(effect)
+    strong = np.empty(len(effect), bool)
+    strong[order] = np.cumsum(effect[order]) > (_STRONG * tolerance) ** 2
+    return strong
 
 
-def _effects(problem: LineProblem, x) -> np.ndarray:
-    """Mean squares (L, n_meshes) of the forces that every line makes with the varying stiffness [N^2]."""
-    out = np.zeros((len(x), sum(len(one.meshes) for one in problem.families)))
+def _neighbours(problem: LineProblem, lines, size, share) -> np.ndarray:
+    """Codes of the lines outside that the relative forces (L, n_meshes) reach, but for a share of these."""
+    both, size, found = mirrored_codes(lines), np.abs(mirrored(size)), []
     for one in problem.families:
-        for v in one.directions.values():
-            out[:, one.meshes] += 2.0 * np.abs(x @ v) ** 2 * one.square
-    return out
-
-
-def _neighbours(lines, table, approaches, square, share) -> np.ndarray:
-    """Codes of the lines outside that the mesh forces reach, but for a share of these."""
-    found = []
-    for one, approach in zip(table.families, approaches):
-        family, both = one.family, mirrored_codes(one.inner)
-        relative = family.waves.T / np.sqrt(square[family.meshes])
-        size = (np.abs(mirrored(approach))[:, None, :] * np.abs(relative)).max(axis=2)
-        ordered = np.sort(size, axis=None)
+        product = (size[:, None, one.meshes] * np.abs(one.compliance.T)).max(axis=2)
+        ordered = np.sort(product, axis=None)
         small = np.searchsorted(np.cumsum(ordered**2), share**2)
-        if small == len(ordered):
-            continue
-        at, number = np.nonzero(size >= ordered[small])
-        reached = np.unique(np.abs(both[at] + family.harmonics[number] * family.step))
-        found.append(beside(reached, family.turn))
-    reached = np.unique(np.concatenate([lines[:0], *found]))
+        if small < len(ordered):
+            at, number = np.nonzero(product >= ordered[small])
+            found.append(both[at] + one.compliance_orders[number] * one.step)
+    # what a turn of the carrier adds to lines that are not solved for is smaller still
+    found += [beside(lines, one.turn) for one in problem.families]
+    reached = np.unique(np.abs(np.concatenate(found)))
     return reached[places(lines, reached) < 0]

@@ -1,15 +1,18 @@
 """Lines of the settled motion: search, remainder, limits; integration, Mathieu's equation as references."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import mathieu_a
 
+from femgear.case import read_case
 from femgear.errors import CaseError, ConvergenceError
 from femgear.models.drivetrain import balanced_torque, drivetrain_model
 from femgear.models.drivetrain_balance import drivetrain_lines, settled_motion
+from femgear.models.drivetrain_case import case_model
 from femgear.models.drivetrain_data import ChainBody, Drivetrain, MeshWave, ParallelStage
 from femgear.models.drivetrain_lattice import LineCodes, beside, line_codes, mirrored_codes
 from femgear.models.drivetrain_march import march_drivetrain
@@ -65,6 +68,29 @@ def test_turbine_in_torsion_against_integration():
     assert found.converged and error.max() < 0.015
     by_hand = drivetrain_lines(model, harmonics=30, bands=0)
     assert settled_motion(model, torques, speed=speed, orders=by_hand).remainder.max() > 0.2
+
+
+def test_stiff_meshes_that_hardly_alternate_against_integration():
+    """The motion gives way to the varying stiffness by many lines; the forces need few."""
+    case = read_case(Path(__file__).parents[2] / "cases" / "grc_like_drivetrain.toml")
+    model, speed = case_model(case), case.operation.speed
+    torques = balanced_torque(model, "rotor", 300e3, "generator")
+    found = settled_motion(model, torques, speed=speed)
+    time, force = integrated(model, torques, speed, found, duration=0.2, rate=100e3)
+    # most of the planets' alternating force has the period of the carrier's turn, longer than this run
+    alternating = np.sqrt(0.5 * (np.abs(found.force[:, 1:]) ** 2).sum(axis=1))
+    error = np.sqrt(((found.at(time)[1] - force) ** 2).mean(axis=0)) / alternating
+    assert found.converged and len(found.orders) < 600
+    assert error.max() < 0.015
+
+
+def test_stiffness_without_a_series_of_its_compliance_is_refused():
+    stages = tuple(replace(p, mesh=replace(p.mesh, low_share=1e-6)) for p in TRAIN.parallel)
+    bodies = tuple(b for b in TRAIN.bodies if b.name in ("gear 1", "gear 2", "gear 3"))
+    model = torsional_model(Drivetrain(bodies, parallel=stages, damping_ratio=0.05), harmonics=5)
+    with pytest.raises(CaseError) as error:
+        settled_motion(model, balanced_torque(model, "gear 1", 3000.0, "gear 3"), speed=3.8)
+    assert error.value.code == "E-STIFFNESS" and "gear 1-gear 2" in str(error.value)
 
 
 def test_search_against_a_lattice_that_is_complete():
