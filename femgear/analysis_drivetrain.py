@@ -10,12 +10,14 @@ import numpy as np
 from femgear.analysis import Progress
 from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.casefile.drivetrain_checks import settle_time
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import ConvergenceError
 from femgear.models.drivetrain_case import (
     BENDING,
     TORSIONAL,
     case_model,
     check_drivetrain,
+    check_spectrum,
+    check_turning,
     record_every,
     record_rate,
     torque_histories,
@@ -37,8 +39,9 @@ if TYPE_CHECKING:
 _SPEEDS, _FASTEST, _HIGHEST, _MOST_BRANCHES = 21, 10.0 / 3.0, 2.5, 40
 # Orders are read off up to this share of the record rate: beyond it the interpolation takes more than 1.4 %.
 _ORDERS = 0.25
-# Slower instants, over the mean speed, would need records of endless length over a turn.
-_SLOWEST = 0.05
+# Growth of the free motion from which linear meshes are asked whether the motion means anything, and the
+# vibration of a body over its own speed that means nothing.
+GROWN, _WILD = 1e3, 100.0
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,7 @@ def solve_transient_run(case: DrivetrainCase, *, progress: Progress | None = Non
     Raises
     ------
     ConvergenceError
-        The motion outgrows the numbers (E-DIVERGED).
+        The motion outgrows the numbers, or all sense (E-DIVERGED).
     """
     check_drivetrain(case)
     variants = (BENDING, TORSIONAL) if case.simulation.torsional else (BENDING,)
@@ -137,7 +140,7 @@ def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
 
     s = case.simulation
     try:
-        return march_drivetrain(
+        run = march_drivetrain(
             model,
             torques,
             duration=s.duration,
@@ -153,6 +156,27 @@ def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
         if error.code == "E-DIVERGED":
             error.key, error.message = "simulation.damping_ratio", f"{variant}: {error.message}"
         raise
+    _check_sense(run, variant, list(model.ratio.values()))
+    return run
+
+
+def _check_sense(run: DrivetrainRun, variant: str, ratio) -> None:
+    """Refuse linear motions that a resonance has blown up beyond sense, however exact their books are."""
+    if run.contact_loss or not run.gain > GROWN:
+        return
+    fastest = np.abs(run.spin_speed).max() * np.abs(ratio)
+    vibration = np.abs(run.velocity).max(axis=0)
+    worst = int(np.argmax(vibration - _WILD * fastest))
+    if vibration[worst] <= _WILD * fastest[worst]:
+        return
+    body = run.outputs[worst].split(":")[0]
+    raise ConvergenceError(
+        f"{variant}: {body} vibrates with {vibration[worst]:.3g} rad/s beside {fastest[worst]:.3g} rad/s of "
+        f"its own speed: the free motion grows {run.gain:.2g} times within the run, a parametric resonance",
+        code="E-DIVERGED", key="simulation.damping_ratio",
+        limit=f"vibration below {_WILD:g} times the speed of the body, where linear meshes grow",
+        remedy="give more damping, or another speed, or write contact_loss = true: real meshes separate",
+    )  # fmt: skip
 
 
 def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> SpectrumResult:
@@ -161,11 +185,12 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
     Raises
     ------
     CaseError
-        A first body that stops or turns back (E-SPECTRUM).
+        As `femgear.models.drivetrain_case.check_spectrum`.
     """
     from femgear.models.drivetrain_lines import line_amplitudes, mesh_lines
     from femgear.models.drivetrain_spectra import averaged_spectrum, order_spectrum
 
+    check_spectrum(case, transient.models[BENDING])
     first, settle = next(iter(transient.runs.values())), settle_time(case)
     rate = record_rate(case, transient.models[BENDING])
     late, step = first.time >= settle, 1.0 / rate
@@ -174,12 +199,7 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
     speed = float(first.spin_speed[late].mean())
     turns = float(np.ptp(first.spin[late])) / (2.0 * np.pi)
     slowest = min(float(run.spin_speed[late].min()) for run in transient.runs.values())
-    if not slowest > _SLOWEST * speed:
-        raise CaseError(
-            "the first body nearly stops or turns back: there are no orders", code="E-SPECTRUM",
-            key="operation.torque", limit=f"never slower than {_SLOWEST:.0%} of its mean speed",
-            remedy="give torques that keep it turning, or write --only transient",
-        )  # fmt: skip
+    check_turning(slowest, speed)
     lines = mesh_lines(transient.models[BENDING])
     per_turn = int(np.ceil(2.0 * np.pi * rate / slowest))
     distance = 1.0 / (0.99 * turns)

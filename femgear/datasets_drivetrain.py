@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.datasets import RPM, dataset
+from femgear.models.drivetrain_names import numbered
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +19,8 @@ _TORSION = 0.9
 
 
 def _names(name: str, values, long_name: str) -> tuple:
-    return (name,), list(values), "1", long_name
+    """A coordinate of names, those that come again with a number."""
+    return (name,), numbered([str(value) for value in values]), "1", long_name
 
 
 def drivetrain_modes_dataset(result: DrivetrainModesResult) -> xr.Dataset:
@@ -129,6 +131,10 @@ def transient_dataset(result: TransientResult) -> xr.Dataset:
         "growth": (
             ("variant",), [run.growth for run in runs], "1/s",
             "mean rate of the logarithm of the free motion: above zero it grows",
+        ),
+        "gain": (
+            ("variant",), [run.gain for run in runs], "1",
+            "largest growth of the free motion between two instants of the run, as a factor",
         ),
         "torque": (("time", "body"), torque, "N m", "external torque"),
         "ratio": (("body",), ratio, "1", "speed over that of the first body"),

@@ -98,6 +98,10 @@ def check_case(case: Case, only: str | None = None) -> None:
     gears = None if isinstance(case, DrivetrainCase) else planetary_set(case)
     if set(stages) - {"static", "stress"}:
         KINDS[kind_of(case)].check(case, gears)
+    if isinstance(case, DrivetrainCase) and "spectrum" in stages:
+        from femgear.models.drivetrain_case import case_model, check_spectrum
+
+        check_spectrum(case, case_model(case))
 
 
 def _stress(case, results, cache, progress):

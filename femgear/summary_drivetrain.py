@@ -8,9 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.models.drivetrain_rates import GOOD_STEPS, highest_mesh
+from femgear.errors import CaseError
+from femgear.models.drivetrain_rates import (
+    GOOD_STEPS,
+    frequency_shift,
+    highest_mesh,
+    mesh_mode,
+    shift_rate,
+)
 from femgear.models.drivetrain_record import PASS_BAND
 from femgear.summary_block import Block
+from femgear.summary_transient import GROWN, growth_rates, largest_gains, separating, shown_factor
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,12 +31,8 @@ RPM = math.pi / 30
 _SHOWN = 16
 # A speed that changes by more is worth a remark.
 _CHANGE = 2.0
-# The step rule keeps energy and momentum exactly: more is rounding that grew, or a motion that runs away.
-_BALANCE = 1e-6
-# Linear meshes: a free motion that grows by more than this over a run is no longer small.
-_GROWN = 10.0
-# A force that is rounding [N].
-_NOTHING = 1e-6
+# Share by which steps may lower the frequency of a mode that the meshes drive, and a small one.
+_SHIFT, _SMALL_SHIFT = 1e-2, 1e-3
 
 
 def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
@@ -64,7 +68,8 @@ def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = No
 
     model = model or check_drivetrain(case)
     speeds = case_speeds(case, model)
-    return (*case.notices, *_runaway(case, speeds), *_rates(case, model, speeds))
+    warned = _runaway(case, speeds), _rates(case, model, speeds), _spectra(case, model)
+    return (*case.notices, *(text for some in warned for text in some))
 
 
 def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
@@ -97,11 +102,31 @@ def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> 
             f"[W-RATE] simulation.rate: {rate / top:.3g} steps a period of the {name} ({where}) shift and "
             f"damp it; take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz"
         )
+    # modes above the last line of the mesh stiffness answer as springs
+    mode = mesh_mode(model, top * case.simulation.harmonics)
+    if (shift := frequency_shift(mode, rate)) > _SHIFT:
+        yield (
+            f"[W-RATE] simulation.rate: steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the "
+            f"meshes drive, by {shift:.2%}; {shift_rate(mode, _SHIFT):.3g} Hz lowers it by {_SHIFT:.0%}, "
+            f"{shift_rate(mode, _SMALL_SHIFT):.3g} Hz by {_SMALL_SHIFT:.1%}"
+        )
     if 0.5 * PASS_BAND * record < top:
         yield (
             f"[W-RECORD] simulation.record: records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, "
             f"below the {name} ({where})"
         )
+
+
+def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
+    """Runs that stop before the spectra, which would be refused."""
+    from femgear.models.drivetrain_case import check_spectrum
+
+    if not len(model.meshes):
+        return
+    try:
+        check_spectrum(case, model)
+    except CaseError as error:
+        yield f"[W-SPECTRUM] {error.key}: {error.message}: the stage spectrum refuses this ({error.code})"
 
 
 def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
@@ -153,19 +178,21 @@ def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
         contact = f"{one.sun_mesh.contact_ratio:.4g}, {one.ring_mesh.contact_ratio:.4g}"
         stiffness = f"{one.sun_mesh.stiffness:.4g}, {one.ring_mesh.stiffness:.4g}"
         ratio = model.ratio[one.sun] / model.ratio[one.carrier]
-        rows.append((one.name, teeth, radii, f"{ratio:.5g}", contact, stiffness, f"{hertz[2 * i + 1]:.4f}"))
+        driver, line = one.driver or one.ends[0], f"{hertz[2 * i + 1]:.4f}"
+        rows.append((one.name, driver, teeth, radii, f"{ratio:.5g}", contact, stiffness, line))
     for i, (one, given) in enumerate(zip(train.parallel, case.parallel)):
         radii = f"{1e3 * one.first_radius:.4f}, {1e3 * one.second_radius:.4f}"
         ratio = model.ratio[one.second] / model.ratio[one.first]
         line = hertz[2 * len(train.planetary) + i]
         rows.append(
             (
-                one.name, f"{given.teeth[0]} / {given.teeth[1]}", radii, f"{ratio:.5g}",
+                one.name, one.driver or one.ends[0], f"{given.teeth[0]} / {given.teeth[1]}", radii,
+                f"{ratio:.5g}",
                 f"{one.mesh.contact_ratio:.4g}", f"{one.mesh.stiffness:.4g}", f"{line:.4f}",
             )
         )  # fmt: skip
     header = (
-        "stage", "teeth", "pitch radii [mm]", "ratio", "contact ratio", "stiffness [N/m]", "mesh [Hz]",
+        "stage", "driver", "teeth", "pitch radii [mm]", "ratio", "contact ratio", "stiffness [N/m]", "mesh [Hz]",
     )  # fmt: skip
     return Block("Gear stages", header, tuple(rows))
 
@@ -215,7 +242,7 @@ def describe_transient(data: xr.Dataset) -> Block:
     """Table of transient.nc: mesh forces, speeds, balances."""
     rows, mean = [], data["mesh_force"].values.mean(axis=1)
     least, largest, pulling = (data[name].values for name in ("least_force", "largest_force", "pulling"))
-    parts = _parts(data)
+    parts = separating(data)
     for v, variant in enumerate(data["variant"].values):
         for m, mesh in enumerate(data["mesh"].values):
             forces = [f"{1e-3 * values[v, m]:.4f}" for values in (mean, least, largest)]
@@ -238,55 +265,18 @@ def describe_transient(data: xr.Dataset) -> Block:
     return Block("Transient", header, tuple(rows), tuple(notes))
 
 
-def _parts(data: xr.Dataset) -> bool:
-    """Whether the meshes of transient.nc lose contact."""
-    return data.attrs.get("contact", "linear") == "separating"
-
-
-def _growths(data: xr.Dataset) -> Iterator[tuple[str, float]]:
-    """Variants and the rates of their free motions [1/s]; results of earlier runs have none."""
-    if "growth" in data:
-        yield from zip(map(str, data["variant"].values), map(float, data["growth"].values))
-
-
 def _growth_notes(data: xr.Dataset) -> Iterator[str]:
-    for variant, rate in _growths(data):
+    for variant, rate in growth_rates(data):
         if not math.isfinite(rate):
             continue
-        if _parts(data):
+        if separating(data):
             words = "move apart: the motion is chaotic or unstable" if rate > 0.0 else "draw together"
             yield f"{variant}: neighbouring motions {words} (Lyapunov exponent {rate:.4g} 1/s)"
         else:
-            yield f"{variant}: the free motion {'grows' if rate > 0.0 else 'decays'} with {abs(rate):.4g} 1/s"
-
-
-def transient_warnings(data: xr.Dataset) -> Iterator[str]:
-    """What transient.nc says against itself."""
-    pulling, least = data["pulling"].values, data["least_force"].values
-    for v, variant in enumerate(data["variant"].values):
-        if pulling[v].any() and least[v].min() < -_NOTHING and not _parts(data):
-            worst, lowest = int(np.argmax(pulling[v])), int(np.argmin(least[v]))
-            yield (
-                f"[W-PULL] {variant}: {data['mesh'].values[worst]} pulls for {pulling[v, worst]:.2%} of the "
-                f"time, {data['mesh'].values[lowest]} with up to {-1e-3 * least[v, lowest]:.4g} kN: real "
-                "teeth would part (simulation.contact_loss)"
-            )
-    yield from _growth_warnings(data)
-    for name, words in (("energy_error", "energy"), ("momentum_error", "angular momentum")):
-        if not (error := float(data[name].max())) <= _BALANCE:
-            yield f"[W-BALANCE] the balance of {words} misses {error:.1e} of its largest term"
-
-
-def _growth_warnings(data: xr.Dataset) -> Iterator[str]:
-    duration = float(data.attrs["steps"]) * float(data.attrs["step"])
-    for variant, rate in () if _parts(data) else _growths(data):
-        if rate * duration > math.log(_GROWN):
-            power = rate * duration / math.log(10.0)
-            times = f"{10.0**power:.3g}" if power < 300.0 else f"1e{power:.0f}"
-            yield (
-                f"[W-GROWTH] {variant}: the free motion grows with {rate:.4g} 1/s, {times} times over the "
-                "run: a parametric resonance; give more damping or another speed, or contact_loss = true"
-            )
+            way = "grows" if rate > 0.0 else "decays"
+            text = f"{variant}: the free motion {way} with {abs(rate):.4g} 1/s in the mean"
+            gain = largest_gains(data).get(variant, math.nan)
+            yield f"{text}, at most {shown_factor(math.log10(gain))} times" if gain > GROWN else text
 
 
 def describe_spectrum(data: xr.Dataset) -> Block:

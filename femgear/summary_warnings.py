@@ -9,8 +9,9 @@ import numpy as np
 
 from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.summary import warnings_of
-from femgear.summary_drivetrain import drivetrain_warnings, transient_warnings
+from femgear.summary_drivetrain import drivetrain_warnings
 from femgear.summary_planar import planar_verdicts
+from femgear.summary_transient import transient_warnings
 
 if TYPE_CHECKING:
     import xarray as xr

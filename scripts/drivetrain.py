@@ -11,8 +11,11 @@ from cyclopts import Parameter
 from drivetrain_figures import backlash_figure, sensitivity_figure, with_balance
 from script_tools import Progress, print_table, ready_folder, run_script, say_files, write_csv
 
+from femgear.errors import FemgearError
+
 PAPER = Path(__file__).resolve().parents[1] / "cases" / "wind_turbine_drivetrain.toml"
 STAGES = ("planetary", "gear 1-2", "gear 2-3")
+FILES = {"contact loss": "backlash", "sensitivity": "sensitivity"}
 
 
 def main(
@@ -51,8 +54,8 @@ def main(
     from femgear.analysis_drivetrain import solve_drivetrain_modes, solve_spectrum, solve_transient_run
     from femgear.case import read_case, with_value
     from femgear.case_drivetrain import need_drivetrain
+    from femgear.models.drivetrain_case import case_model, check_spectrum
     from femgear.pictures_drivetrain import write_drivetrain_pictures
-    from femgear.plots import save_figure
     from femgear.summary_drivetrain import describe_drivetrain, describe_spectrum, describe_transient
 
     data, paper = need_drivetrain(read_case(case)), read_case(PAPER)
@@ -65,32 +68,53 @@ def main(
     data = with_value(data, "simulation.torsional", torsional)
     data = with_balance(data) if balanced else data
     blocks = describe_drivetrain(data)  # refuse before the folder is touched
-    folder, figures, apart = ready_folder(output), {}, ""
+    if gears := bool(data.parallel or data.planetary):
+        check_spectrum(data, case_model(data))
+    folder = ready_folder(output)
     with Progress() as progress:
         found = {"modes": solve_drivetrain_modes(data)}
         found["transient"] = solve_transient_run(data, progress=progress)
-        found["spectrum"] = solve_spectrum(data, found["transient"])
+        if gears:
+            found["spectrum"] = solve_spectrum(data, found["transient"])
         sets = {name: stage.dataset() for name, stage in found.items()}
         names = write_drivetrain_pictures(folder, data, sets, progress=progress)
-        if found["modes"].model.meshes:
-            figures["backlash"], apart = backlash_figure(data, found["modes"].model)
-        if sensitivity and _is_paper(data, paper):
-            figures["sensitivity"] = sensitivity_figure(progress)
-    for name, figure in figures.items():
-        if figure is not None:
-            save_figure(figure, folder / f"{name}.png")
-            names.append(f"{name}.png")
-    blocks = [block for block in blocks if block.rows]
-    for block in (*blocks, describe_transient(sets["transient"]), describe_spectrum(sets["spectrum"])):
+    _write_forces(folder, sets["transient"])
+    names.append("forces.csv")
+    blocks = [*(block for block in blocks if block.rows), describe_transient(sets["transient"])]
+    for block in (*blocks, describe_spectrum(sets["spectrum"])) if gears else blocks:
         print_table(block.title, block.header, block.rows)
         for note in block.notes:
             print(f"  {note}")
-    if apart:
-        print(f"contact loss: {apart}")
     if _is_paper(data, paper):
         _kinematics()
-    _write_forces(folder, sets["transient"])
-    say_files(folder, [*names, "forces.csv"])
+    extras = {"contact loss": lambda: backlash_figure(data, found["modes"].model)} if gears else {}
+    if sensitivity and _is_paper(data, paper):
+        extras["sensitivity"] = _sensitivity
+    names += _draw_extras(folder, extras)
+    say_files(folder, names)
+
+
+def _draw_extras(folder: Path, extras) -> list[str]:
+    """Pictures beside those of a run; what stops one of them is said and stops nothing else."""
+    from femgear.plots import save_figure
+
+    names = []
+    for title, draw in extras.items():
+        try:
+            figure, text = draw()
+        except FemgearError as error:
+            figure, text = None, f"no picture: [{error.code}] {error.message}"
+        if text:
+            print(f"{title}: {text}")
+        if figure is not None:
+            names.append(f"{FILES[title]}.png")
+            save_figure(figure, folder / names[-1])
+    return names
+
+
+def _sensitivity():
+    with Progress() as progress:
+        return sensitivity_figure(progress), ""
 
 
 def _is_paper(data, paper) -> bool:

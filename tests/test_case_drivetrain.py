@@ -138,7 +138,6 @@ def refused(case, **changes):
         ("operation.speed", "0 rpm", "E-RANGE", "operation.speed"),
         ("simulation.record", "7 kHz", "E-RANGE", "simulation.record"),
         ("simulation.settle", "3 s", "E-RANGE", "simulation.settle"),
-        ("simulation.resolution", "0.01 Hz", "E-RANGE", "simulation.resolution"),
         ("simulation.duration", "9e4 s", "E-RANGE", "simulation.duration"),
         ("simulation.contact_loss", "yes", "E-TYPE", "simulation.contact_loss"),
         ("model", "drivetrian", "E-CHOICE", "model"),

@@ -9,7 +9,7 @@ import pytest
 from femgear.case import parse_case, read_case, to_toml, with_value
 from femgear.casefile import tomlfile
 from femgear.errors import CaseError
-from femgear.models.drivetrain_case import case_model, check_drivetrain, record_rate
+from femgear.models.drivetrain_case import case_model, check_drivetrain, check_spectrum, record_rate
 from femgear.summary import describe
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -54,7 +54,7 @@ def test_the_fastest_speed_counts(own):
     found, notes = warnings_of(case, "W-RATE", "W-RECORD", "W-SPEED")
     assert found == {"W-RATE", "W-RECORD"} and "the fastest" in notes
     still = with_value(case, "operation.torque", None)
-    assert warnings_of(still, "W-RATE", "W-RECORD", "W-SPEED")[0] == set()
+    assert warnings_of(still, "steps a period", "W-RECORD", "W-SPEED")[0] == set()
     fast = re.search(r"(\d+\.?\d*) Hz at (\d+\.?\d*) rpm", notes)
     rpm = 1480.0 + 60.0 / case_model(case).inertia * 2.0 * 30.0 / math.pi
     assert float(fast[2]) == pytest.approx(rpm, rel=1e-4) and float(fast[1]) == pytest.approx(
@@ -70,6 +70,39 @@ def test_speeds_that_run_away_are_said(own):
     ):
         found, notes = warnings_of(driven(own, torque, rate="100 kHz", record="10 kHz"), "W-SPEED")
         assert (found == {"W-SPEED"}) == (torque != "-60 N m") and (words in notes) == bool(found)
+
+
+def test_steps_that_lower_the_modes_of_the_mesh_are_said(own):
+    """The motor's chain: 35 steps a mesh period, but a mode of the mesh at two and a half times that line."""
+    found, notes = warnings_of(with_value(own, "simulation.rate", "20 kHz"), "W-RATE", "steps a period")
+    assert found == {"W-RATE"}
+    hertz, percent = (float(re.search(text, notes)[1]) for text in (r"mode of (\S+) Hz", r"by (\S+)%;"))
+    assert 1400.0 < hertz < 1450.0 and percent == pytest.approx(
+        100.0 * (math.pi * hertz / 20e3) ** 2 / 3, rel=0.05
+    )
+    fast = re.search(r"; (\S+) Hz lowers it by 1%, (\S+) Hz by 0.1%", notes)
+    assert float(fast[2]) / float(fast[1]) == pytest.approx(math.sqrt(10.0), rel=0.01)
+    for rate, said in ((float(fast[1]) * 0.98, {"W-RATE"}), (float(fast[1]) * 1.01, set())):
+        case = with_value(with_value(own, "simulation.record", None), "simulation.rate", f"{rate:g} Hz")
+        assert warnings_of(case, "W-RATE")[0] == said
+
+
+def test_spectra_are_refused_where_they_are_asked_for(own):
+    short = with_value(own, "simulation", {"duration": "1 ms", "rate": "50 kHz"})
+    brake = driven(own, "-300 N m", rate="100 kHz", record="10 kHz")
+    fine = with_value(own, "simulation.resolution", "0.01 Hz")
+    for case, code, key in (
+        (short, "E-RANGE", "simulation.duration"),
+        (fine, "E-RANGE", "simulation.resolution"),
+        (brake, "E-SPECTRUM", "operation.torque"),
+    ):
+        model = check_drivetrain(case)
+        with pytest.raises(CaseError, match=code):
+            check_spectrum(case, model)
+        found, notes = warnings_of(case, "W-SPECTRUM")
+        assert found and key in notes.split("[W-SPECTRUM]")[1]
+    check_spectrum(own, check_drivetrain(own))
+    assert not warnings_of(own, "W-SPECTRUM")[0]
 
 
 def test_steps_that_cannot_follow_are_refused(own):
@@ -90,7 +123,10 @@ def test_default_records_keep_three_mesh_harmonics(own, paper):
     assert rate == pytest.approx(50e3 / 11) and 0.4 * rate > 3 * 567.34 > 0.4 * 50e3 / 12
     assert record_rate(paper, case_model(paper)) == pytest.approx(1250.0)
     assert record_rate(own, case_model(own)) == 5e3
-    error = refused_model(with_value(own, "simulation", {"duration": "10 ms", "rate": "50 kHz"}))
+    short = with_value(own, "simulation", {"duration": "10 ms", "rate": "50 kHz"})
+    with pytest.raises(CaseError) as caught:
+        check_spectrum(short, check_drivetrain(short))
+    error = caught.value
     assert (error.code, error.key) == ("E-RANGE", "simulation.duration") and "64 records" in error.limit
 
 
@@ -108,6 +144,30 @@ def test_sizes_alone_are_no_mechanism(own):
         else:
             error = refused_model(case)
             assert error.code == "E-SPREAD" and "wheel-fan" in error.remedy
+
+
+@pytest.mark.parametrize("body", [0, 1])
+def test_one_soft_bearing_is_named(body):
+    """The mesh alone holds a gear without its bearing, along one line; nothing else is slow."""
+    text = """
+        model = "drivetrain"
+        title = "two gears"
+        body = [{name = "a", inertia = "0.25 kg m^2", mass = "210 kg", tilts = false},
+                {name = "b", inertia = "18 kg m^2", mass = "160 kg", tilts = false}]
+        bearing = [{body = "a", radial = "2e8 N/m"}, {body = "b", radial = "1e8 N/m"}]
+        operation = {speed = "1480 rpm"}
+        simulation = {duration = "1 s"}
+        [[parallel]]
+        between = ["a", "b"]
+        teeth = [23, 71]
+        module = "3 mm"
+        mesh = {stiffness = "3e8 N/m", contact_ratio = 1.68}
+    """
+    assert check_drivetrain(parse_case(text))
+    error = refused_model(with_value(parse_case(text), f"bearing[{body}].radial", "1e-3 N/m"))
+    assert (error.code, error.key, error.value) == ("E-SPREAD", f"bearing[{body}].radial", "0.001 N/m")
+    hertz = math.sqrt(1e-3 / (210.0, 160.0)[body]) / (2.0 * math.pi)
+    assert f"{'ab'[body]} on its bearings alone has {hertz:.3g} Hz" in error.message
 
 
 def test_contact_loss_and_its_notice(own):

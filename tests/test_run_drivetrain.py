@@ -24,6 +24,7 @@ from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.errors import CaseError, ConvergenceError
 from femgear.models.drivetrain import balanced_torque
 from femgear.models.drivetrain_balance import settled_motion
+from femgear.models.drivetrain_case import check_spectrum
 from femgear.models.drivetrain_lines import MeshLine, line_amplitudes, mesh_lines, resolved_lines
 from femgear.models.drivetrain_record import Decimator
 from femgear.plots.drivetrain_results import spectrum_figures
@@ -253,6 +254,8 @@ def test_a_shaft_without_gears_has_no_spectrum(own, tmp_path):
     assert (speed[-1] - speed[0]).mean() == pytest.approx(2.0, rel=0.05)
     with pytest.raises(CaseError, match="no gears"):
         stages_of(parse_case(text), "spectrum")
+    with pytest.raises(CaseError, match=r"E-SPECTRUM.*no gears"):
+        solve_spectrum(parse_case(text), solve_transient_run(parse_case(text)))
 
 
 def test_command_line(tmp_path, capsys, own):
@@ -292,10 +295,20 @@ def test_a_motion_that_grows_without_end_is_refused(resonant):
         assert part in text
 
 
+def test_a_motion_beyond_sense_is_refused_though_its_books_are_exact(resonant):
+    with pytest.raises(ConvergenceError, match="E-DIVERGED") as caught:
+        solve_transient_run(with_value(resonant, "simulation.duration", "0.2 s"))
+    error = caught.value
+    assert "torsional: motor vibrates with" in error.message and "100 times the speed" in error.limit
+    assert error.key == "simulation.damping_ratio" and "contact_loss" in error.remedy
+
+
 def test_growth_and_contact_loss_in_the_results(resonant):
-    short = with_value(resonant, "simulation.duration", "0.2 s")
+    short = with_value(resonant, "simulation.duration", "0.1 s")
     linear = solve_transient_run(short).dataset()
     assert linear.attrs["contact"] == "linear" and float(linear["lost"].max()) == 0.0
+    # grown at most as the exponent of the second says
+    assert 10.0 < float(linear["gain"][1]) < math.exp(1.2 * 0.1 * float(linear["growth"][1]))
     assert np.all(linear["growth"].values[1:] > 10.0) and linear["growth"].attrs["units"] == "1/s"
     longer = with_value(resonant, "simulation.duration", "0.5 s")
     apart = solve_transient_run(with_value(longer, "simulation.contact_loss", True)).dataset()
@@ -307,8 +320,17 @@ def test_growth_and_contact_loss_in_the_results(resonant):
 def test_a_chain_that_turns_back_has_no_orders(own):
     brake = [{"body": "motor", "torque": "-900 N m"}]
     case = with_value(with_value(own, "operation.torque", brake), "simulation.duration", "0.6 s")
-    with pytest.raises(CaseError, match="nearly stops or turns back"):
+    with pytest.raises(CaseError, match="nearly stops or turns back") as caught:
         solve_spectrum(case, solve_transient_run(case))
+    # known from the torques alone, with the same numbers
+    with pytest.raises(CaseError) as before:
+        check_spectrum(case, case_model(case))
+    assert before.value.message == caught.value.message and before.value.code == "E-SPECTRUM"
+    run = solve_transient_run(case).runs[BENDING]
+    late = run.time >= case.simulation.settle
+    rpm = [float(number) for number in re.findall(r"(\S+) rpm", before.value.message)]
+    wanted = np.array([run.spin_speed[late].min(), run.spin_speed[late].mean()]) * 30.0 / math.pi
+    assert rpm == pytest.approx(wanted, abs=2.0)
 
 
 def keys_of(model) -> set[str]:

@@ -6,7 +6,15 @@ import math
 import re
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    ValidationInfo,
+    field_validator,
+)
 
 from femgear.casefile.fields import Count, Number, Quantity, Title, described, refuse
 from femgear.casefile.origin import ReadCase
@@ -98,6 +106,16 @@ def Pair(kind: Any) -> Any:
     return Annotated[tuple[kind, ...], BeforeValidator(_two)]
 
 
+def _driver(value: str | None, ends) -> str | None:
+    """The driver of a stage; where the ends themselves are wrong, they alone are refused."""
+    if value is not None and len(ends) == 2 and value not in ends:
+        raise refuse(
+            "the driver is none of the two bodies of its stage", code="E-BODY", value=value,
+            limit=" or ".join(ends),
+        )  # fmt: skip
+    return value
+
+
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -152,6 +170,12 @@ class ParallelSection(_Section):
     helix_angle: Quantity(ANGLE, -math.radians(60), math.radians(60)) = 0.0
     direction: Angle = 0.0
     offsets: Pair(Offset) = (0.0, 0.0)
+    driver: Reference | None = None
+
+    @field_validator("driver")
+    @classmethod
+    def _one_of_two(cls, value, info: ValidationInfo):
+        return _driver(value, info.data.get("between", ()))
 
 
 class PlanetarySection(_Section):
@@ -176,6 +200,12 @@ class PlanetarySection(_Section):
     sun_mesh: MeshSection
     ring_mesh: MeshSection
     pressure_angle: PressureAngle = math.radians(20.0)
+    driver: Reference | None = None
+
+    @field_validator("driver")
+    @classmethod
+    def _one_of_two(cls, value, info: ValidationInfo):
+        return _driver(value, [info.data[key] for key in ("carrier", "sun") if key in info.data])
 
 
 class BearingSection(_Section):

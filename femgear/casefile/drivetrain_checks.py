@@ -251,13 +251,18 @@ def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
             value=FREQUENCY.show(record), limit=f"{MOST_VALUES:g} numbers",
             remedy=f"take {FREQUENCY.show(record * MOST_VALUES / size)} or less, or a shorter duration",
         )  # fmt: skip
+
+
+def spectrum_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
+    """Why the records of a run have no spectra; parameters as of `record_problems`."""
+    s = case.simulation
     late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
     if late * record < LEAST_RECORDS:
         yield CaseError(
             f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
             key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
             limit=f"{LEAST_RECORDS} records or more after simulation.settle",
-            remedy="take a longer duration, a shorter settle or more records a second",
+            remedy="take a longer duration, a shorter settle or more records, or write --only transient",
         )  # fmt: skip
     elif s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
         yield CaseError(

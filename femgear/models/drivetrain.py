@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.models.drivetrain_contacts import FlankContacts, flank_contacts
 from femgear.models.drivetrain_coordinates import (
     Coordinates,
     bearing_place,
@@ -33,6 +34,7 @@ from femgear.models.drivetrain_meshes import (
     planet_bearing_rows,
     rectangular_series,
 )
+from femgear.models.drivetrain_names import numbered
 from femgear.models.shaft import beam_element, disc_matrices
 from femgear.solvers.nonlinear import NonlinearSystem, modal_damping
 from femgear.solvers.series import FourierSeries
@@ -70,6 +72,8 @@ class DrivetrainModel:
         Rotations of the free spin, one for the first body.
     ratio : dict
         Speed of every body over that of the first one.
+    contacts : FlankContacts
+        Drive and back flanks of the meshes, for those that separate.
     """
 
     train: Drivetrain
@@ -83,6 +87,7 @@ class DrivetrainModel:
     turning: bool
     rigid: np.ndarray
     ratio: dict[str, float]
+    contacts: FlankContacts
 
     @property
     def meshes(self) -> tuple[str, ...]:
@@ -162,8 +167,9 @@ def drivetrain_model(
     system = replace(reduced, C=C, load=load)
     ratio = {name: float(spin[first + 4]) for name, first in place.body.items()}
     return DrivetrainModel(
-        train, system, geometry, stiffness, backlash, bases, base_ratio, mesh_base, turning, rigid, ratio
-    )
+        train, system, geometry, stiffness, backlash, bases, base_ratio, mesh_base, turning, rigid, ratio,
+        flank_contacts(train, place, spin, T, geometry, backlash),
+    )  # fmt: skip
 
 
 def drivetrain_problem(
@@ -181,7 +187,8 @@ def drivetrain_problem(
     torques : dict
         Constant torque on bodies [N m], by their names; they must balance over the spin.
     separates : bool
-        Meshes lose contact, and touch their back flanks after the backlash.
+        Meshes lose contact, and touch their back flanks, whose elements follow those of the drive flanks,
+        after the backlash.
     speed : float
         Of the first body for the gyroscopic terms [rad/s].
 
@@ -190,29 +197,36 @@ def drivetrain_problem(
     NonlinearSystem
         Its base frequencies are ``model.bases``.
     """
-    geometry, elements = model.geometry, []
-    n_bases = len(model.bases)
-    for stage in np.unique(geometry.stage):
-        own = np.flatnonzero(geometry.stage == stage)
-        planetary = stage < len(geometry.even)
-        empty = np.zeros_like(geometry.fixed)
-        even, odd = (geometry.even[stage], geometry.odd[stage]) if planetary else (empty, empty)
-        fixed = geometry.fixed
-        if not model.turning:
-            fixed, even, odd = fixed + even, empty, empty
-        shared = len(geometry.names) + 4 * stage + np.arange(4 if planetary else 0)
-        used = [np.append(j, shared) for j in own]
-        order = tuple(int(b == model.mesh_base[own[0]]) for b in range(n_bases))
-        turn = tuple(int(planetary and b == 2 * stage) for b in range(n_bases))
-        elements.append(
-            TurningMeshes(
-                np.array(used), *(np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd)),
-                FourierSeries(model.stiffness[own], order), turn, model.backlash[own], separates,
-            )
-        )  # fmt: skip
+    count, contacts = len(model.meshes), model.contacts
+    geometry = contacts.geometry if separates else model.geometry
+    number, elements = np.arange(len(geometry.names)), []
+    for back in (False, True):
+        for stage in np.unique(geometry.stage):
+            own = np.flatnonzero((geometry.stage == stage) & ((number >= count) == back))
+            if len(own):
+                elements.append(_flanks(model, geometry, own, int(stage), separates))
     load = model.system.load + torque_vector(model, torques or {})
     system = replace(model.system, W=geometry.basic, load=load)
     return NonlinearSystem(system, tuple(elements), speed=speed)
+
+
+def _flanks(
+    model: DrivetrainModel, geometry: MeshGeometry, own, stage: int, separates: bool
+) -> TurningMeshes:
+    """Element of like flanks of a stage."""
+    contacts, planetary = model.contacts, stage < len(geometry.even)
+    meshes, n_bases = contacts.mesh[own], len(model.bases)
+    empty, fixed = np.zeros_like(geometry.fixed), geometry.fixed
+    even, odd = (geometry.even[stage], geometry.odd[stage]) if planetary else (empty, empty)
+    if not model.turning:
+        fixed, even, odd = fixed + even, empty, empty
+    used = [contacts.columns[j] for j in own]
+    order = tuple(int(b == model.mesh_base[meshes[0]]) for b in range(n_bases))
+    turn = tuple(int(planetary and b == 2 * stage) for b in range(n_bases))
+    return TurningMeshes(
+        np.array(used), *(np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd)),
+        FourierSeries(model.stiffness[meshes], order), turn, contacts.gap[own], separates,
+    )  # fmt: skip
 
 
 def torque_vector(model: DrivetrainModel, torques: dict[str, float]) -> np.ndarray:
@@ -330,4 +344,4 @@ def _meshes(train, place, spin, geometry: MeshGeometry, harmonics: int):
         backlash.append(stage.mesh.backlash)
         mesh_base.append(len(bases) - 1)
     table = np.array(waves).reshape(len(geometry.names), harmonics + 1)
-    return table, np.array(backlash), np.array(mesh_base, int), tuple(bases), np.array(ratio)
+    return table, np.array(backlash), np.array(mesh_base, int), tuple(numbered(bases)), np.array(ratio)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from femgear.casefile import drivetrain as sections
 from femgear.casefile.drivetrain import DrivetrainCase
-from femgear.casefile.drivetrain_checks import record_problems
+from femgear.casefile.drivetrain_checks import record_problems, settle_time, spectrum_problems
 from femgear.casefile.units import FREQUENCY, SPEED
 from femgear.errors import CaseError
 from femgear.models.drivetrain import DrivetrainModel, drivetrain_model
@@ -23,6 +22,7 @@ from femgear.models.drivetrain_data import (
     ParallelStage,
     PlanetaryStage,
 )
+from femgear.models.drivetrain_drivers import speed_ratios, with_drivers
 from femgear.models.drivetrain_mechanism import loose_motions
 from femgear.models.drivetrain_rates import (
     GOOD_STEPS,
@@ -32,12 +32,16 @@ from femgear.models.drivetrain_rates import (
     highest_mesh,
     speed_range,
 )
+from femgear.models.drivetrain_spread import check_spread
 from femgear.models.drivetrain_torque import TorqueHistory
 from femgear.models.drivetrain_torsional import torsional_model
 from femgear.models.shaft import ShaftSection
 from femgear.solvers.series import FourierSeries
 
+RPM = math.pi / 30.0
 BENDING, TORSIONAL = "with bending", "torsional"
+# Slower instants, over the mean speed, would need records of endless length over a turn.
+SLOWEST = 0.05
 
 
 def drivetrain_of(case: DrivetrainCase) -> Drivetrain:
@@ -91,7 +95,7 @@ def _parallel(one: sections.ParallelSection) -> ParallelStage:
         radii = one.radii or tuple(radius / cosine for radius in one.base_radii)
     return ParallelStage(
         *one.between, *radii, one.teeth[0], _wave(one.mesh), one.pressure_angle, one.helix_angle,
-        one.direction, *one.offsets,
+        one.direction, *one.offsets, one.driver,
     )  # fmt: skip
 
 
@@ -109,7 +113,7 @@ def _planetary(one: sections.PlanetarySection) -> PlanetaryStage:
     return PlanetaryStage(
         one.carrier, one.sun, sun, planet, one.ring_teeth, one.sun_teeth, one.planet_mass, one.planet_inertia,
         one.planet_transverse_inertia, _wave(one.sun_mesh), _wave(one.ring_mesh), angles,
-        one.pressure_angle, one.planet_bearing,
+        one.pressure_angle, one.planet_bearing, one.driver,
     )  # fmt: skip
 
 
@@ -141,7 +145,7 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
 
 
 def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
-    """Model of a case.
+    """Model of a case, its loaded flanks those that the mean torques press together.
 
     Raises
     ------
@@ -151,7 +155,9 @@ def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
     build = drivetrain_model if variant == BENDING else torsional_model
     options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
     try:
-        return build(drivetrain_of(case), **options)
+        train = drivetrain_of(case)
+        torques = torque_histories(case, speed_ratios(train))
+        return build(with_drivers(train, torques, duration=case.simulation.duration), **options)
     except CaseError as error:
         raise _located(error, case) from None
 
@@ -192,7 +198,7 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
     CaseError
         As `case_model`; bodies that nothing holds across their axis or against tilting (E-MECHANISM);
         natural frequencies too far apart for double precision (E-SPREAD); steps that cannot follow the
-        meshes (E-RATE); records that the spectra cannot use (E-RANGE).
+        meshes (E-RATE); records that are too many (E-RANGE).
     """
     try:
         count, names = loose_motions(drivetrain_of(case), turning=case.simulation.turning)
@@ -205,7 +211,7 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
             limit="bearings and shafts that leave the common rotation alone free",
             remedy="add a [[bearing]] or its stiffness, or tilts = false",
         )  # fmt: skip
-    _check_spread(case)
+    check_spread(case, drivetrain_of(case))
     model = case_model(case)
     _check_stiffness(case, model)
     _check_rate(case, model)
@@ -216,33 +222,46 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
     return model
 
 
-def _check_spread(case: DrivetrainCase) -> None:
-    """Refuse slow motions that rounding hides beside the free spin."""
-    from scipy import linalg
+def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
+    """Refuse what has no spectra: the stage is not asked for by every run.
 
-    model = drivetrain_model(replace(drivetrain_of(case), damping_ratio=0.0), turning=case.simulation.turning)
-    n, mass = len(model.rigid), model.system.M
-    stiffness = model.system.K + (model.system.W * model.mean_stiffness) @ model.system.W.T
-    values = linalg.eigvalsh(stiffness, mass)
-    # what femgear.solvers.modal takes for rigid: a share of a norm, which is up to sqrt(n) above the largest
-    share = math.sqrt(n) * max(1e-12, 10.0 * n * np.finfo(float).eps)
-    if n == 1 or values[1] > share * values[-1]:
-        return
-    own = np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2.0 * math.pi)
-    fast = int(np.argmax(own))
-    slow = linalg.eigh(stiffness, mass, subset_by_index=(0, 1))[1]
-    slow = slow - np.outer(model.rigid, model.rigid @ mass @ slow) / model.inertia
-    energy = np.abs(slow * (mass @ slow)).max(axis=1)
-    first, second = (model.system.dofs[i] for i in (fast, int(np.argmax(energy))))
-    names, factor = [body.name for body in case.body], f"a factor of {1.0 / math.sqrt(share):.1g}"
-    members = [name.split(":")[0] for name in (first, second)]
-    key = f"body[{names.index(members[0])}]" if members[0] in names else "shaft"
-    raise CaseError(
-        f"natural frequencies are too far apart for double precision: {first} by itself has {own[fast]:.3g} "
-        f"Hz, and {second} moves slower by more than {factor}",
-        code="E-SPREAD", key=key, file=case.location(key), limit=f"frequencies within {factor}",
-        remedy=f"give {members[0]} more mass or inertia or rigid springs, or stiffen what holds {members[1]}",
+    Raises
+    ------
+    CaseError
+        Records that are too few, a resolution that they do not have (E-RANGE); no meshes, or a first body
+        that nearly stops or turns back in the part that the spectra take (E-SPECTRUM).
+    """
+    if not len(model.meshes):
+        raise CaseError(
+            "the chain has no gears, and therefore no mesh forces",
+            code="E-SPECTRUM",
+            limit="one mesh or more",
+        )
+    for problem in spectrum_problems(case, record_rate(case, model)):
+        problem.file = case.location(problem.key)
+        raise problem
+    s = case.simulation
+    late = speed_range(
+        model, torque_histories(case, model.ratio), duration=s.duration, speed=case.operation.speed,
+        start=settle_time(case),
     )  # fmt: skip
+    try:
+        check_turning(late.lowest, late.mean)
+    except CaseError as error:
+        error.file = case.location(error.key)
+        raise
+
+
+def check_turning(lowest: float, mean: float) -> None:
+    """Refuse speeds of the first body [rad/s] at which a turn takes endless records (E-SPECTRUM)."""
+    if not lowest > SLOWEST * mean or not mean > 0.0:
+        raise CaseError(
+            f"the first body nearly stops or turns back: {lowest / RPM:.6g} rpm at the slowest, "
+            f"{mean / RPM:.6g} rpm in the mean; there are no orders",
+            code="E-SPECTRUM", key="operation.torque",
+            limit=f"never slower than {SLOWEST:.0%} of its mean speed where spectra are taken",
+            remedy="give torques that keep it turning, or write --only transient",
+        )  # fmt: skip
 
 
 def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:

@@ -24,6 +24,15 @@ def check_numbers(name: str, data, *, positive, least) -> None:
             )  # fmt: skip
 
 
+def check_driver(name: str, driver: str | None, ends: tuple[str, str]) -> None:
+    """Refuse a driver that is none of the two bodies of its stage."""
+    if driver is not None and driver not in ends:
+        raise CaseError(
+            f"{driver!r} drives {name}", code="E-DRIVETRAIN", key="driver", limit=" or ".join(ends),
+            remedy="name the body that drives, or leave it out",
+        )  # fmt: skip
+
+
 def check_free_spin(model) -> None:
     """Refuse a chain that turns in bearings with a torsion spring, which would not see the spin."""
     K, rigid = model.system.K, model.rigid

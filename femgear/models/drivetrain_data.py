@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 from femgear.errors import CaseError
-from femgear.models.drivetrain_checks import check_numbers, check_train
+from femgear.models.drivetrain_checks import check_driver, check_numbers, check_train
 from femgear.models.shaft import JointSprings, ShaftSection, joint_springs
 
 
@@ -160,11 +160,14 @@ class ParallelStage:
         Teeth of the first gear, for the mesh frequency.
     mesh : MeshWave
     pressure_angle, helix_angle : float
-        Transverse pressure angle, helix angle [rad]. A positive helix angle pushes the second gear along z.
+        Transverse pressure angle, helix angle [rad]. A positive helix angle pushes the second gear along z
+        where the first drives, against z where the second does.
     direction : float
         Angle of the line from the first to the second axis, from x [rad].
     first_offset, second_offset : float
         Place of the mesh along z from the centre of either body [m], which tilts it.
+    driver : str, optional
+        The body whose teeth push, which makes its leading flanks the loaded ones; the first where not given.
     """
 
     first: str
@@ -178,6 +181,7 @@ class ParallelStage:
     direction: float = 0.0
     first_offset: float = 0.0
     second_offset: float = 0.0
+    driver: str | None = None
 
     def __post_init__(self):
         name = f"stage {self.first} to {self.second}"
@@ -185,10 +189,21 @@ class ParallelStage:
         angles = self.pressure_angle, self.helix_angle
         if not (0.0 < angles[0] < 0.5 * math.pi and abs(angles[1]) < 0.5 * math.pi):
             raise CaseError(f"angles {angles} rad of {name}", code="E-DRIVETRAIN", limit="within 90 degrees")
+        check_driver(name, self.driver, self.ends)
 
     @property
     def name(self) -> str:
         return f"{self.first}-{self.second}"
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Both bodies; the first drives where nothing else is said."""
+        return self.first, self.second
+
+    @property
+    def flank(self) -> int:
+        """1 where the first of the ends drives, else -1."""
+        return -1 if self.driver == self.second else 1
 
 
 @dataclass(frozen=True)
@@ -215,6 +230,8 @@ class PlanetaryStage:
         [rad]
     planet_bearing : float
         [N/m]; infinite fixes the planets' axes to their pins, so that each has its rotation only.
+    driver : str, optional
+        Carrier or sun, the one that drives the other; the carrier where not given.
     """
 
     carrier: str
@@ -231,16 +248,28 @@ class PlanetaryStage:
     planet_angles: tuple[float, ...] = (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0)
     pressure_angle: float = math.radians(20.0)
     planet_bearing: float = math.inf
+    driver: str | None = None
 
     def __post_init__(self):
         positive = (
             "sun_radius", "planet_radius", "ring_teeth", "sun_teeth", "planet_mass", "planet_inertia",
         )  # fmt: skip
         check_numbers(self.name, self, positive=positive, least=("planet_transverse_inertia",))
+        check_driver(f"stage {self.carrier} to {self.sun}", self.driver, self.ends)
 
     @property
     def name(self) -> str:
         return f"{self.carrier}-{self.sun}"
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Carrier and sun; the carrier drives where nothing else is said."""
+        return self.carrier, self.sun
+
+    @property
+    def flank(self) -> int:
+        """1 where the carrier drives, -1 where the sun does."""
+        return -1 if self.driver == self.sun else 1
 
     @property
     def centre_distance(self) -> float:

@@ -61,6 +61,18 @@ class FreeMotion:
         size = np.sqrt(max(twice, 0.0))
         return self.scheme.row(state / size if size > 0.0 else 0.0 * state), size
 
+    def gain(self) -> float:
+        """Largest growth between any two instants of the run, as a factor; NaN without a free motion.
+
+        ``exp(max over t of (log size(t) - its least value before))``: a resonance that the speed passes
+        shows here, though the mean over the run decays. Infinite beyond all numbers.
+        """
+        sizes = np.array(self.sizes)
+        if len(sizes) < 2 or not np.all(np.isfinite(sizes)):
+            return float("nan")
+        with np.errstate(over="ignore"):
+            return float(np.exp((sizes - np.minimum.accumulate(sizes)).max()))
+
     def growth(self) -> float:
         """Mean rate of the logarithm of the size [1/s] after the first third; NaN without a free motion."""
         times, sizes = np.array(self.times), np.array(self.sizes)

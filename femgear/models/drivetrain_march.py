@@ -16,6 +16,7 @@ from femgear.errors import CaseError
 from femgear.models.drivetrain import DrivetrainModel
 from femgear.models.drivetrain_books import Books, Ledger
 from femgear.models.drivetrain_checks import check_free_spin
+from femgear.models.drivetrain_contacts import contact_model
 from femgear.models.drivetrain_growth import FreeMotion, piece_length
 from femgear.models.drivetrain_record import Record
 from femgear.models.drivetrain_separation import Separating, check_pushing
@@ -39,7 +40,7 @@ class DrivetrainRun:
     motion, velocity : (n, n_outputs) arrays
         Deviations from the free spin [m, rad].
     approach, force : (n, n_meshes) arrays
-        Of the meshes [m], [N].
+        Of the drive flanks [m]; of the meshes, drive less back flank [N].
     spin, spin_speed : (n,) arrays
         Angle and speed of the first body without its deviation [rad], [rad/s].
     meshes, ledger
@@ -54,13 +55,16 @@ class DrivetrainRun:
     extremes : (2, n_meshes) array
         Least and largest force at any step [N], whatever is recorded.
     pulling : (n_meshes,) array
-        Share of the steps with a negative force: of a linear mesh that pulls, or of the back flank.
+        Share of the steps with a negative force: of a linear mesh that pulls, or of a back flank that pushes
+        more than the drive flank.
     lost : (n_meshes,) array
         Share of the steps in which no flank touches; zeros where meshes are linear.
     contact_loss : bool
     growth : float
         Mean rate of the logarithm of the free motion after the first third of the run [1/s]; NaN where
         nothing moves but the spin.
+    gain : float
+        Largest growth of the free motion between any two instants of the run, as a factor; NaN likewise.
     """
 
     time: np.ndarray
@@ -82,6 +86,7 @@ class DrivetrainRun:
     lost: np.ndarray
     contact_loss: bool
     growth: float
+    gain: float
 
 
 def march_drivetrain(
@@ -106,7 +111,8 @@ def march_drivetrain(
     model : DrivetrainModel
     torques : sequence of TorqueHistory
     duration, step : float
-        [s]
+        [s]. Any step is taken; cases are refused below four steps a mesh period (`check_drivetrain`, E-RATE),
+        and warned of below thirty and of modes that the step lowers (W-RATE).
     speed : float
         Of the first body at the start [rad/s]; gyroscopic terms keep this value.
     start : {"static", "zero"} or pair of (n,) arrays
@@ -136,8 +142,9 @@ def march_drivetrain(
     """
     _check(model, duration, step, every, rule)
     count = max(1, round(duration / step))
-    track = Spin(model, torques, step, speed, separate_spin)
-    scheme = Scheme.of(model, rule, step, speed, track.directions)
+    stepped = contact_model(model) if contact_loss else model
+    track = Spin(stepped, torques, step, speed, separate_spin)
+    scheme = Scheme.of(stepped, rule, step, speed, track.directions)
     names = _outputs(model, outputs)
     at = np.array([model.index(name) for name in names], int)
     if contact_loss:
@@ -145,7 +152,7 @@ def march_drivetrain(
     record = Record(model, count, every, at, lowpass=lowpass, contact_loss=contact_loss)
     with np.errstate(over="ignore", invalid="ignore"):
         motion = _Motion(model, scheme, track, start, count, contact_loss)
-        books = Books(model, scheme, track, motion.state)
+        books = Books(stepped, scheme, track, motion.state)
         for first in range(0, count, _BLOCK):
             states, block = motion.block(first, min(_BLOCK, count - first))
             books.add(states, block)
@@ -159,7 +166,7 @@ def march_drivetrain(
         step * every * np.arange(count // every + 1), names, *record.columns(), model.meshes, books.ledger(),
         books.drift, books.momentum_error(), count, step,
         record.extremes, record.pulled / record.steps, record.lost / record.steps, contact_loss,
-        motion.free.growth(),
+        motion.free.growth(), motion.free.gain(),
     )  # fmt: skip
 
 
@@ -189,18 +196,20 @@ class _Motion:
 
     def __init__(self, model, scheme, track, start, count, contact_loss):
         self.scheme, self.track, self.piece = scheme, track, piece_length(count)
-        self.state = start_state(model, scheme, track, start, contact_loss=contact_loss)
+        self.meshes = len(model.meshes)
+        contacts = model.contacts if contact_loss else None
+        self.state = start_state(model, scheme, track, start, contacts=contacts)
         self.free = FreeMotion(model, scheme)
         self.free_row = self.free.start()
         self.march = march_closed
         if contact_loss and model.meshes:
-            self.march = Separating(model.backlash).march
+            self.march = Separating(contacts.gap, self.meshes).march
 
     def block(self, first: int, number: int):
         """States (number + 1, 2 n + m) of the next steps, and their loads and meshes."""
         scheme, h = self.scheme, self.track.step
         block = self.track.block(first, number)
-        meshes = MeshBlock.of(scheme, block)
+        meshes = MeshBlock.of(scheme, block, self.meshes)
         loads = block.loads[:-1] @ scheme.loads_before + block.loads[1:] @ scheme.loads_after
         rows = np.empty((number + 1, 2, len(scheme.advance)))
         rows[0] = scheme.row(self.state), self.free_row

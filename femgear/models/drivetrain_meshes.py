@@ -10,6 +10,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.models.drivetrain_coordinates import Coordinates
 from femgear.models.drivetrain_data import Drivetrain, MeshWave, ParallelStage, PlanetaryStage
+from femgear.models.drivetrain_names import numbered
 from femgear.models.planar import PlanarBody, PlanarSet, mesh_directions, pin_directions
 from femgear.solvers.elements import positive_part
 from femgear.solvers.series import FourierSeries, phase_of
@@ -77,11 +78,12 @@ class MeshGeometry:
     def selection(self, angles) -> np.ndarray:
         """``S`` (..., m, n_meshes) at carrier angles (..., P) [rad]."""
         angles = np.asarray(angles, float)
-        return (
-            self.fixed
-            + np.tensordot(np.cos(angles), self.even, axes=1)
-            + np.tensordot(np.sin(angles), self.odd, axes=1)
-        )
+        whole = np.empty((*angles.shape[:-1], *self.fixed.shape))
+        whole[...] = self.fixed
+        # few entries turn
+        turns = np.any((self.even != 0.0) | (self.odd != 0.0), axis=0)
+        whole[..., turns] += np.cos(angles) @ self.even[:, turns] + np.sin(angles) @ self.odd[:, turns]
+        return whole
 
     @property
     def frozen(self) -> np.ndarray:
@@ -90,29 +92,42 @@ class MeshGeometry:
 
 
 def mesh_geometry(train: Drivetrain, place: Coordinates, spin: np.ndarray) -> MeshGeometry:
-    """Directions of all meshes among all coordinates; the planetary stages come first."""
-    names, columns, stages, planar = [], [], [], []
+    """Directions of the drive flanks of all meshes among all coordinates; the planetary stages come first."""
+    names, stages = [], []
     for number, stage in enumerate(train.planetary):
         n = len(stage.planet_angles)
-        driven = -1 if spin[place.body[stage.carrier] + 4] > 0.0 else 1
-        columns.append(lumped_map(stage, place, number).T @ mesh_directions(planar_of(train, stage), driven))
         names += [f"{stage.sun}-planet {p + 1}" for p in range(n)]
         names += [f"planet {p + 1}-ring of {stage.carrier}" for p in range(n)]
         stages += [number] * (2 * n)
-        planar.append(
-            [
-                place.body[stage.carrier],
-                place.body[stage.carrier] + 1,
-                place.body[stage.sun],
-                place.body[stage.sun] + 1,
-            ]
-        )
-    for number, stage in enumerate(train.parallel):
-        columns.append(parallel_direction(stage, place, spin)[:, None])
-        names.append(stage.name)
-        stages.append(len(train.planetary) + number)
-    total = np.hstack(columns) if columns else np.zeros((place.count, 0))
-    return _split(names, total, np.array(stages, int), planar)
+    names += [stage.name for stage in train.parallel]
+    stages += range(len(train.planetary), len(train.planetary) + len(train.parallel))
+    total = flank_directions(train, place, spin)
+    return _split(numbered(names), total, np.array(stages, int), planar_places(train, place))
+
+
+def flank_directions(train: Drivetrain, place: Coordinates, spin, *, back: bool = False) -> np.ndarray:
+    """Approaches (n, n_meshes) of the drive or the back flanks, with the carriers at angle zero."""
+    columns, side = [np.zeros((place.count, 0))], -1 if back else 1
+    for number, stage in enumerate(train.planetary):
+        flank = side * stage.flank
+        # the flank of a sun that drives turns with it, that of one that is driven against it
+        driven = -flank if spin[place.body[stage.carrier] + 4] > 0.0 else flank
+        columns.append(lumped_map(stage, place, number).T @ mesh_directions(planar_of(train, stage), driven))
+    for stage in train.parallel:
+        columns.append(parallel_direction(stage, place, spin, flank=side * stage.flank)[:, None])
+    return np.hstack(columns)
+
+
+def planar_places(train: Drivetrain, place: Coordinates) -> list[list[int]]:
+    """Per planetary stage the places of x and y of the carrier and the sun."""
+    firsts = [(place.body[stage.carrier], place.body[stage.sun]) for stage in train.planetary]
+    return [[one, one + 1, two, two + 1] for one, two in firsts]
+
+
+def turned_directions(direction) -> tuple[np.ndarray, np.ndarray]:
+    """Even and odd part (4, ...) of directions along x, y of carrier and sun that turn with the carrier."""
+    # a direction (a, b) turned by phi is cos phi (a, b) + sin phi (-b, a)
+    return direction, (direction[[1, 0, 3, 2]].T * np.array([-1.0, 1.0, -1.0, 1.0])).T
 
 
 def _split(names, total, stages, planar) -> MeshGeometry:
@@ -125,11 +140,10 @@ def _split(names, total, stages, planar) -> MeshGeometry:
         at = count + 4 * number + np.arange(4)
         basic[places, at] = 1.0
         own = np.flatnonzero(stages == number)
-        direction = total[np.ix_(places, own)]
         basic[np.ix_(places, own)] = 0.0
-        even[number][np.ix_(at, own)] = direction
-        # a direction (a, b) turned by phi is cos phi (a, b) + sin phi (-b, a)
-        odd[number][np.ix_(at, own)] = direction[[1, 0, 3, 2]] * np.array([-1.0, 1.0, -1.0, 1.0])[:, None]
+        even[number][np.ix_(at, own)], odd[number][np.ix_(at, own)] = turned_directions(
+            total[np.ix_(places, own)]
+        )
     fixed = np.vstack([np.eye(count), np.zeros((extra, count))])
     return MeshGeometry(tuple(names), basic, fixed, even, odd, stages)
 
@@ -181,18 +195,20 @@ def planet_bearing_rows(train: Drivetrain, stage: PlanetaryStage, place, number:
     return pins.T @ lumped_map(stage, place, number)
 
 
-def parallel_direction(stage: ParallelStage, place: Coordinates, spin: np.ndarray) -> np.ndarray:
+def parallel_direction(stage: ParallelStage, place: Coordinates, spin, *, flank: int) -> np.ndarray:
     """Approach (n,) of the flanks of two gears at the pitch point, tilts and helix included.
 
     A point P of a body moves by ``t + tilt x (P - C)``; with n the normal into the second gear the
-    coordinates get ``n`` and ``(P - C) x n``, the second gear the opposite.
+    coordinates get ``n`` and ``(P - C) x n``, the second gear the opposite. On the other flank (-1), that of
+    a second gear that drives, the tangential and the axial part of n are reversed; the radial part pushes the
+    gears apart on both (ISO 21771, left and right lines of action).
     """
-    driver = 1.0 if spin[place.body[stage.first] + 4] > 0.0 else -1.0
+    sense = 1.0 if spin[place.body[stage.first] + 4] > 0.0 else -1.0
     along = np.array([math.cos(stage.direction), math.sin(stage.direction)])
-    across = driver * np.array([-along[1], along[0]])
+    across = flank * sense * np.array([-along[1], along[0]])
     plane = math.cos(stage.pressure_angle) * across + math.sin(stage.pressure_angle) * along
     # the normal leans along z by the base helix angle: tan(beta_b) = tan(beta) cos(alpha_t)
-    lean = math.tan(stage.helix_angle) * math.cos(stage.pressure_angle)
+    lean = flank * math.tan(stage.helix_angle) * math.cos(stage.pressure_angle)
     normal = np.append(plane, lean) / math.hypot(1.0, lean)
     w = np.zeros(place.count)
     for name, radius, offset, sign in (
@@ -208,7 +224,7 @@ def parallel_direction(stage: ParallelStage, place: Coordinates, spin: np.ndarra
 
 @dataclass(frozen=True)
 class TurningMeshes:
-    """Meshes of one stage as elements on simple motions, with contact loss and play.
+    """Meshes of one stage, or one of their flanks, as elements on simple motions.
 
     Parameters
     ----------
@@ -220,9 +236,10 @@ class TurningMeshes:
         [N/m]
     turn : tuple of int
         Orders of the carrier's angle ``phi`` in the base frequencies.
-    backlash : (g,) array
-        [m], infinite without back side.
+    gap : (g,) array
+        Of flanks that separate: ``k max(x - gap, 0)`` [m].
     separates : bool
+        False: ``k x``.
     """
 
     columns: np.ndarray
@@ -231,7 +248,7 @@ class TurningMeshes:
     odd: np.ndarray
     stiffness: FourierSeries
     turn: tuple[int, ...]
-    backlash: np.ndarray
+    gap: np.ndarray
     separates: bool = False
 
     @property
@@ -244,14 +261,20 @@ class TurningMeshes:
         """Forces (..., g, d) and tangents (..., g, d, d)."""
         phi = phase_of(theta, self.turn)[..., None, None]
         S = self.fixed + np.cos(phi) * self.even + np.sin(phi) * self.odd
-        force, slope = mesh_force(
-            (S * x).sum(axis=-1), self.stiffness.at(theta), self.backlash, separates=self.separates
-        )
+        k, approach = self.stiffness.at(theta), (S * x).sum(axis=-1)
+        if self.separates:
+            overlap, closed = positive_part(approach - self.gap)
+            force, slope = k * overlap, k * closed
+        else:
+            force, slope = k * approach, np.broadcast_to(k, approach.shape)
         return force[..., None] * S, slope[..., None, None] * S[..., :, None] * S[..., None, :]
 
 
 def mesh_force(x, k, backlash, *, separates: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Force and tangent of meshes with the stiffness k at the approach x; drive side from ``x = 0`` on."""
+    """Force and tangent of meshes with the stiffness k at the approach x; drive side from ``x = 0`` on.
+
+    The back side is that of gears whose axes keep their distance: its approach is -x.
+    """
     if not separates:
         return k * x, np.broadcast_to(k, np.shape(x))
     drive, closed = positive_part(x)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from femgear.models.drivetrain_meshes import mesh_force
-
 # The pass band ends at this share of half the record rate, where the stop band begins.
 PASS_BAND = 0.8
 # Attenuation of the stop band [dB].
@@ -16,8 +14,12 @@ class Decimator:
     """Low pass and decimation of columns that come in blocks, without delay.
 
     A linear-phase filter (Kaiser window; J. F. Kaiser and R. W. Schafer, IEEE Trans. Acoust. Speech Signal
-    Process. 28, 1980, 105-107) with 80 dB between 0.8 and 1.0 of half the record rate. At both ends the
-    columns are continued point-symmetrically, so that constants and ramps pass unchanged.
+    Process. 28, 1980, 105-107) with 80 dB between 0.8 and 1.0 of half the record rate. Beyond both ends the
+    columns go on as their mirror image about a ramp. Its slope is that of the parabola of least squares
+    through two records (A. Savitzky and M. J. E. Golay, Anal. Chem. 36, 1964, 1627-1639), so that constants
+    and ramps pass unchanged. Near an end both bands suffer. Of a tone at 0.1, 0.3 and 0.5 times half the
+    record rate the end record misses 0.2, 5 and 20 % (r.m.s. over its phases), of one at 2, 6 and 12 times
+    it keeps 36, 11 and 7 %; the next three keep 5 % and less.
 
     Parameters
     ----------
@@ -38,6 +40,7 @@ class Decimator:
         self.half = half
         middle = 0.5 * (1.0 + PASS_BAND) / every
         self.weights = firwin(2 * half + 1, middle, window=("kaiser", beta)) if half else np.ones(1)
+        self.slope = _end_slope(min(half, 2 * every)) if half else np.zeros(1)
         self.buffer, self.first, self.done = None, 0, 0
 
     def push(self, rows) -> np.ndarray:
@@ -49,12 +52,16 @@ class Decimator:
         if self.done == 0 and self.first == 0:
             if len(self.buffer) <= half and not last:
                 return np.empty((0, rows.shape[1]))
-            ahead = 2.0 * self.buffer[0] - self.buffer[half:0:-1]
-            self.buffer, self.first = np.vstack([ahead, self.buffer]), -half
+            ahead = self._mirrored(self.buffer[: half + 1])
+            self.buffer, self.first = np.vstack([ahead[::-1], self.buffer]), -half
         if last and half:
-            behind = 2.0 * self.buffer[-1] - self.buffer[-2 : -2 - half : -1]
-            self.buffer = np.vstack([self.buffer, behind])
+            self.buffer = np.vstack([self.buffer, self._mirrored(self.buffer[-1 - half :][::-1])])
         return self._filtered()
+
+    def _mirrored(self, rows) -> np.ndarray:
+        """Rows (half, c) beyond the end at which `rows` (half + 1, c) begin."""
+        slope = self.slope @ (rows[: len(self.slope)] - rows[0])
+        return rows[1:] - 2.0 * np.outer(np.arange(1, len(rows)), slope)
 
     def _filtered(self) -> np.ndarray:
         """Records whose whole window is in the buffer."""
@@ -77,12 +84,22 @@ class Decimator:
         return found
 
 
+def _end_slope(steps: int) -> np.ndarray:
+    """Weights (steps + 1,) of rows for the slope, at the first one, of their parabola; of a line for two."""
+    from scipy.signal import savgol_coeffs
+
+    weights = savgol_coeffs(steps + 1, min(2, steps), deriv=1, pos=0, use="dot")
+    # ramps exactly, whatever the least squares round
+    return weights / (weights @ np.arange(steps + 1.0))
+
+
 class Record:
     """What a run keeps: coordinates, meshes, spin."""
 
     def __init__(self, model, count: int, every: int, at, *, lowpass: bool, contact_loss: bool):
-        self.every, self.at, self.basic = every, at, model.geometry.basic
-        self.backlash, self.separates = model.backlash, contact_loss
+        self.every, self.at = every, at
+        self.contacts = model.contacts if contact_loss else None
+        self.basic = (self.contacts or model).geometry.basic
         rows, meshes = count // every + 1, len(model.meshes)
         widths = [len(at), len(at), meshes, meshes, 1, 1]
         self.cuts = np.cumsum(widths)[:-1]
@@ -96,8 +113,11 @@ class Record:
         """Rows of a block of `number` steps; that of its start comes with the first block alone."""
         begin = min(first, 1)
         approach = np.einsum("tmj,tm->tj", block.selection, states[:, : len(self.basic)] @ self.basic)
-        force, _ = mesh_force(approach, block.stiffness, self.backlash, separates=self.separates)
-        self._count(approach[begin:], force[begin:])
+        force, touched = block.stiffness * approach, np.ones((1, 1), bool)
+        if self.contacts is not None:
+            force, touched = self.contacts.mesh_forces(approach, block.stiffness)
+            approach = approach[:, : force.shape[1]]
+        self._count(force[begin:], touched[begin:])
         if self.decimator is None:
             at = (-first % self.every) or self.every if first else 0
             kept = slice(at, None, self.every)
@@ -112,12 +132,11 @@ class Record:
         self.table[self.filled : self.filled + len(new)] = new
         self.filled += len(new)
 
-    def _count(self, approach, force) -> None:
+    def _count(self, force, touched) -> None:
         self.extremes[0] = np.minimum(self.extremes[0], force.min(axis=0, initial=np.inf))
         self.extremes[1] = np.maximum(self.extremes[1], force.max(axis=0, initial=-np.inf))
         self.pulled += np.count_nonzero(force < 0.0, axis=0)
-        if self.separates:
-            self.lost += np.count_nonzero((approach < 0.0) & (approach > -self.backlash), axis=0)
+        self.lost += np.count_nonzero(~touched, axis=0)
         self.steps += len(force)
 
     def columns(self) -> tuple[np.ndarray, ...]:

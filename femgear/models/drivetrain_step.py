@@ -157,30 +157,28 @@ class MeshBlock:
 
     Parameters
     ----------
-    selection : (t, m, n_meshes) array
-    stiffness : (t, n_meshes) array
-    turned : (t, n_meshes, n_meshes) array
-        ``(S^T F S)^T``: approaches (a row) that mesh forces at the end of the step take away [m/N].
+    selection : (t, m, c) array
+        Of the meshes, or of all contacts of those that separate.
+    stiffness : (t, c) array
     closed : (t, m, m) array
         From x without mesh forces (a row) to the forces on the simple motions when all drive flanks touch.
     """
 
     selection: np.ndarray
     stiffness: np.ndarray
-    turned: np.ndarray
     closed: np.ndarray
 
     @classmethod
-    def of(cls, scheme: Scheme, block: Block) -> MeshBlock:
-        S, k = block.selection[1:], block.stiffness[1:]
+    def of(cls, scheme: Scheme, block: Block, meshes: int) -> MeshBlock:
+        """Of a block whose first `meshes` contacts are drive flanks."""
+        S, k = np.ascontiguousarray(block.selection[1:, :, :meshes]), block.stiffness[1:, :meshes]
         St = np.swapaxes(S, 1, 2)
-        turned = np.matmul(np.matmul(St, scheme.flexibility.T), S)
         # transposed: x S k (1 + (S^T F S)^T k)^-1 S^T
-        inner = turned * k[:, None, :]
+        inner = np.matmul(np.swapaxes(np.matmul(scheme.flexibility, S), 1, 2), S) * k[:, None, :]
         inner[:, np.arange(inner.shape[1]), np.arange(inner.shape[1])] += 1.0
         forces = np.linalg.solve(np.swapaxes(inner, 1, 2), k[:, :, None] * St)
         closed = np.matmul(np.swapaxes(forces, 1, 2), St)
-        return cls(S, k, turned, closed)
+        return cls(block.selection[1:], block.stiffness[1:], closed)
 
 
 def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:

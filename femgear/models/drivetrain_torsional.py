@@ -58,7 +58,7 @@ def torsional_matrices(train: Drivetrain) -> tuple[np.ndarray, np.ndarray, np.nd
     spin = _senses(train)
     columns = []
     for number, stage in enumerate(train.planetary):
-        cosine, sense = math.cos(stage.pressure_angle), spin[stage.carrier]
+        cosine, sense = math.cos(stage.pressure_angle), stage.flank * spin[stage.carrier]
         c, s, planets = at[stage.carrier], at[stage.sun], at[number]
         M[c, c] += len(planets) * stage.planet_mass * stage.centre_distance**2
         sun, ring = np.zeros((2, len(planets), len(names)))
@@ -72,7 +72,7 @@ def torsional_matrices(train: Drivetrain) -> tuple[np.ndarray, np.ndarray, np.nd
         row = np.zeros(len(names))
         row[[at[stage.first], at[stage.second]]] = stage.first_radius, stage.second_radius
         lean = math.hypot(1.0, math.tan(stage.helix_angle) * math.cos(stage.pressure_angle))
-        columns.append(spin[stage.first] * math.cos(stage.pressure_angle) / lean * row)
+        columns.append(stage.flank * spin[stage.first] * math.cos(stage.pressure_angle) / lean * row)
     return M, K, np.array(columns).reshape(-1, len(names)).T, tuple(names)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.models.drivetrain_names import numbered
 from femgear.models.drivetrain_record import PASS_BAND
 from femgear.plots.drivetrain import over_time, spectra, stiffness_series
 from femgear.plots.frequency import campbell
@@ -25,7 +26,7 @@ _REACH = 1.04 * _HARMONICS
 _TURNS, _BESIDE = 8.0, 1.3
 # Fewer lines are no picture of side bands.
 _LEAST_LINES = 24
-_PLANET = re.compile(r"(?:^|-)planet (\d+)(?:-ring of |$)")
+_PLANET = re.compile(r"(?:^|-)planet (\d+)(?: \d+)?(?:-ring of |$)")
 
 
 def stiffness_figure(model: DrivetrainModel):
@@ -39,14 +40,16 @@ def stiffness_figure(model: DrivetrainModel):
     from femgear.solvers.series import FourierSeries
 
     train, phase = model.train, np.linspace(0.0, 2.0, 1601)
-    waves = []
+    names, row, waves = numbered(model.meshes), 0, []
+    # by position: the planetary stages come first, with all suns' meshes before the rings'
     for stage in train.planetary:
-        waves.append((f"{stage.sun}-planet 1", stage.sun_mesh))
-        waves.append((f"planet 1-ring of {stage.carrier}", stage.ring_mesh))
-    waves += [(stage.name, stage.mesh) for stage in train.parallel]
+        planets = len(stage.planet_angles)
+        waves += [(row, stage.sun_mesh), (row + planets, stage.ring_mesh)]
+        row += 2 * planets
+    waves += [(row + i, stage.mesh) for i, stage in enumerate(train.parallel)]
     curves, steps = [], []
-    for text, wave in waves[:_MOST_PANELS]:
-        row = model.meshes.index(text)
+    for row, wave in waves[:_MOST_PANELS]:
+        text = names[row]
         curves.append((text, FourierSeries(model.stiffness[row]).at(2.0 * np.pi * phase[:, None])[:, 0]))
         low, high, share = stiffness_levels(wave)
         inside = (phase + wave.phase + 0.5 * share) % 1.0 < share

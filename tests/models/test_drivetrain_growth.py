@@ -1,5 +1,6 @@
 """Growth of the free motion: Floquet and Mathieu exponents, decay, refusal of what outgrows the numbers."""
 
+import cmath
 import math
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from scipy.special import mathieu_a, mathieu_b
 from femgear.errors import CaseError, ConvergenceError
 from femgear.models.drivetrain import balanced_torque, drivetrain_model
 from femgear.models.drivetrain_data import ChainBearing, ChainBody, Drivetrain, MeshWave, ParallelStage
+from femgear.models.drivetrain_growth import PIECE, FreeMotion
 from femgear.models.drivetrain_march import march_drivetrain
 from femgear.models.drivetrain_torque import constant_torques
 from femgear.models.drivetrain_torsional import torsional_model
@@ -158,3 +160,45 @@ def test_nothing_but_the_spin_has_no_growth():
         drivetrain_model(train), constant_torques({"a": 1.0}), duration=0.1, step=1e-3, speed=1.0
     )
     assert math.isnan(run.growth) and run.spin_speed[-1] == pytest.approx(1.5)
+
+
+def test_gain_of_a_run_through_a_resonance():
+    """The same sweep of the equation of the one elastic coordinate, by another method; the mean decays."""
+    damping, ends, duration, step = 0.01, (1.85, 2.6), 1.0, 1e-5
+    model, w = pair(damping=damping), natural(pair())
+    first, last = np.array(ends) * w
+    torque = constant_torques({"a": (last - first) / TEETH / duration * model.inertia})
+    run = march_drivetrain(model, torque, duration=duration, step=step, speed=first / TEETH, outputs=())
+    wave = (w * w * model.stiffness[0] / model.mean_stiffness[0]).tolist()
+
+    def stiffness(t):
+        turn = cmath.exp(1j * (first * t + 0.5 * (last - first) * t * t / duration))
+        return sum((value * turn**order).real for order, value in enumerate(wave))
+
+    def rate(t, y):
+        return [y[1], -2.0 * damping * w * y[1] - stiffness(t) * y[0]]
+
+    times = np.arange(0.0, duration, PIECE * step)
+    x, v = solve_ivp(
+        rate, (0.0, duration), [0.0, 1.0], t_eval=times, rtol=1e-9, atol=1e-13, method="DOP853"
+    ).y
+    sizes = 0.5 * np.log(v * v + np.array([stiffness(t) for t in times.tolist()]) * x * x)
+    wanted = (sizes - np.minimum.accumulate(sizes)).max()
+    assert math.log(run.gain) == pytest.approx(wanted, rel=5e-3) and wanted > math.log(1e3)
+    assert run.growth < -10.0
+
+
+def test_gain_without_resonance_is_small():
+    model = pair(damping=0.02)
+    assert 1.0 <= run_at(model, 1.5).gain < 2.0
+    assert run_at(pair(), 2.0, periods=150).gain > 1e3
+
+
+def test_gain_follows_the_sizes():
+    free = FreeMotion.__new__(FreeMotion)
+    free.sizes = [0.0, -3.0, 1.0, -5.0, -2.0, 700.0, 710.0]
+    assert free.gain() == math.inf
+    free.sizes = [0.0, -3.0, 1.0, -5.0, -2.0]
+    assert free.gain() == pytest.approx(math.exp(4.0))
+    free.sizes = [0.0, -math.inf]
+    assert math.isnan(free.gain())

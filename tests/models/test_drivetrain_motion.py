@@ -1,5 +1,6 @@
 """Motion of the drivetrain: balances, other integrators, harmonic balance, spectra, torques."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -157,7 +158,7 @@ def test_backlash_takes_the_pulling_forces_away():
         stage = problem.elements[1]
         x = (run.deflection[:, stage.columns] * stage.fixed).sum(axis=-1)
         k = stage.stiffness.at(times[:, None] * model.frequencies(0.6))
-        lowest.append(mesh_force(x, k, stage.backlash, separates=separates)[0].min())
+        lowest.append(mesh_force(x, k, math.inf, separates=separates)[0].min())
     assert lowest[0] < -1000.0
     assert lowest[1] >= 0.0
 

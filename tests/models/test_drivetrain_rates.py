@@ -7,9 +7,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.case import read_case
+from femgear.models.drivetrain import drivetrain_model
 from femgear.models.drivetrain_case import case_model
+from femgear.models.drivetrain_data import ChainBearing, ChainBody, Drivetrain, MeshWave, ParallelStage
 from femgear.models.drivetrain_march import march_drivetrain
-from femgear.models.drivetrain_rates import default_record_rate, highest_mesh, speed_range
+from femgear.models.drivetrain_rates import (
+    default_record_rate,
+    frequency_shift,
+    highest_mesh,
+    mesh_mode,
+    shift_rate,
+    speed_range,
+)
 from femgear.models.drivetrain_torque import TorqueHistory, constant_torques
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -48,6 +57,21 @@ def test_speeds_are_those_of_quadrature(model):
     assert (found.last, found.lowest) == pytest.approx((run.spin_speed[-1], run.spin_speed.min()), rel=1e-4)
 
 
+def test_speeds_of_the_late_part(model):
+    """From 0.7 s on, between two instants of the torques; the mean is the angle over the time."""
+    torques = histories()
+    run = march_drivetrain(model, torques, duration=2.0, step=1e-4, speed=50.0)
+    late = run.time >= 0.7 - 1e-9
+    found = speed_range(model, torques, duration=2.0, speed=50.0, start=0.7)
+    speed, angle = run.spin_speed[late], run.spin[late]
+    wanted = (speed[0], speed[-1], speed.min(), speed.max(), (angle[-1] - angle[0]) / 1.3)
+    assert (found.first, found.last, found.lowest, found.highest, found.mean) == pytest.approx(
+        wanted, rel=1e-5
+    )
+    whole = speed_range(model, torques, duration=2.0, speed=50.0)
+    assert abs(whole.mean - found.mean) > 0.5 and whole.lowest < found.lowest
+
+
 def test_constant_torque_gives_a_ramp(model):
     found = speed_range(model, constant_torques({"motor": -30.0}), duration=10.0, speed=20.0)
     assert found.last == pytest.approx(20.0 - 300.0 / model.inertia) and found.highest == 20.0
@@ -75,3 +99,40 @@ def test_records_keep_the_third_harmonic(rate, highest):
     for one, enough in ((record, True), (slower, False)):
         keeps = one >= 1000.0 * (1.0 - 1e-9) and 0.4 * one >= 3.0 * highest
         assert keeps == enough or (enough and every == 1.0)
+
+
+def held_pair(stiffness=2e8):
+    """Two wheels on held axes, one mesh, one elastic coordinate of known frequency."""
+    train = Drivetrain(
+        (ChainBody("a", 10.0, 0.2, tilts=False), ChainBody("b", 20.0, 0.9, tilts=False)),
+        parallel=(ParallelStage("a", "b", 0.05, 0.1, 20, MeshWave(stiffness, 1.5)),),
+        bearings=(ChainBearing("a", np.inf), ChainBearing("b", np.inf)),
+    )
+    base = np.array([0.05, 0.1]) * np.cos(np.radians(20.0))
+    return drivetrain_model(train), np.sqrt(stiffness * np.sum(base**2 / [0.2, 0.9])) / (2.0 * np.pi)
+
+
+def test_mode_that_the_mesh_drives(model):
+    pair, hertz = held_pair()
+    assert mesh_mode(pair, 1.01 * hertz) == pytest.approx(hertz, rel=1e-9)
+    assert mesh_mode(pair, 0.99 * hertz) == 0.0
+    # the elastic coupling between motor and pinion has modes without any share of the mesh
+    top = mesh_mode(model, 1e6)
+    assert 1000.0 < top < 2000.0
+
+
+@pytest.mark.parametrize("steps", [200.0, 20.0, 4.0])
+def test_shift_is_that_of_the_trapezoidal_rule(steps):
+    """Eigenvalues of one step of x'' = -omega^2 x, in matrices written down here."""
+    omega, h = 2.0 * np.pi, 1.0 / steps
+    rate = np.array([[0.0, 1.0], [-(omega**2), 0.0]])
+    step = np.linalg.solve(np.eye(2) - 0.5 * h * rate, np.eye(2) + 0.5 * h * rate)
+    turned = np.abs(np.angle(np.linalg.eigvals(step))).max() / h
+    assert frequency_shift(1.0, steps) == pytest.approx(1.0 - turned / omega, rel=1e-9)
+    # the leading term, for short steps
+    assert frequency_shift(1.0, steps) == pytest.approx((omega * h) ** 2 / 12.0, rel=0.15 * (omega * h) ** 2)
+
+
+@pytest.mark.parametrize("share", [1e-2, 1e-3])
+def test_rate_of_a_shift(share):
+    assert 0.98 * share < frequency_shift(1500.0, shift_rate(1500.0, share)) <= share
