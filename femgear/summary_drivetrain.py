@@ -192,7 +192,8 @@ def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
             )
         )  # fmt: skip
     header = (
-        "stage", "driver", "teeth", "pitch radii [mm]", "ratio", "contact ratio", "stiffness [N/m]", "mesh [Hz]",
+        "stage", "driver", "teeth", "pitch radii [mm]", "ratio", "contact ratio", "stiffness [N/m]",
+        "mesh [Hz]",
     )  # fmt: skip
     return Block("Gear stages", header, tuple(rows))
 
