@@ -107,14 +107,20 @@ def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> 
     if (shift := frequency_shift(mode, rate)) > _SHIFT:
         yield (
             f"[W-RATE] simulation.rate: steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the "
-            f"meshes drive, by {shift:.2%}; {shift_rate(mode, _SHIFT):.3g} Hz lowers it by {_SHIFT:.0%}, "
-            f"{shift_rate(mode, _SMALL_SHIFT):.3g} Hz by {_SMALL_SHIFT:.1%}"
+            f"meshes drive, by {shift:.2%}; {_up(shift_rate(mode, _SHIFT))} Hz lowers it by {_SHIFT:.0%}, "
+            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {_SMALL_SHIFT:.1%}"
         )
     if 0.5 * PASS_BAND * record < top:
         yield (
             f"[W-RECORD] simulation.record: records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, "
             f"below the {name} ({where})"
         )
+
+
+def _up(value: float) -> str:
+    """Three digits, rounded up."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return f"{math.ceil(value / unit) * unit:.12g}"
 
 
 def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
