@@ -27,10 +27,11 @@ def transient_warnings(data: xr.Dataset) -> Iterator[str]:
     for v, variant in enumerate(data["variant"].values):
         if pulling[v].any() and least[v].min() < -_NOTHING and not separating(data):
             worst, lowest = int(np.argmax(pulling[v])), int(np.argmin(least[v]))
+            beside = "" if lowest == worst else f" {data['mesh'].values[lowest]}"
             yield (
                 f"[W-PULL] {variant}: {data['mesh'].values[worst]} pulls for {pulling[v, worst]:.2%} of the "
-                f"time, {data['mesh'].values[lowest]} with up to {-1e-3 * least[v, lowest]:.4g} kN: real "
-                "teeth would part (simulation.contact_loss)"
+                f"time,{beside} with up to "
+                f"{-1e-3 * least[v, lowest]:.4g} kN: real teeth would part (simulation.contact_loss)"
             )
     yield from _parted_warnings(data)
     yield from _growth_warnings(data)
@@ -54,6 +55,7 @@ def _parted_warnings(data: xr.Dataset) -> Iterator[str]:
 
 def _growth_warnings(data: xr.Dataset) -> Iterator[str]:
     if separating(data):
+        yield from _chaos_warnings(data)
         return
     duration, gains = float(data.attrs["steps"]) * float(data.attrs["step"]), largest_gains(data)
     pulls = data["least_force"].values.min(axis=1, initial=0.0) < -_NOTHING
@@ -73,6 +75,17 @@ def _growth_warnings(data: xr.Dataset) -> Iterator[str]:
             f"{'; these forces mean nothing: real teeth part long before' if senseless else ''}; give more "
             "damping or another speed, or contact_loss = true"
         )
+
+
+def _chaos_warnings(data: xr.Dataset) -> Iterator[str]:
+    """Motions with contact loss that depend on every detail, steps included."""
+    duration = float(data.attrs["steps"]) * float(data.attrs["step"])
+    for variant, rate in growth_rates(data):
+        if rate * duration > math.log(GROWN):
+            yield (
+                f"[W-CHAOS] {variant}: neighbouring motions move apart with {rate:.4g} 1/s: times of contact "
+                "and peaks depend on every detail, the steps included; compare two values of simulation.rate"
+            )
 
 
 def separating(data: xr.Dataset) -> bool:

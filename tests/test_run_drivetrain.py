@@ -3,6 +3,7 @@
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args
 
 import numpy as np
@@ -14,6 +15,7 @@ from femgear import cli
 from femgear.analysis_drivetrain import (
     BENDING,
     TORSIONAL,
+    _check_sense,
     case_model,
     solve_drivetrain_modes,
     solve_spectrum,
@@ -301,6 +303,18 @@ def test_a_motion_beyond_sense_is_refused_though_its_books_are_exact(resonant):
     error = caught.value
     assert "torsional: motor vibrates with" in error.message and "100 times the speed" in error.limit
     assert error.key == "simulation.damping_ratio" and "contact_loss" in error.remedy
+
+
+def test_impacts_that_the_steps_blow_up_are_refused():
+    """Finer steps keep this motion at some 40 kN; coarse ones feed its impacts with energy."""
+    run = SimpleNamespace(
+        contact_loss=True, gain=1e9, spin_speed=np.full(3, 10.0), velocity=np.array([[0.0, 5.0], [1.0, 9e4]]),
+        outputs=("motor: rotation", "fan: rotation"),
+    )  # fmt: skip
+    with pytest.raises(ConvergenceError, match="fan vibrates with 9e") as caught:
+        _check_sense(run, "with bending", [1.0, 0.25])
+    assert caught.value.code == "E-DIVERGED" and "simulation.rate" in caught.value.remedy
+    _check_sense(SimpleNamespace(**vars(run) | {"gain": 10.0}), "with bending", [1.0, 0.25])
 
 
 def test_growth_and_contact_loss_in_the_results(resonant):

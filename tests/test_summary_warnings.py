@@ -118,13 +118,17 @@ def transient(
         ({"gain": 1e9, "contact": "separating", "growth": -1.0}, []),
         ({"lost": 1.0, "contact": "separating"}, ["[W-PARTED] with bending: the teeth of a-b never touch"]),
         ({"lost": 0.999, "contact": "separating"}, []),
-        ({"growth": 5.0, "contact": "separating", "pulling": 0.1, "lost": 0.2}, []),
+        (
+            {"growth": 5.0, "contact": "separating", "pulling": 0.1, "lost": 0.2},
+            ["[W-CHAOS] with bending: neighbouring motions move apart with 5 1/s"],
+        ),
+        ({"growth": 1.1, "contact": "separating"}, []),
         ({"energy": 2e-6}, ["[W-BALANCE] the balance of energy misses 2.0e-06"]),
         ({"momentum": 1e-3}, ["[W-BALANCE] the balance of angular momentum misses 1.0e-03"]),
         ({"energy": np.nan}, ["[W-BALANCE] the balance of energy misses nan"]),
         (
             {"pulling": 0.25},
-            ["[W-PULL] with bending: a-b pulls for 25.00% of the time, a-b with up to 0.2 kN"],
+            ["[W-PULL] with bending: a-b pulls for 25.00% of the time, with up to 0.2 kN"],
         ),
     ],
 )

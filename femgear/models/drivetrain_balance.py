@@ -231,10 +231,20 @@ def settled_motion(
     left, fed_back = found.estimate.remainder, found.estimate.feedback
     converged = bool(left.max() <= tolerance and fed_back.max() <= _FEEDBACK * tolerance and found.solved)
     message = _message(model, found, converged, tolerance, max_lines)
+    if not given:
+        message += _pulling(model, force[:, 0].real)
     return SettledMotion(
         model, orders, problem.frequency, x, q, None if given else force, found.residual, left, fed_back,
         converged, found.rounds, message,
     )  # fmt: skip
+
+
+def _pulling(model, mean) -> str:
+    """Meshes that pull in the mean: the torques press their other flanks."""
+    names = [model.meshes[i] for i in np.flatnonzero(mean < -_UNBALANCED * np.abs(mean).max(initial=0.0))]
+    if not names:
+        return ""
+    return f"; {', '.join(names)} pull in the mean: the other flank is loaded, name the driver of the stage"
 
 
 def _check(tolerance, max_lines) -> None:

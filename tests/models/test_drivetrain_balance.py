@@ -155,6 +155,13 @@ def test_too_few_lines_are_told():
     assert "max_lines is 30" in found.message and "gear" in found.message
 
 
+def test_torques_on_the_other_flank_are_told():
+    model, torques, speed = two_stages(terms=3)
+    against = {body: -torque for body, torque in torques.items()}
+    messages = [settled_motion(model, one, speed=speed).message for one in (torques, against)]
+    assert "pull" not in messages[0] and "gear 1-gear 2, gear 2-gear 3 pull in the mean" in messages[1]
+
+
 def test_mirror_images_of_given_lines():
     model, torques, speed = two_stages(terms=3)
     lines = drivetrain_lines(model, harmonics=6, mixed=3)
