@@ -241,8 +241,6 @@ def solve_modes(
     """
     from femgear.contact.bodies import active_flank_load, ring_on_foundation
     from femgear.fe.elasticity import Material, mass
-    from femgear.frequency_limit import highest_excitation
-    from femgear.models.elastic import highest_mesh_mode
     from femgear.models.ring import ring_model
 
     check_entries(static.entries, static_entries(case), "static solution")
@@ -254,10 +252,7 @@ def solve_modes(
     if case.static.members != "elastic":
         bodies = ring_on_foundation(bodies, static.sectors, foundation, depth=case.static.depth)
     state = state_on_supports(case, bodies, static.sun_torque, progress=progress)
-    mesh_mode = highest_mesh_mode(
-        gears, state.stiffness.mean(axis=1), **_bodies_of(case), sun_torque=static.sun_torque
-    )
-    reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
+    reach = excitation_reach(case, state, static.sun_torque)
     material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
     diameter = max_nodal_diameter(case)
     ring = ring_model(
@@ -290,6 +285,16 @@ def state_on_supports(case: Case, bodies: Bodies, sun_torque: float, *, progress
         supports=replace(_supports_of(case), planet_clearance=0.0),
         progress=None if progress is None else lambda done, total: progress("modes", done, total),
     )
+
+
+def excitation_reach(case: Case, state: LoadedPeriod, sun_torque: float) -> float:
+    """Frequency to which the excitation reaches [Hz], see `femgear.frequency_limit.highest_excitation`."""
+    from femgear.frequency_limit import highest_excitation
+    from femgear.models.elastic import highest_mesh_mode
+
+    gears, stiffness = planetary_set(case), state.resampled("stiffness", RECORD).mean(axis=1)
+    mesh_mode = highest_mesh_mode(gears, stiffness, **_bodies_of(case), sun_torque=sun_torque)
+    return highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
 
 
 def modal_basis(case: Case, ring: RingModel, bodies: Bodies, state: LoadedPeriod, *, sun_torque, reach):

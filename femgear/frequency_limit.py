@@ -8,6 +8,7 @@ at all speeds, and the level of the housing is computed again with twice that fr
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,8 @@ LOWEST = 20e3
 """The excitation reaches the end of hearing at least [Hz]."""
 ABOVE_MESHES = 1.4
 """And this many times the highest natural frequency of the rigid gears on their meshes."""
+STEP = 2500.0
+"""In whole steps, so that variants of one set are excited alike [Hz]."""
 HARMONICS = 512
 """The record of the static state carries this many harmonics: the jumps are 2^-13 of a period wide."""
 MEMORY = 1.5e9
@@ -61,7 +64,7 @@ def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> f
     """
     if case.dynamics.up_to is not None:
         return case.dynamics.up_to
-    lowest = max(LOWEST, ABOVE_MESHES * mesh_mode, 3 * mesh_frequency)
+    lowest = STEP * math.ceil(max(LOWEST, ABOVE_MESHES * mesh_mode, 3 * mesh_frequency) / STEP)
     given = (case.dynamics.mesh_harmonics or 0) * mesh_frequency
     return max(min(lowest, 0.5 * HIGHEST_RESPONSE), given)
 

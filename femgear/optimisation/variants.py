@@ -210,6 +210,8 @@ def _modal_basis(case: Case, static: StaticResult, shared: Shared) -> ModesResul
         return first
     check_dynamic_case(case, planetary_set(case))
     state = analysis.state_on_supports(case, first.bodies, static.sun_torque)
+    if analysis.excitation_reach(case, state, static.sun_torque) != first.reach:
+        return analysis.solve_modes(case, static)
     return analysis.modal_basis(
         case, first.ring, first.bodies, state, sun_torque=static.sun_torque, reach=first.reach
     )
