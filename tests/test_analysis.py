@@ -55,7 +55,7 @@ def test_at_standstill_the_dynamic_transmission_error_is_that_of_the_set_on_its_
     # the kinks of the static curve have harmonics beyond the 512 of the excitation
     ste = sample(harmonics_of(modes.state.resampled("deflection", 8192), 512), 2048)
     dte = sample(result.dte[0], 2048)
-    assert np.abs(dte - ste).max(axis=1) == pytest.approx(0, abs=1e-4 * np.ptp(ste, axis=1).min())
+    assert np.abs(dte - ste).max(axis=1) == pytest.approx(0, abs=2e-4 * np.ptp(ste, axis=1).min())
     assert dte.mean(axis=1) == pytest.approx(ste.mean(axis=1), rel=1e-4)
     # gears that are held deflect by less than those on their supports
     assert static.cycle.deflection[3:].mean() < 0.5 * ste[3:].mean()
