@@ -147,8 +147,11 @@ THEMES = (
     Theme(
         "ring",
         "Vibration of the ring",
-        "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress.",
-        (ring.plain_annulus, ring.toothed_ring),
+        "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress. Rows "
+        "*turning*: the reference set, and its ring alone on the foundation, with the gyroscopic and "
+        "convective terms of the carrier frame. In that frame the equations do not change with time, so that "
+        "natural frequencies exist; the ring stands still in the housing.",
+        (ring.plain_annulus, ring.toothed_ring, ring.turning_carrier),
     ),
     Theme(
         "two routes",
