@@ -401,6 +401,15 @@ def test_planet_phasing_of_unequal_planets(tmp_path):
     assert float(first["lateral force, tilting"]) > 0.5 and float(second["torque, thrust"]) > 0.01
 
 
+def test_multistage_lists_the_readings_of_the_published_table(tmp_path):
+    done = run("multistage.py", "--published", "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert is_png(tmp_path / "published.png")
+    assert re.search(r"N/m, 3 planets +last carrier free +1 +298\.1 +2771\.9 +7 of 16", done.stdout)
+    rows = text_table(tmp_path / "published.csv")
+    assert len(rows) == 2 * (17 + 16 + 21 + 20)
+
+
 def test_multistage_writes_its_tables_and_figures(tmp_path):
     done = run("multistage.py", "--points", "40", "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -208,6 +208,7 @@ THEMES = (
             multistage.structure,
             multistage.soft_shaft,
             multistage.response,
+            multistage.published,
         ),
     ),
     Theme(
