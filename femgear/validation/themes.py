@@ -196,7 +196,14 @@ THEMES = (
         "helical",
         "Helical planetary set",
         "Forces act at the base circles, as in the paper, where nothing else is said.",
-        (helical.table_4, helical.rigid, helical.leakage, helical.response),
+        (
+            helical.table_4,
+            helical.rigid,
+            helical.table_2,
+            helical.table_1,
+            helical.leakage,
+            helical.response,
+        ),
     ),
     Theme(
         "multistage",
