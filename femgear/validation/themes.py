@@ -224,7 +224,9 @@ THEMES = (
         "",
         (
             drivetrain.shafts,
+            drivetrain.shaft_joints,
             drivetrain.kinematics,
+            drivetrain.base_line,
             drivetrain.stiffness,
             drivetrain.reductions,
             drivetrain.balances,
