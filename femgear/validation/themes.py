@@ -241,7 +241,14 @@ THEMES = (
         "Planetary sets of two wind turbines",
         "NREL/CP-5000-55355; what every reading of its tables gives stands in docs/nrel.md.",
         (nrel.frequencies, nrel.linear_peak),
-        slow_parts=(nrel.ring_resonance, nrel.wedging, nrel.folds, nrel.extended),
+        slow_parts=(
+            nrel.ring_resonance,
+            nrel.wedging,
+            nrel.folds,
+            nrel.small_plays,
+            nrel.sun_support,
+            nrel.extended,
+        ),
     ),
     Theme(
         "dynamics",
