@@ -2,8 +2,7 @@
 
 All bodies move in the plane; coordinates are those of the carrier frame, in which the mean motion is
 removed. `elastic_set`, and with it the dynamics, leaves the gyroscopic and convective terms of that frame
-out, as the modulation paper does ("Vibratory response of planetary gear sets housing by a spectral iterative
-approach"); `turning_system` adds them, to see what they do to the natural frequencies.
+out; `turning_system` adds them, to see what they do to the natural frequencies.
 """
 
 from __future__ import annotations
