@@ -147,8 +147,11 @@ THEMES = (
     Theme(
         "ring",
         "Vibration of the ring",
-        "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress.",
-        (ring.plain_annulus, ring.toothed_ring),
+        "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress. Rows "
+        "*turning*: the reference set, and its ring alone on the foundation, with the gyroscopic and "
+        "convective terms of the carrier frame. In that frame the equations do not change with time, so that "
+        "natural frequencies exist; the ring stands still in the housing.",
+        (ring.plain_annulus, ring.toothed_ring, ring.turning_carrier),
     ),
     Theme(
         "two routes",
@@ -193,7 +196,14 @@ THEMES = (
         "helical",
         "Helical planetary set",
         "Forces act at the base circles, as in the paper, where nothing else is said.",
-        (helical.table_4, helical.rigid, helical.leakage, helical.response),
+        (
+            helical.table_4,
+            helical.rigid,
+            helical.table_2,
+            helical.table_1,
+            helical.leakage,
+            helical.response,
+        ),
     ),
     Theme(
         "multistage",
@@ -205,6 +215,7 @@ THEMES = (
             multistage.structure,
             multistage.soft_shaft,
             multistage.response,
+            multistage.published,
         ),
     ),
     Theme(
@@ -213,7 +224,9 @@ THEMES = (
         "",
         (
             drivetrain.shafts,
+            drivetrain.shaft_joints,
             drivetrain.kinematics,
+            drivetrain.base_line,
             drivetrain.stiffness,
             drivetrain.reductions,
             drivetrain.balances,
@@ -228,7 +241,14 @@ THEMES = (
         "Planetary sets of two wind turbines",
         "NREL/CP-5000-55355; what every reading of its tables gives stands in docs/nrel.md.",
         (nrel.frequencies, nrel.linear_peak),
-        slow_parts=(nrel.ring_resonance, nrel.wedging, nrel.folds, nrel.extended),
+        slow_parts=(
+            nrel.ring_resonance,
+            nrel.wedging,
+            nrel.folds,
+            nrel.small_plays,
+            nrel.sun_support,
+            nrel.extended,
+        ),
     ),
     Theme(
         "dynamics",
