@@ -16,6 +16,7 @@ from femgear.validation import (
     housing,
     impacts,
     integration,
+    levels,
     members,
     modulation,
     moving_force,
@@ -256,7 +257,15 @@ THEMES = (
         "6 mesh harmonics of the excitation, 5 % modal damping. Differences are those of the mesh "
         "deflections.",
         (dynamics.fixed_point, dynamics.harmonics_kept, dynamics.modes_kept, dynamics.time_integration),
-        (dynamics.quasi_static, dynamics.more_time_integration),
+        (dynamics.more_time_integration,),
+    ),
+    Theme(
+        "levels",
+        "Dynamic model at rest, and level of the housing",
+        "Default settings: the excitation reaches as far as each row says. Beside the reference set one out of "
+        "phase and one with two opposite pairs of planets.",
+        (),
+        (levels.at_rest, levels.more_torque, levels.reach),
     ),
     Theme(
         "stability",
