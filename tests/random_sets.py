@@ -13,7 +13,7 @@ KINDS = ("in phase", "out of phase", "unequal")
 PLANETS = (2, 3, 4, 5, 6, 7)
 # what the dynamics are asked for "at rest" [rpm of the input]
 REST = 0.5
-# of gears that femgear refuses for their geometry, another set is drawn; so many of them say that the draw is wrong
+# another set is drawn where femgear refuses the geometry; so many refusals tell of a bad draw
 MOST_DRAWS = 25
 
 

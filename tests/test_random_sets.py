@@ -1,4 +1,7 @@
-"""What must hold for any valid set: random ones, from their teeth to the signal of the housing."""
+"""What must hold for any valid set: random ones, from their teeth to the signal of the housing.
+
+``pytest tests/test_random_sets.py -m "" -k seed117`` repeats one set; `random_sets.random_set(117)` has its case.
+"""
 
 import math
 import warnings
@@ -75,7 +78,7 @@ every_set = pytest.mark.parametrize(
     "solved",
     [*QUICK, *(pytest.param(seed, marks=pytest.mark.slow) for seed in SLOW)],
     indirect=True,
-    ids="seed {}".format,
+    ids="seed{:03d}".format,
     scope="module",
 )
 
@@ -136,6 +139,35 @@ def unequal_peaks(values: np.ndarray, solved: Solved) -> float:
     return worst
 
 
+def test_most_draws_are_valid_sets():
+    refused = [len(random_set(seed).refused) for seed in range(36)]
+    assert len(refused) / (len(refused) + sum(refused)) > 0.3
+
+
+def test_rotations_tell_which_planets_are_equal():
+    def places(*turns):
+        return 2 * math.pi * np.array(turns) / 12 - 1.3
+
+    cases = (
+        (places(0, 4, 8), 3, [[0, 1, 2]]),
+        (places(0, 2, 6, 8), 2, [[0, 2], [1, 3]]),
+        (places(0, 1, 4, 5, 8, 9), 3, [[0, 2, 4], [1, 3, 5]]),
+        (places(0, 3, 7), 1, [[0], [1], [2]]),
+    )
+    for angles, g, groups in cases:
+        assert symmetry(angles, 12) == g and equal_planets(angles, 12) == groups
+
+
+@pytest.mark.parametrize("uniform", [True, False])
+def test_lines_of_a_later_record_are_turned(uniform):
+    rng = np.random.default_rng(1)
+    tau = np.arange(20) / 20 if uniform else np.sort(rng.random(20))
+    record, turn = rng.standard_normal((2, 20)), np.exp(2j * math.pi * 0.35 * np.arange(9))
+    assert lines((tau - 0.35) % 1.0, record, 8) == pytest.approx(lines(tau, record, 8) * turn, abs=1e-13)
+    fine = np.interp(np.arange(4096) / 4096, tau, record[0], period=1.0)
+    assert uniform or lines(tau, record[0], 8) == pytest.approx(harmonics_of(fine, 8), abs=1e-5)
+
+
 @every_set
 def test_every_number_is_finite(solved):
     for result in (solved.static, solved.modes, solved.dynamics, solved.housing):
@@ -172,11 +204,12 @@ def test_static_solution_is_in_equilibrium(solved):
 def test_equal_planets_are_equal(solved):
     """Every planet that a rotation of the set takes to another has its record, a mesh phase later."""
     cycle = solved.static.cycle
-    for name in ("stiffness", "deflection", "force"):
-        record = getattr(cycle, name)
-        assert unequal_lines(lines(cycle.position, record, LINES), solved) < 1e-8, name
-        assert unequal_peaks(record.max(axis=1), solved) < 1e-8, name
-        assert unequal_peaks(record.min(axis=1), solved) < 1e-8, name
+    for state in (cycle, getattr(solved.modes, "state", cycle)):
+        for name in ("stiffness", "deflection", "force"):
+            record = getattr(state, name)
+            assert unequal_lines(lines(state.position, record, LINES), solved) < 1e-8, name
+            assert unequal_peaks(record.max(axis=1), solved) < 1e-8, name
+            assert unequal_peaks(record.min(axis=1), solved) < 1e-8, name
     assert unequal_peaks(cycle.tooth_load.max(axis=(1, 2)), solved) < 1e-8
     for name, amplitudes in (("DTE", solved.dynamics.dte), ("mesh force", solved.dynamics.response.force)):
         for amplitude in amplitudes:
