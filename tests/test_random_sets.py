@@ -1,6 +1,6 @@
 """What must hold for any valid set: random ones, from their teeth to the signal of the housing.
 
-``pytest tests/test_random_sets.py -m "" -k seed117`` repeats one set; `random_sets.random_set(117)` has its case.
+``pytest tests/test_random_sets.py -m "" -k seed117`` repeats one set, the case of ``random_set(117)``.
 """
 
 import math
