@@ -147,8 +147,12 @@ THEMES = (
     Theme(
         "ring",
         "Vibration of the ring",
-        "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress.",
-        (ring.plain_annulus, ring.toothed_ring),
+        "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress where "
+        "nothing else is said. The annulus of the root circle is another body than the toothed ring: it "
+        "gates the ring without teeth and is information beside the one with teeth, which a whole toothed ring "
+        "on a grid of its own gates.",
+        (ring.plain_annulus, ring.toothed_ring, ring.other_outline),
+        (ring.whole_ring,),
     ),
     Theme(
         "two routes",
