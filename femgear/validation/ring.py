@@ -150,7 +150,7 @@ def toothed_ring() -> tuple[Row, ...]:
             thicker,
             bare,
             EXACT + ", of the same area as the body",
-            "its edge is not round",
+            "its edge is wavy",
         ),
         ("teeth without mass: their stiffness", annulus, stiff, EXACT, ""),
         ("free toothed ring", predicted, ours, bent, "an estimate: the rim shears and stretches too"),
@@ -251,8 +251,7 @@ def other_outline() -> tuple[Row, ...]:
             f"free toothed ring, plane stress, n = {n} [Hz]",
             ELSEWHERE[n],
             value,
-            note=f"root fillets of {SHARP} instead of {gear.rack.root_radius} modules at the cutter's tip give "
-            f"{other:.2f} Hz",
+            note=f"with {SHARP} instead of {gear.rack.root_radius} modules at the cutter's tip {other:.2f} Hz",
         )
         for n, value, other in zip(diameters, ours, sharper, strict=True)
     )

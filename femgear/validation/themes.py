@@ -148,9 +148,8 @@ THEMES = (
         "ring",
         "Vibration of the ring",
         "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress where "
-        "nothing else is said. The annulus of the root circle is another body than the toothed ring: it "
-        "gates the ring without teeth and is information beside the one with teeth, which a whole toothed ring "
-        "on a grid of its own gates.",
+        "nothing else is said. The annulus of the root circle is another body than the toothed ring and only "
+        "information beside it; what gates the ring with teeth has all its teeth in a grid of its own.",
         (ring.plain_annulus, ring.toothed_ring, ring.other_outline),
         (ring.whole_ring,),
     ),

@@ -1,4 +1,4 @@
-"""Free vibration of a toothed ring with all its teeth in one grid: neither cyclic symmetry nor a mirrored half.
+"""Free vibration of a toothed ring with all its teeth in one grid, without cyclic or mirror symmetry.
 
 Shares with the sector only the exact outline. The grid is triangulated by Gmsh as a whole, the displacement
 is cubic where the sector's is quadratic, assembly and eigenproblem are plain scikit-fem and scipy.
