@@ -251,7 +251,7 @@ def other_outline() -> tuple[Row, ...]:
             f"free toothed ring, plane stress, n = {n} [Hz]",
             ELSEWHERE[n],
             value,
-            note=f"with {SHARP} instead of {gear.rack.root_radius} modules at the cutter's tip {other:.2f} Hz",
+            note=f"{SHARP} instead of {gear.rack.root_radius} modules at the cutter's tip {other:.1f} Hz",
         )
         for n, value, other in zip(diameters, ours, sharper, strict=True)
     )
