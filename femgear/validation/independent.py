@@ -1,9 +1,9 @@
 """Planetary sets of rigid bodies once more, as a network of springs between points in space.
 
-The references of rows "springs between points": plain NumPy and SciPy, nothing of femgear's models. Every body
-has three translations v and three rotations phi in one fixed frame; a spring of stiffness k between points a
-of body A and b of body B along the unit vector n stores ``k/2 (n . (v_A + phi_A x a - v_B - phi_B x b))^2``,
-with a and b seen from the centres of the bodies. Mesh springs lie on the line of action, which touches the
+The references of rows "springs between points": plain NumPy and SciPy, nothing of femgear's models. Each
+body has three translations v and three rotations phi in one fixed frame; a spring of stiffness k between
+points a of body A and b of body B along n stores ``k/2 (n . (v_A + phi_A x a - v_B - phi_B x b))^2``, with a
+and b seen from the centres of the bodies. Mesh springs lie on the line of action, which touches the
 base circles of both gears; a pin holds its planet by springs between planet and carrier at the pin. A planar
 set keeps x, y and the rotation about z.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from decimal import Decimal
 
 import numpy as np
 
@@ -135,8 +136,8 @@ def _frequencies(M: np.ndarray, K: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * math.pi)
 
 
-def network(*, radii, distance, angles, alpha, beta, bodies, supports, pin, meshes) -> Network:
-    """Planetary set whose sun drives counter-clockwise.
+def network(*, radii, distance, angles, alpha, beta, bodies, supports, pin, meshes, flank=1.0) -> Network:
+    """Planetary set with the flanks on which a counter-clockwise sun drives, or -1 for the other ones.
 
     Parameters
     ----------
@@ -156,6 +157,7 @@ def network(*, radii, distance, angles, alpha, beta, bodies, supports, pin, mesh
         The same for every planet on its pin.
     meshes : (float, float)
         Stiffness of the sun's and of the ring's meshes [N/m].
+    flank : {1, -1}
     """
     net = Network()
     for name in ("sun", "ring", "carrier"):
@@ -168,8 +170,10 @@ def network(*, radii, distance, angles, alpha, beta, bodies, supports, pin, mesh
     sun, planet_radius, ring = radii
     for name in planets:
         net.hold(name, "carrier", net.places[name], **pin)
-        net.mesh("sun", "sun", name, name, (sun, planet_radius), alpha, beta, meshes[0], sense=1.0)
-        net.mesh("ring", name, "ring", name, (planet_radius, ring), alpha, beta, meshes[1], sense=-1.0)
+        net.mesh("sun", "sun", name, name, (sun, planet_radius), alpha, flank * beta, meshes[0], sense=flank)
+        net.mesh(
+            "ring", name, "ring", name, (planet_radius, ring), alpha, flank * beta, meshes[1], sense=-flank
+        )
     return net
 
 
@@ -200,10 +204,21 @@ def lin_parker(planets: int, *, pin=1e8, sun_support=1e8, others=1e8, ring_turn=
     )
 
 
-def wind_turbine_b() -> Network:
-    """Set B of NREL/CP-5000-55355 as docs/nrel.md reads it: 16/26/68, module 14 mm, 24.6 deg."""
+# set B of NREL/CP-5000-55355: masses [kg], inertias I / r^2 [kg], supports, meshes and pin [N/m], torsional
+# supports [N/m rad] as printed
+WIND_TURBINE_B = {
+    "sun mass": "51", "ring mass": "4000", "carrier mass": "1330", "planet mass": "114",
+    "sun inertia": "61.1", "ring inertia": "2484", "carrier inertia": "314.7", "planet inertia": "51.9",
+    "ring support": "4e9", "carrier support": "126e6", "sun torsion": "3e6", "ring torsion": "24.4e6",
+    "sun mesh": "3.95e9", "ring mesh": "5.29e9", "pin": "5.3e9",
+}  # fmt: skip
+
+
+def wind_turbine_b(*, flank: float = 1.0, **changes: float) -> Network:
+    """Set B as docs/nrel.md reads it: 16/26/68, module 14 mm, 24.6 deg; changed entries by name."""
     alpha, distance = math.radians(24.6), 0.294
     sun, planet, ring = (0.5 * 14e-3 * teeth * math.cos(alpha) for teeth in (16, 26, 68))
+    given = {name: float(text) for name, text in WIND_TURBINE_B.items()} | changes
     return network(
         radii=(sun, planet, ring),
         distance=distance,
@@ -211,18 +226,64 @@ def wind_turbine_b() -> Network:
         alpha=alpha,
         beta=0.0,
         bodies={
-            "sun": (51.0, 61.1 * sun**2),
-            "ring": (4000.0, 2484.0 * ring**2),
-            "carrier": (1330.0, 314.7 * distance**2),
-            "planet": (114.0, 51.9 * planet**2),
+            name: (given[f"{name} mass"], given[f"{name} inertia"] * radius**2)
+            for name, radius in (("sun", sun), ("ring", ring), ("carrier", distance), ("planet", planet))
         },
         supports={
-            "sun": {"radial": 100.0, "torsion": 4.0 * 3e6},
-            "ring": {"radial": 4e9, "torsion": 4.0 * 24.4e6},
-            "carrier": {"radial": 126e6},
+            "sun": {"radial": 100.0, "torsion": 4.0 * given["sun torsion"]},
+            "ring": {"radial": given["ring support"], "torsion": 4.0 * given["ring torsion"]},
+            "carrier": {"radial": given["carrier support"]},
         },
-        pin={"radial": 5.3e9},
-        meshes=(3.95e9, 5.29e9),
+        pin={"radial": given["pin"]},
+        meshes=(given["sun mesh"], given["ring mesh"]),
+        flank=flank,
+    )
+
+
+def wind_turbine_a(*, flank: float = 1.0) -> Network:
+    """Set A of the same paper as docs/nrel.md reads it: 21/39/99, inertias as I / r^2, 24.6 deg."""
+    alpha, distance = math.radians(24.6), 0.308
+    sun, planet, ring = (0.5 * diameter * math.cos(alpha) for diameter in (0.2156, 0.4004, 1.0164))
+    return network(
+        radii=(sun, planet, ring),
+        distance=distance,
+        angles=2.0 * np.pi * np.arange(3) / 3,
+        alpha=alpha,
+        beta=0.0,
+        bodies={
+            "sun": (181.6, 3.2 * sun**2),
+            "ring": (2633.0, 144.2 * ring**2),
+            "carrier": (759.9, 59.1 * distance**2),
+            "planet": (104.0, 3.2 * planet**2),
+        },
+        supports={
+            "sun": {"radial": 100.0, "torsion": 45.8e6},
+            "ring": {"radial": 102e6, "torsion": 57.4e6},
+            "carrier": {"radial": 5e9},
+        },
+        pin={"radial": 6.8e9},
+        meshes=(16.9e9, 19.2e9),
+        flank=flank,
+    )
+
+
+def half_unit(text: str) -> float:
+    """Half a unit of the last digit of a printed number, such as 0.05e6 of ``"24.4e6"``."""
+    return 0.5 * 10.0 ** int(Decimal(text).as_tuple().exponent)
+
+
+def moved_by_digits(frequencies) -> np.ndarray:
+    """Sum of the shifts [Hz] of frequencies of set B by half a unit of the last digit of every printed entry.
+
+    Parameters
+    ----------
+    frequencies : callable
+        Of a `Network`, returns an array [Hz].
+    """
+    base = frequencies(wind_turbine_b())
+    return sum(
+        np.abs(frequencies(wind_turbine_b(**{name: float(text) + half_unit(text)})) - base)
+        for name, text in WIND_TURBINE_B.items()
     )
 
 

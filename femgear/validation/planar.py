@@ -256,7 +256,7 @@ def load_sharing() -> tuple[Row, ...]:
 
 
 def _springs_sharing(planets, torque, error, sun_support, *, pin=1e9, stiff=False) -> np.ndarray:
-    """Sun-planet forces [N] of `independent`; ring and carrier on 1e12 N/m or rigid, an infinite support too."""
+    """Sun-planet forces [N] of `independent`; ring and carrier on 1e12 N/m or rigid."""
     rigid = math.isinf(sun_support)
     more = {"others": 1e12, "ring_turn": 1e12, "carrier_turn": 1e12} if stiff else {}
     net = independent.lin_parker(planets, pin=pin, sun_support=0.0 if rigid else sun_support, **more)
