@@ -148,11 +148,14 @@ THEMES = (
     Theme(
         "ring",
         "Vibration of the ring",
-        "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress. Rows "
+        "One sector of 108 by cyclic reduction, free, teeth in plane strain and rim in plane stress where "
+        "nothing else is said. The annulus of the root circle is another body than the toothed ring and only "
+        "information beside it; what gates the ring with teeth has all its teeth in a grid of its own. Rows "
         "*turning*: the reference set, and its ring alone on the foundation, with the gyroscopic and "
         "convective terms of the carrier frame. In that frame the equations do not change with time, so that "
         "natural frequencies exist; the ring stands still in the housing.",
-        (ring.plain_annulus, ring.toothed_ring, ring.turning_carrier),
+        (ring.plain_annulus, ring.toothed_ring, ring.other_outline, ring.turning_carrier),
+        (ring.whole_ring,),
     ),
     Theme(
         "two routes",
