@@ -54,7 +54,7 @@ class MeshWindows:
     tooth : tuple of two integer arrays (2N, pairs)
         Tooth numbers on gear 1 and gear 2 during the first mesh period.
     turns : (P,) int array
-        Whole mesh periods passed at each position.
+        Mesh periods passed at each position; one of the record's periods has one number.
     local : (2, cells, cells) array
         Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh.
     cell_area : (2N,) array
@@ -193,16 +193,17 @@ def mesh_windows(
     pitch = planetary_set.sun.base_pitch
     pairs = mesh_pairs(planetary_set)
     tau = (first + np.arange(positions * periods)) / positions
-    turns = np.floor(tau).astype(int)
+    # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
+    turns = -(-first // positions) + np.arange(positions * periods) // positions
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
     count = int(np.ceil(end - begin)) + 4
     found, teeth = [], []
     for direction in (DRIVE, BACK) if both_flanks else (DRIVE,):
         side = flank_side(planetary_set, direction)
-        first = np.floor(begin - side.phase - 0.5 * (1.0 + direction)).astype(int) - 1
-        index = first[:, None] + np.arange(count)
         passed = direction * (tau - turns)
+        lowest = np.floor(begin - side.phase - np.ceil(passed.max())).astype(int) - 1
+        index = lowest[:, None] + np.arange(count)
         zeta = pitch * (passed[None, :, None] + side.phase[:, None, None] + index[:, None, :])
         tooth = side_teeth(planetary_set, index, direction)
         shift = pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
