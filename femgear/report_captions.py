@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from femgear.case import Case
     from femgear.casefile.drivetrain import DrivetrainCase
+    from femgear.storage import Results
 
 # stem of a file, its section, its caption; {} stands for what follows the stem
 CAPTIONS = (
@@ -328,6 +329,28 @@ def comparisons(case: Case | DrivetrainCase, stem: str) -> Iterator[str]:
     for entry in case.planar.published if case.planar is not None else ():
         if entry.figure is not None and (stem == entry.figure or stem.startswith(f"{entry.figure}_")):
             yield f"Beside {entry.source}: {entry.comparison}"
+
+
+_OF_BRANCH = ("weight_response", "carrier_orbit", "planet_bearing_forces", "wedged_teeth", "tooth_contact")
+# figures that show displacements alone, without forces or contact
+_OF_MOTION = ("weight_response", "carrier_orbit", "response_orbit")
+
+
+def doubts(results: Results, stem: str) -> Iterator[str]:
+    """What the results of a planar case say against a picture, for its caption."""
+    from femgear.models.planar_response import TAIL_LIMIT
+
+    stage = "branch" if stem in _OF_BRANCH else "response" if stem.startswith(_OF_RESPONSE) else None
+    if stage is None or results.case.planar is None or stage not in results.stages:
+        return
+    data = results.stage(stage)
+    motion, force = (float(data[name].max()) for name in ("tail", "force_tail"))
+    tail = motion if stem.startswith(_OF_MOTION) else max(motion, force)
+    if tail > TAIL_LIMIT:
+        yield (
+            f"Marked where more than {TAIL_LIMIT:.0%} of the amplitude lies in the upper half of the "
+            f"harmonics (up to {tail:.2g}): shapes and peaks there are not to be trusted (W-TAIL)."
+        )
 
 
 def _contact(case: DrivetrainCase) -> str:

@@ -73,12 +73,13 @@ def housing_signal(
         rows=1 + len(harmonics), width=9.5, height=1.0 + 2.5 * (1 + len(harmonics)), sharex=True
     )
     signal = housing["acceleration"].values[speed_index]
-    peaks = _peaks(signal, ring_teeth)
-    text = "largest within a mesh period"
-    _draw_signal(axes[0], signal, peaks, f"{speed}: all orders", text=text, colour=ORANGE)
+    text = "largest and smallest within a mesh period"
+    around = _extremes(signal, ring_teeth)
+    _draw_signal(axes[0], signal, around, f"{speed}: all orders", text=text, colour=ORANGE)
     for ax, harmonic in zip(axes[1:], harmonics):
         found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
-        _draw_signal(ax, found.signal, found.envelope, _band_title(speed, found))
+        around = found.envelope, -found.envelope
+        _draw_signal(ax, found.signal, around, _band_title(speed, found))
         lobes = found.lobes
         ax.plot(lobes.position, lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False)
     axes[-1].set_xlim(0, 1)
@@ -90,17 +91,18 @@ def housing_signal(
 def _draw_signal(ax, signal, around, title, *, text="envelope", colour=VERMILION):
     at = np.arange(len(signal)) / len(signal)
     ax.plot(at, signal, color=BLUE, linewidth=0.5, label="acceleration of the fixed point")
-    at = np.append(np.arange(len(around)) / len(around), 1.0)
-    for sign in (1, -1):
-        ax.plot(at, sign * np.append(around, around[0]), color=colour, linewidth=1.3, label=text)
+    for side in around:
+        at = np.append(np.arange(len(side)) / len(side), 1.0)
+        ax.plot(at, np.append(side, side[0]), color=colour, linewidth=1.3, label=text)
     label(ax, y=ACCELERATION, title=title)
 
 
-def _peaks(signal, ring_teeth):
-    """Largest absolute value within one mesh period around every sample."""
-    from scipy.ndimage import maximum_filter1d
+def _extremes(signal, ring_teeth):
+    """Largest and smallest value within one mesh period around every sample: signals may lack symmetry."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    return maximum_filter1d(np.abs(signal), max(len(signal) // ring_teeth, 1), mode="wrap")
+    size = max(len(signal) // ring_teeth, 1)
+    return maximum_filter1d(signal, size, mode="wrap"), minimum_filter1d(signal, size, mode="wrap")
 
 
 def _band_title(speed: str, found: BandAnalysis) -> str:
