@@ -183,8 +183,8 @@ CAPTIONS = (
         "drivetrain_mode",
         "Modes",
         "Mode shape of the drivetrain ({}), by the number in the table, where the free spin is the first; "
-        "magnified, at rest in grey. The rays show how far each wheel turns. Shafts of elements are drawn "
-        "through their stations, others as two links with a joint. The drawing is a scheme: bodies without "
+        "magnified, at rest in grey. The rays show how far each wheel turns. Shafts are drawn as bent "
+        "beams between the places that the model knows. The drawing is a scheme: bodies without "
         "gears have a radius that is not theirs.",
     ),
     (
