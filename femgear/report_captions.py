@@ -22,8 +22,8 @@ CAPTIONS = (
     (
         "mesh_stiffness",
         "Static",
-        "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (solid) and secant F/δ "
-        "(dotted).",
+        "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (thick) and secant F/δ "
+        "(thin).",
     ),
     (
         "load_sharing",
@@ -119,12 +119,14 @@ CAPTIONS = (
     (
         "dynamic_transmission_error",
         "Dynamics",
-        "Dynamic transmission error over one mesh period, beside the static one; both without their mean.",
+        "Dynamic transmission error over one mesh period (thick) beside the static one, both without their "
+        "mean. The thin static curve has the harmonics of the excitation alone: what rings in both curves "
+        "is the cut series, not vibration. Pale: the whole static curve.",
     ),
     (
         "dynamic_spectrum",
         "Dynamics",
-        "Harmonics of the dynamic transmission error.",
+        "Harmonics of the dynamic transmission error, down to five decades below the largest.",
     ),
     (
         "speed_sweep",
@@ -153,8 +155,9 @@ CAPTIONS = (
     (
         "housing_signal",
         "Housing",
-        "Acceleration at the fixed sensor during one carrier revolution: all orders, and the band around "
-        "a mesh harmonic with its envelope and lobes ({}).",
+        "Acceleration at the fixed sensor during one carrier revolution: all orders with the largest and the "
+        "smallest value within a mesh period, and the band around a mesh harmonic with its envelope and lobes "
+        "({}).",
     ),
     (
         "order_spectrum",

@@ -1,6 +1,7 @@
 """Figures: what they draw, that nothing hides anything, and that every axis says its unit."""
 
 import importlib.util
+import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -385,7 +386,7 @@ def test_static_curve_has_the_harmonics_of_the_excitation():
         size = np.sinc(np.arange(1, expected + 1) / len(ste)) ** 2
         np.testing.assert_allclose(thin.get_ydata(), 1e6 * ((lines[:expected] * size) @ wave).real, atol=1e-9)
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert "static, harmonics of the excitation" in texts and "static, whole" in texts
+    assert "static, harmonics of the excitation (thin)" in texts and "static, whole (pale)" in texts
 
 
 def test_both_panels_hold_their_tooth_loads():
@@ -426,3 +427,19 @@ def test_the_whole_signal_lies_between_its_extremes():
     assert np.all(high.get_ydata()[:-1] >= signal.get_ydata()) and np.all(
         low.get_ydata()[:-1] <= signal.get_ydata()
     )
+
+
+def test_spectra_of_hundreds_of_harmonics_stay_legible():
+    """Numbers of mesh harmonics above the order spectrum keep apart."""
+    housing = synthetic.housing()
+    order = np.arange(220 * TEETH)
+    lines = np.zeros((2, len(order)))
+    lines[:, TEETH * np.arange(1, 220) - 3] = 1.0 / np.arange(1, 220)
+    housing = housing.drop_dims("order").assign_coords(order=order)
+    for name in ("order_amplitude", "order_amplitude_exact"):
+        housing[name] = (("speed", "order"), lines)
+    figure = plots.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    renderer = drawn(figure)
+    (top,) = figure.axes[0].child_axes
+    boxes = [text.get_window_extent(renderer) for text in top.get_xticklabels()]
+    assert 5 < len(boxes) <= 20 and not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))

@@ -155,7 +155,7 @@ def shaft_lines(
     for shaft, inner, ends in zip(model.train.shafts, place.inner, layout.shafts):
         first = np.array([place.body[shaft.first], *inner, place.body[shaft.second]])
         stations = full[first[:, None] + np.arange(5)]
-        share, across = _beam_line(shaft, stations, points)
+        share, across = _beam_line(shaft, stations, points if shaft.elements else 3 * points)
         one, two = layout.centre[list(ends)]
         rest = one + share[:, None] * (two - one)
         found.append((rest, np.column_stack([across, np.zeros(len(share))])))

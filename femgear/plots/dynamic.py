@@ -58,7 +58,7 @@ def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = 
     """
     speeds = _few(dynamics.sizes["speed"])
     h = dynamics["harmonic"].values
-    position = np.linspace(0.0, 1.0, max(256, 16 * int(h.max())) + 1)
+    position = fine_positions(int(h.max()))
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
     names = dynamics["mesh"].values
     errors = [(harmonics_of(dynamics, "dte")[s][:, h > 0] @ wave).real * 1e6 for s in speeds]
@@ -75,9 +75,7 @@ def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = 
             style = line_style(i)
             ax.plot(position, error[row], label=text, linewidth=2.0, **style)
             if static is not None:
-                at, whole, part = _static_fluctuation(static, row, cut, position)
-                ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
-                ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
+                draw_static(ax, static["position"], static["ste"].values[row], cut, position, style)
         for k, kind in enumerate(kinds):
             title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
             label(
@@ -90,15 +88,32 @@ def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = 
     for ax in axes[::2]:
         label(ax, y="transmission error less its mean [µm]")
     if static is not None:
-        known = "excitation" if "excitation_limit" in dynamics else "response"
-        for text, look in (
-            ("dynamic", {"linewidth": 2.0}),
-            (f"static, harmonics of the {known}", {"linewidth": 0.9}),
-            ("static, whole", {"linewidth": 2.5, "alpha": 0.3}),
-        ):
-            axes[0].plot([], [], color=BLACK, label=text, **look)
+        name_kinds(axes[0], dynamics)
     legend_below(figure, columns=3)
     return figure
+
+
+def fine_positions(harmonics: int) -> np.ndarray:
+    """Positions of one mesh period, enough for a curve of so many harmonics."""
+    return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
+
+
+def name_kinds(ax, dynamics: xr.Dataset) -> None:
+    """Legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
+    known = "excitation" if "excitation_limit" in dynamics else "response"
+    for text, look in (
+        ("dynamic (thick)", {"linewidth": 2.0}),
+        (f"static, harmonics of the {known} (thin)", {"linewidth": 0.9}),
+        ("static, whole (pale)", {"linewidth": 2.5, "alpha": 0.3}),
+    ):
+        ax.plot([], [], color=BLACK, label=text, **look)
+
+
+def draw_static(ax, at, values, harmonics: int, position, style) -> None:
+    """Static transmission error [m] less its mean: the whole record pale, its first harmonics thin."""
+    at, whole, part = _fluctuation(at, values, harmonics, position)
+    ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
+    ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
 
 
 def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
@@ -111,13 +126,13 @@ def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
     return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
 
 
-def _static_fluctuation(static: xr.Dataset, row: int, harmonics: int, position):
-    """Static transmission error less its mean: closed record, and its first harmonics at `position` [m].
+def _fluctuation(at, values, harmonics: int, position):
+    """A record of one period less its mean, closed, and the sum of its first harmonics at `position`.
 
     The record is linear between its positions, which may be closer where it is steep. Harmonics of such a
     curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
     """
-    at, value = periodic(static["position"], static["ste"].values[row])
+    at, value = periodic(at, values)
     mean = np.trapezoid(value, at) / (at[-1] - at[0])
     slope = np.diff(value) / np.diff(at)
     jump, h = slope - np.roll(slope, 1), np.arange(1, harmonics + 1)

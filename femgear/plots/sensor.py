@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+_TICKS = 20
 ACCELERATION = "acceleration [m/s²]"
 
 
@@ -141,7 +142,9 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     floor = 1e-4 * largest
     _stems(axes[0], order, linear, floor)
     axes[0].set_xlim(0, order[-1] + 1)
-    multiples = np.arange(1, int(order[-1]) // ring_teeth + 1)
+    last = int(order[-1]) // ring_teeth
+    # at most twenty numbers, that none covers another
+    multiples = np.arange(1, last + 1) if last <= _TICKS else np.arange(0, last + 1, _whole_step(last))[1:]
     top = axes[0].secondary_xaxis("top")
     top.set_xticks(multiples * ring_teeth, [str(h) for h in multiples])
     top.tick_params(labelsize=SIZE - 2)
@@ -282,6 +285,11 @@ def _around(values):
     from scipy.ndimage import uniform_filter1d
 
     return uniform_filter1d(values, max(len(values) // 15, 1), mode="wrap")
+
+
+def _whole_step(last: int) -> int:
+    """Whole step of at most `_TICKS` ticks up to `last`."""
+    return max(round(_round_step(last / _TICKS)), 1)
 
 
 def _round_step(step: float) -> float:
