@@ -156,8 +156,8 @@ CAPTIONS = (
         "housing_signal",
         "Housing",
         "Acceleration at the fixed sensor during one carrier revolution: all orders with the largest and the "
-        "smallest value within a mesh period, and the band around a mesh harmonic with its envelope and lobes "
-        "({}).",
+        "smallest value within a mesh period, and the band around a mesh harmonic with its envelope and "
+        "lobes ({}).",
     ),
     (
         "order_spectrum",
