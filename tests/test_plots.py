@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from scipy.ndimage import maximum_filter1d
 
 from femgear import plots
 from femgear.errors import StorageError
+from femgear.plots.sensor import _highest
 from femgear.plots.style import COLOURS, distinct_lines
 
 _HERE = Path(__file__).parent
@@ -443,3 +445,17 @@ def test_spectra_of_hundreds_of_harmonics_stay_legible():
     (top,) = figure.axes[0].child_axes
     boxes = [text.get_window_extent(renderer) for text in top.get_xticklabels()]
     assert 5 < len(boxes) <= 20 and not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
+
+
+def test_order_spectra_draw_the_highest_of_lines_too_close_to_part():
+    order, floor = np.arange(200_000), 1e-4
+    amplitude = 1e-3 * np.random.default_rng(2).random(len(order))
+    amplitude[[7, 123_456]] = 1.0
+    kept = _highest(order, amplitude, amplitude > floor)
+    assert {7, 123_456} <= set(kept.tolist()) and len(kept) <= 4001 and np.all(np.diff(kept) > 0)
+    # nothing that is left out stands above what is drawn beside it
+    drawn_lines = np.zeros(len(order))
+    drawn_lines[kept] = amplitude[kept]
+    assert np.all(maximum_filter1d(drawn_lines, 101) >= amplitude * (amplitude > floor))
+    few = _highest(order[:3000], amplitude[:3000], amplitude[:3000] > floor)
+    assert few.tolist() == np.flatnonzero(amplitude[:3000] > floor).tolist()

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-_TICKS = 20
+# numbers along an axis, and lines of a spectrum that can be told apart, at most
+_TICKS, _STEMS = 20, 4000
 ACCELERATION = "acceleration [m/s²]"
 
 
@@ -169,9 +170,21 @@ def _strongest_bands(order, amplitude, ring_teeth, count):
 
 
 def _stems(ax, order, amplitude, floor, *, text="Heaviside, linear interpolation", colour=BLUE, width=1.0):
-    shown = amplitude > floor
+    shown = _highest(order, amplitude, amplitude > floor)
     ax.vlines(order[shown], floor, amplitude[shown], color=colour, linewidth=width, label=text)
     ax.set_yscale("log")
+
+
+def _highest(order, amplitude, shown) -> np.ndarray:
+    """Numbers of the lines to draw: of more than there are pixels, the highest one of every column."""
+    numbers = np.flatnonzero(shown)
+    if len(numbers) <= _STEMS:
+        return numbers
+    column = ((order[numbers] - order[0]) * (_STEMS / np.ptp(order))).astype(int)
+    # the last of a column in ascending order is its highest
+    ranked = np.lexsort((amplitude[numbers], column))
+    last = np.append(np.diff(column[ranked]) > 0, True)
+    return numbers[ranked[last]]
 
 
 def _draw_band(ax, order, linear, exact, ring_teeth, harmonic):
