@@ -275,7 +275,8 @@ def modulation_polar(
         lobes, angle = found.lobes, np.linspace(0.0, 2 * np.pi, len(found.envelope) + 1)
         value = np.append(found.envelope, found.envelope[0])
         ax.plot(angle, value, color=COLOURS[i % len(COLOURS)], linewidth=2.0)
-        ax.fill(angle, value, color=COLOURS[i % len(COLOURS)], alpha=0.15, linewidth=0)
+        # a polygon would search the extremes of every one of its sides
+        ax.fill_between(angle, 0.0, value, color=COLOURS[i % len(COLOURS)], alpha=0.15, linewidth=0)
         ax.plot(2 * np.pi * lobes.position, lobes.height, "v", color=BLACK, markersize=6, label="lobe")
         ax.set_yticks(np.arange(1, 5) * _round_step(value.max(initial=0.0) / 4))
         ax.set_ylim(0, 1.12 * value.max(initial=0.0) or 1.0)
