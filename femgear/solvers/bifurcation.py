@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, correct
+from femgear.solvers.corrector import CurvePoint, LostError, RoundingError, ScaledCurve, correct
 
 # A located point this near to the start of a segment, in parts of the segment, is that start.
 _START = 1e-9
@@ -116,7 +116,7 @@ def branch_point(segment: Segment) -> tuple[float, CurvePoint] | None:
 
 
 def _singular_place(tau, length: float, at_low: float, at_high: float) -> float:
-    """Zero of tau between 0 and length; where Newton's method fails beside it, that of a line through tau.
+    """Zero of tau between 0 and length; where rounding forbids corrections beside it, that of a line.
 
     Rounding grows with one over tau, so that points very near the zero cannot be corrected to tolerance.
     """
@@ -131,7 +131,7 @@ def _singular_place(tau, length: float, at_low: float, at_high: float) -> float:
 
     try:
         return brentq(value, 0.0, length, xtol=1e-13 * length, rtol=1e-14)
-    except LostError:
+    except RoundingError:
         low = max(h for h in known if known[h] * at_low > 0.0)
         high = min(h for h in known if known[h] * at_high > 0.0)
         if high < low:
@@ -152,7 +152,7 @@ def _check_smooth(segment: Segment, h: float) -> None:
 
 
 def _beside(segment: Segment, h: float, part: float):
-    """Places and points before and after the place h, as near as asked or as Newton's method allows.
+    """Places and points before and after the place h, as near as asked or as rounding allows.
 
     The distance starts with a part of the segment.
     """
@@ -161,7 +161,7 @@ def _beside(segment: Segment, h: float, part: float):
         low, high = max(h - width, 0.0), min(h + width, segment.length)
         try:
             return low, high, segment.at(low), _turned(segment, high)
-        except LostError:
+        except RoundingError:
             part *= 4.0
             if part > 1.0:
                 raise
