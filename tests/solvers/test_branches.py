@@ -320,10 +320,12 @@ def test_motions_that_lost_their_symmetry_form_a_closed_loop(stops):
 
 
 def test_sharp_corners_of_sampled_contact_are_passed():
-    """Without smoothing the first samples in contact turn the tangent by 0.4 rad at once."""
-    problem, ends = two_masses(0.0, between=True, forced=1), (2 * np.pi * 80.0, 2 * np.pi * 90.0)
-    found = frequency_response_curve(problem, ends, harmonics=9, stability=False)
-    assert found.complete and found.parameter[-1] == ends[1]
+    """Without smoothing the first samples in contact turn the tangent by 0.4 rad at once, at 85.8 Hz."""
+    problem = two_masses(0.0, between=True, forced=1)
+    found = frequency_response_curve(
+        problem, TWO_HZ, harmonics=9, stability=False, options=StepOptions(max_points=150)
+    )
+    assert found.message.startswith("stopped") and found.parameter[-1] > 2 * np.pi * 86.0
     corrected = np.delete(found.residual, found.branch_points)
     assert corrected.max() < 1e-10 and found.residual.max() < 1e-7
 
