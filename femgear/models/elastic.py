@@ -8,7 +8,7 @@ order of the carrier speed over the natural frequencies.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -85,6 +85,7 @@ def elastic_set(
     brake: ShaftData | None,
     sun_torque: float,
     driven: str = "sun",
+    flexibility=None,
 ) -> ElasticSet:
     """Assemble the mechanical system.
 
@@ -101,6 +102,8 @@ def elastic_set(
         Torque on the sun [N m]; its sign tells which flanks carry.
     driven : {"sun", "carrier"}
         Input member.
+    flexibility : (2N, 2N) array, optional
+        Compliance of the bodies between the meshes, see `body_flexibility` [m/N].
     """
     motor_shaft, brake_shaft = ("motor", motor), ("brake", brake)
     names = rigid_dofs(planetary_set.n_planets, motor is not None, brake is not None)
@@ -129,6 +132,7 @@ def elastic_set(
         for m, p in zip(ring_mode, ring_phase)
     )
     system = MechanicalSystem(M=np.diag(M), C=np.zeros((n, n)), K=K, W=W, load=load, dofs=names + ring_names)
+    system = replace(system, flexibility=flexibility)
     return ElasticSet(
         system=system,
         rigid_directions=rigid,
@@ -207,8 +211,30 @@ def _mesh_directions(W, place, planetary_set, side):
         W[place[f"planet {n + 1}: rotation"], N + n] = -side * s.planet.base_radius
 
 
+def highest_mesh_mode(
+    planetary_set: PlanetarySet, stiffness, *, sun: BodyData, carrier: BodyData, planet: BodyData, sun_torque
+) -> float:
+    """Highest natural frequency of the rigid sun and planets on their meshes and a rigid ring [Hz].
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    stiffness : (2N,) array
+        Mean mesh stiffness [N/m].
+    sun, carrier, planet, sun_torque
+        As for `elastic_set`.
+    """
+    names = rigid_dofs(planetary_set.n_planets, False, False)
+    place = {name: i for i, name in enumerate(names)}
+    M, K, W = np.zeros(len(names)), np.zeros((len(names),) * 2), np.zeros((len(names), len(stiffness)))
+    _place_bodies(M, K, place, planetary_set, sun, carrier, planet)
+    _mesh_directions(W, place, planetary_set, 1.0 if sun_torque >= 0 else -1.0)
+    K += (W * stiffness) @ W.T
+    return float(np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(M, M)))[-1]) / (2 * np.pi))
+
+
 def ring_mesh_compliance(harmonic_compliance, nodal_diameters, count, angles) -> np.ndarray:
-    """Static compliance between the ring's mesh points with the outer surface held, shape (N, N) [m/N].
+    """Static compliance of the dynamic ring between its mesh points, shape (N, N) [m/N].
 
     Parameters
     ----------
@@ -228,11 +254,30 @@ def ring_mesh_compliance(harmonic_compliance, nodal_diameters, count, angles) ->
     return np.einsum("n,n,nij->ij", weight, np.asarray(harmonic_compliance), wave.conj()).real
 
 
-def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) -> MeshExcitation:
-    """Mesh springs of the dynamic model: the static meshes less what the ring model keeps elastic.
+def body_flexibility(compliance, ring_compliance) -> np.ndarray:
+    """Compliance between the meshes through their bodies that neither springs nor ring modes hold, (2N, 2N).
+
+    Parameters
+    ----------
+    compliance : (2N, 2N) array
+        Between the static meshes [m/N]; its diagonal belongs to the mesh springs.
+    ring_compliance : (N, N) array
+        That of the dynamic ring, see `ring_mesh_compliance` [m/N].
+    """
+    N = len(ring_compliance)
+    flexibility = 0.5 * (compliance + compliance.T)
+    flexibility[N:, N:] -= ring_compliance
+    np.fill_diagonal(flexibility, 0.0)
+    return flexibility
+
+
+def mesh_excitation(
+    stiffness, deflection, force, ring_compliance, *, flexibility=None, backlash
+) -> MeshExcitation:
+    """Mesh springs of the dynamic model: the static meshes less what the other parts keep elastic.
 
     ``1/k_dyn = 1/k - c_jj`` for the tangent stiffness, and ``delta - C F`` for the deflection, with ``C`` the
-    compliance of the dynamic ring between its mesh points, outer surface held.
+    compliance of the dynamic ring between its mesh points and of the bodies between theirs.
 
     Parameters
     ----------
@@ -240,6 +285,8 @@ def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) 
         Tangent stiffness [N/m], deflection [m] and force [N] of the static meshes.
     ring_compliance : (N, N) array
         See `ring_mesh_compliance` [m/N].
+    flexibility : (2N, 2N) array, optional
+        See `body_flexibility` [m/N].
     backlash : float or (2N,) array
         [m].
 
@@ -248,10 +295,11 @@ def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) 
     CaseError
         Without torque there is no mesh stiffness to linearise.
     ContactError
-        When a mesh opens at some position, or the ring is softer than its mesh.
+        When a mesh opens at some position, or the bodies are softer than their meshes.
     """
     force, stiffness = np.asarray(force), np.asarray(stiffness)
     N = len(force) // 2
+    flexibility = np.zeros((2 * N, 2 * N)) if flexibility is None else flexibility
     if not force.any():
         raise CaseError(
             "without torque no tooth carries load, so there is no mesh stiffness for the dynamic model",
@@ -272,11 +320,12 @@ def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) 
     own = np.zeros((2 * N, 1))
     own[N:, 0] = np.diag(ring_compliance)
     remaining = 1.0 / stiffness - own
-    if remaining.min() <= 0:
+    between = np.diag(remaining.min(axis=1)) + flexibility
+    if remaining.min() <= 0 or np.linalg.eigvalsh(between)[0] <= 0:
         raise ContactError(
             "the compliance of the ring model exceeds that of the loaded mesh", code="E-RING-COMPLIANCE"
         )
-    spring = np.array(deflection)
+    spring = deflection - flexibility @ force
     spring[N:] -= ring_compliance @ force[N:]
     return MeshExcitation(
         stiffness=1.0 / remaining,
