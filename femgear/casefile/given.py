@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 from femgear.casefile.helical import helical_notices
 from femgear.casefile.planar import planar_notices
@@ -43,8 +44,9 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
         error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
         error.limit = f"0 mm to {LENGTH.show(2.0 * case.sun.module)}: each gear takes half of it"
         error.remedy = "reduce the backlash"
-    if error.code == "E-ROOT-RADIUS":
-        gear = error.message.partition(":")[0]
+    if error.key == "rack.root_radius":
+        cut = re.match(r"(\w+):|the \w+'s tip runs into the (\w+)'s root fillet", error.message)
+        gear = (cut[1] or cut[2]) if cut else ""
         if getattr(getattr(case, gear, None), "rack", None) is not None:
             error.key = f"{gear}.rack.root_radius"
         error.value = rack_at(case, error.key).root_radius

@@ -260,5 +260,5 @@ def _rim_held(gear: Gear) -> str:
         )
     return (
         "its bore is held rigid, so that it cannot bend and the mesh gets stiffer as it thins, where a rim "
-        "that floats on its bearing gets softer and its root stress rises: neither is computed"
+        "on a bearing or hub that yields gets softer and its root stress rises: neither is computed"
     )
