@@ -83,8 +83,8 @@ class ModesResult:
 
     Parameters
     ----------
-    bodies : Bodies
-        Flank compliances with the ring on its foundation.
+    bodies : tuple of Bodies
+        Flank compliances with the ring on its foundation, and with the ring held.
     state : LoadedPeriod
         Static state of the set on its supports, whatever ``static.members`` shows.
     reach : float
@@ -96,7 +96,7 @@ class ModesResult:
     excitation: MeshExcitation
     modes: Modes
     max_diameter: int
-    bodies: Bodies
+    bodies: tuple[Bodies, Bodies]
     state: LoadedPeriod
     reach: float
     entries: Entries
@@ -237,7 +237,7 @@ def solve_modes(case: Case, static: StaticResult, *, progress: Progress | None =
     CaseError
         Without torque, or when the ring, which is the housing of this model, is not the fixed member.
     """
-    from femgear.contact.bodies import active_flank_load, ring_on_foundation
+    from femgear.contact.bodies import active_flank_load, with_ring
     from femgear.fe.elasticity import Material, mass
     from femgear.models.ring import ring_model
 
@@ -246,9 +246,9 @@ def solve_modes(case: Case, static: StaticResult, *, progress: Progress | None =
     check_dynamic_case(case, gears)
     side = 1.0 if static.sun_torque >= 0 else -1.0
     foundation = _ring_foundation(case, sector)
-    bodies = static.bodies
-    if case.static.members != "elastic":
-        bodies = ring_on_foundation(bodies, static.sectors, foundation, depth=case.static.depth)
+    springs = foundation if case.static.members == "fixed" else None
+    other = with_ring(static.bodies, static.sectors, depth=case.static.depth, ring_foundation=springs)
+    bodies = (other, static.bodies) if springs is not None else (static.bodies, other)
     state = state_on_supports(case, bodies, static.sun_torque, progress=progress)
     reach = excitation_reach(case, state, static.sun_torque)
     material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
@@ -267,14 +267,17 @@ def solve_modes(case: Case, static: StaticResult, *, progress: Progress | None =
     return modal_basis(case, ring, bodies, state, sun_torque=static.sun_torque, reach=reach)
 
 
-def state_on_supports(case: Case, bodies: Bodies, sun_torque: float, *, progress=None) -> LoadedPeriod:
-    """Loaded state of the set on its supports and of the ring on its foundation, over one mesh period."""
+def state_on_supports(case: Case, bodies, sun_torque: float, *, progress=None) -> LoadedPeriod:
+    """Loaded state of the set on its supports, over one mesh period.
+
+    ``bodies`` are flank compliances with the ring on its foundation, and with the ring held.
+    """
     from femgear.contact.loaded_period import loaded_period
 
     deviations = set_deviations(case)
     return loaded_period(
         planetary_set(case),
-        bodies,
+        *bodies,
         sun_torque=sun_torque,
         positions=case.static.positions,
         contact=case.static.contact,
@@ -290,24 +293,28 @@ def excitation_reach(case: Case, state: LoadedPeriod, sun_torque: float) -> floa
     from femgear.frequency_limit import highest_excitation
     from femgear.models.elastic import highest_mesh_mode
 
-    gears, stiffness = planetary_set(case), state.resampled("stiffness", RECORD).mean(axis=1)
+    gears, stiffness = planetary_set(case), state.resampled("held_stiffness", RECORD).mean(axis=1)
     mesh_mode = highest_mesh_mode(gears, stiffness, **_bodies_of(case), sun_torque=sun_torque)
     return highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
 
 
-def modal_basis(case: Case, ring: RingModel, bodies: Bodies, state: LoadedPeriod, *, sun_torque, reach):
+def modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, sun_torque, reach):
     """Modes of the set with the ring given and the meshes of the loaded state."""
     from femgear.models.elastic import body_flexibility, elastic_set, mesh_excitation, ring_mesh_compliance
     from femgear.solvers.modal import solve_modes as modal_basis
 
     gears, diameters = planetary_set(case), np.arange(len(ring.compliance))
-    compliance = ring_mesh_compliance(ring.compliance, diameters, gears.ring.teeth, gears.planet_angles)
-    flexibility = body_flexibility(state.compliance, compliance)
+    held, compliance = (
+        ring_mesh_compliance(values, diameters, gears.ring.teeth, gears.planet_angles)
+        for values in (ring.held_compliance, ring.compliance)
+    )
+    flexibility = body_flexibility(state.held_compliance, held)
     # equal planets are equal to rounding when their phases are among the positions
     record = gears.n_planets * -(-RECORD // gears.n_planets)
     excitation = mesh_excitation(
-        *(state.resampled(name, record) for name in ("stiffness", "deflection", "force")),
-        compliance,
+        *(state.resampled(name, record) for name in ("held_stiffness", "deflection", "force")),
+        held,
+        ring_compliance=compliance,
         flexibility=flexibility,
         backlash=_backlash(gears),
     )

@@ -12,7 +12,7 @@ from femgear.errors import GeometryError
 KINDS = ("in phase", "out of phase", "unequal")
 PLANETS = (2, 3, 4, 5, 6, 7)
 # what the dynamics are asked for "at rest" [rpm of the input]
-REST = 0.5
+REST = 0.01
 # another set is drawn where femgear refuses the geometry; so many refusals tell of a bad draw
 MOST_DRAWS = 25
 

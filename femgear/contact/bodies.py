@@ -98,28 +98,23 @@ def make_bodies(
         )
         for s in (sectors.sun, sectors.planet)
     ]
-    ring, held = sectors.ring, "rim"
-    stiffness = ring.stiffness
-    if ring_foundation is not None:
-        stiffness, held = stiffness + ring_foundation, None
-    compliances.append(flank_compliance(ring.grid, ring.gear, material, stiffness, held=held, depth=depth))
-    return Bodies(*compliances, material=material, face_width=sectors.sun.gear.face_width)
+    bodies = Bodies(*compliances, None, material=material, face_width=sectors.sun.gear.face_width)
+    return with_ring(bodies, sectors, depth=depth, ring_foundation=ring_foundation)
 
 
-def ring_on_foundation(bodies: Bodies, sectors: Sectors, ring_foundation, *, depth: float | None) -> Bodies:
-    """The same bodies with the ring on an elastic foundation instead of held at its outer surface.
+def with_ring(bodies: Bodies, sectors: Sectors, *, depth: float | None, ring_foundation=None) -> Bodies:
+    """The same bodies with the ring held at its outer surface, or on an elastic foundation.
 
     Parameters
     ----------
     bodies, sectors : Bodies, Sectors
-    ring_foundation : sparse matrix
-        Stiffness of the foundation of one sector [N/m].
-    depth : float, optional
+    depth, ring_foundation
         As for `make_bodies`.
     """
-    ring = sectors.ring
-    stiffness = ring.stiffness + ring_foundation
-    found = flank_compliance(ring.grid, ring.gear, bodies.material, stiffness, held=None, depth=depth)
+    ring, held, stiffness = sectors.ring, "rim", sectors.ring.stiffness
+    if ring_foundation is not None:
+        stiffness, held = stiffness + ring_foundation, None
+    found = flank_compliance(ring.grid, ring.gear, bodies.material, stiffness, held=held, depth=depth)
     return replace(bodies, ring=found)
 
 
@@ -139,6 +134,9 @@ def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> n
     stations = flank_stations(grid, planetary_set.ring)
     pair = mesh_pairs(planetary_set)[1]
     active = pair.pitch_roll_2 - pair.sign * np.asarray(pair.path)
-    weight = np.gradient(stations.roll) * ((stations.roll >= active.min()) & (stations.roll <= active.max()))
+    # every station carries the part of its own piece of the flank that is active
+    middle = 0.5 * (stations.roll[1:] + stations.roll[:-1])
+    ends = np.concatenate([stations.roll[:1], middle, stations.roll[-1:]])
+    weight = np.diff(np.clip(ends, active.min(), active.max()))
     load = flank_load_columns(grid, stations) @ (weight / weight.sum())[:, None]
     return load if side > 0 else mirrored_columns(load, mirror_nodes(grid))

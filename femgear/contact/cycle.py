@@ -51,7 +51,7 @@ def walk_mesh_cycle(
     planet_gaps=None,
     both_flanks: bool = False,
     pressures: bool = False,
-    coupling: bool = False,
+    held_bodies: Bodies | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> MeshCycle:
     """Static transmission error, load sharing and mesh stiffness over the mesh cycle.
@@ -87,8 +87,9 @@ def walk_mesh_cycle(
         of teeth that are wedged.
     pressures : bool
         Keep the pressure distributions of the drive flanks.
-    coupling : bool
-        Keep the tangent compliance between all meshes.
+    held_bodies : Bodies, optional
+        The bodies with the ring held at its outer surface: keep stiffness and compliance between all meshes
+        of the same contact with these bodies.
     progress : callable, optional
         Called with (positions done, positions).
 
@@ -129,7 +130,7 @@ def walk_mesh_cycle(
             both_flanks=both_flanks,
         )
         found, overflow, missed = _walk(
-            planetary_set, bodies, setup, sun_torque, members, springs, pressures, coupling, progress
+            planetary_set, bodies, setup, sun_torque, members, springs, pressures, held_bodies, progress
         )
         missed = missed if contact == "profile" else 0.0
         if not overflow and missed <= nearest:
@@ -154,7 +155,7 @@ def _enlarged(enlarge: float, share: float, force: float) -> float:
 
 
 def _walk(
-    planetary_set, bodies, setup: MeshWindows, sun_torque, members, springs, pressures, coupling, progress
+    planetary_set, bodies, setup: MeshWindows, sun_torque, members, springs, pressures, held_bodies, progress
 ) -> tuple[dict, bool, float]:
     """All positions with one set of windows, as fields of `MeshCycle`.
 
@@ -163,7 +164,7 @@ def _walk(
     N, P = planetary_set.n_planets, setup.positions
     load = np.zeros(N + 1 + int(members.free.sum()))
     load[N] = sun_torque / planetary_set.sun.base_radius
-    out = _empty_record(setup, members, pressures, coupling)
+    out = _empty_record(setup, members, pressures, held_bodies is not None)
     previous, overflow, missed = None, False, 0.0
     for p in range(P):
         problem = assemble_contact(setup, bodies, p, members)
@@ -171,6 +172,8 @@ def _walk(
         state, active = solve_position(problem, springs, load, start=start)
         previous = (problem, active)
         _collect(problem, state, setup, members, out, p)
+        if held_bodies is not None:
+            _collect_held(assemble_contact(setup, held_bodies, p), state, setup, out, p)
         out["unknowns"] = max(out["unknowns"], len(problem.gap))
         overflow |= problem.touches_window_end(state.active, setup)
         missed = max(missed, _penetrated_outsider(setup, p, out["deflection"][:, p]))
@@ -203,7 +206,7 @@ def _empty_record(setup: MeshWindows, members: MovingMembers, pressures: bool, c
     if pressures:
         out["pressure"] = np.zeros((2 * N, setup.pairs, setup.gap.shape[-1], P))
     if coupling:
-        out["compliance"] = np.zeros((2 * N, 2 * N, P))
+        out |= {"held_stiffness": np.zeros((2 * N, P)), "held_compliance": np.zeros((2 * N, 2 * N, P))}
     return out
 
 
@@ -264,12 +267,7 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     out["member_motion"][:, p] = motion
     moved = members.approach[: 2 * N] @ motion
     out["deflection"][:, p] = rotation_approach(N) @ state.motions[: N + 1] + moved
-    window = problem.mesh * setup.pairs + problem.pair
-    tangents = tangent_stiffness(problem.H, state, problem.mesh, window, problem.cell, meshes)
-    out["stiffness"][:, p] = tangents.reshape(-1, 2 * N).sum(axis=0)
-    if "compliance" in out and (force[: 2 * N] > 0).all():
-        drive = state.active & (problem.mesh < 2 * N)
-        out["compliance"][..., p] = np.linalg.inv(mesh_tangent_matrix(problem.H, drive, problem.mesh, 2 * N))
+    out["stiffness"][:, p] = _tangents(problem, state, setup)
     np.add.at(out["tooth_load"][:, :, p], (problem.mesh, problem.pair), loads)
     at_edge = problem.at_flank_end(state.active, setup)
     np.logical_or.at(out["edge_contact"][:, p], problem.mesh, at_edge)
@@ -279,6 +277,24 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
         drive = problem.mesh < 2 * N
         place = problem.mesh[drive], problem.pair[drive], problem.cell[drive], p
         out["pressure"][place] = pressure[drive]
+
+
+def _tangents(problem: ContactProblem, state, setup: MeshWindows) -> np.ndarray:
+    """Tangent stiffness of every mesh (2N,), both flanks together [N/m]."""
+    window = problem.mesh * setup.pairs + problem.pair
+    meshes = setup.near.shape[0]
+    found = tangent_stiffness(problem.H, state, problem.mesh, window, problem.cell, meshes)
+    return found.reshape(-1, 2 * problem.n_planets).sum(axis=0)
+
+
+def _collect_held(problem: ContactProblem, state, setup: MeshWindows, out, p):
+    """Stiffness and compliance between the meshes of the same contact with other bodies."""
+    meshes = 2 * problem.n_planets
+    out["held_stiffness"][:, p] = _tangents(problem, state, setup)
+    if (out["force"][:, p] > 0).all():
+        drive = state.active & (problem.mesh < meshes)
+        tangent = mesh_tangent_matrix(problem.H, drive, problem.mesh, meshes)
+        out["held_compliance"][..., p] = np.linalg.inv(tangent)
 
 
 def _penetrated_outsider(setup: MeshWindows, p, deflection) -> float:

@@ -49,19 +49,22 @@ class LoadedPeriod:
         Force on the drive flanks [N].
     stiffness : (2N, P) array
         Tangent stiffness at constant loads of the other meshes [N/m].
-    compliance : (2N, 2N) array
-        Mean over the period of the tangent compliance between the meshes through their common bodies,
-        supports left out [m/N].
+    held_stiffness : (2N, P) array
+        The same with the ring held at its outer surface [N/m].
+    held_compliance : (2N, 2N) array
+        Mean over the period of the tangent compliance between the meshes through their common bodies, the
+        ring held, supports left out [m/N].
     """
 
     position: np.ndarray
     deflection: np.ndarray
     force: np.ndarray
     stiffness: np.ndarray
-    compliance: np.ndarray
+    held_stiffness: np.ndarray
+    held_compliance: np.ndarray
 
     def resampled(self, name: str, count: int) -> np.ndarray:
-        """Values (2N, count) of `deflection`, `force` or `stiffness` at equidistant positions."""
+        """Values (2N, count) of one of the arrays (2N, P) at equidistant positions."""
         at, values = np.arange(count) / count, getattr(self, name)
         return np.array([np.interp(at, self.position, row, period=1.0) for row in values])
 
@@ -82,6 +85,7 @@ def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | Non
 def loaded_period(
     planetary_set: PlanetarySet,
     bodies: Bodies,
+    held_bodies: Bodies,
     *,
     sun_torque: float,
     positions: int = 64,
@@ -94,7 +98,7 @@ def loaded_period(
 
     Parameters
     ----------
-    planetary_set, bodies, contact, deviations, supports
+    planetary_set, bodies, held_bodies, contact, deviations, supports
         As for `walk_mesh_cycle`.
     sun_torque : float
         Of either sign [N m].
@@ -125,7 +129,7 @@ def loaded_period(
             contact=contact,
             deviations=deviations,
             supports=supports,
-            coupling=True,
+            held_bodies=held_bodies,
             progress=progress,
         )
         return _record(cycle, planetary_set.base_pitch)
@@ -146,6 +150,7 @@ class _Record:
     deflection: np.ndarray
     force: np.ndarray
     stiffness: np.ndarray
+    held_stiffness: np.ndarray
     compliance: np.ndarray
     loaded: np.ndarray
 
@@ -157,7 +162,7 @@ def _record(cycle: MeshCycle, base_pitch: float) -> _Record:
     for p in range(len(cycle.position)):
         mesh, pair = np.nonzero(cycle.tooth_load[..., p] > 0)
         loaded[p] = frozenset(zip(mesh.tolist(), place[mesh, pair, p].tolist(), strict=True))
-    values = (cycle.deflection, cycle.force, cycle.stiffness, cycle.compliance)
+    values = (cycle.deflection, cycle.force, cycle.stiffness, cycle.held_stiffness, cycle.held_compliance)
     return _Record(cycle.position, *values, loaded)
 
 
@@ -201,12 +206,13 @@ def _whole_period(planetary_set, record: _Record, symmetry: int, parts: int) -> 
     shown = record.position < (1.0 - 1e-12) / parts
     mean_of = _mean_weights(record.position[shown], 1.0 / parts)
     compliance = record.compliance[..., shown] @ mean_of
+    names = ("deflection", "force", "stiffness", "held_stiffness")
     position, rows, mean = [], [], np.zeros((2 * N, 2 * N))
     for part in range(parts):
         planet = first[(np.arange(N) - ahead * (step * part % parts)) % N]
         mesh = np.concatenate([planet, planet + N])
         position.append(record.position[shown] + part / parts)
-        rows.append([getattr(record, name)[mesh][:, shown] for name in ("deflection", "force", "stiffness")])
+        rows.append([getattr(record, name)[mesh][:, shown] for name in names])
         moved = np.concatenate([(np.arange(N) - ahead * (step * part % parts)) % N + s for s in (0, N)])
         mean += compliance[np.ix_(moved, moved)] / parts
     joined = [np.concatenate(values, axis=1) for values in zip(*rows, strict=True)]

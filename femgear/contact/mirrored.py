@@ -28,7 +28,7 @@ def walk_either_flank(
     planet_gaps=None,
     both_flanks=False,
     pressures=False,
-    coupling=False,
+    held_bodies=None,
     progress=None,
 ) -> MeshCycle:
     """`walk_mesh_cycle` for a torque of either sign; results keep the order of planets and positions.
@@ -44,7 +44,7 @@ def walk_either_flank(
         "periods": periods,
         "both_flanks": both_flanks,
         "pressures": pressures,
-        "coupling": coupling,
+        "held_bodies": held_bodies,
         "progress": progress,
     }
     if sun_torque >= 0:
@@ -89,8 +89,9 @@ def _seen_from_front(cycle: MeshCycle, planetary_set, order) -> MeshCycle:
         found["pressure"] = cycle.pressure[mesh][:, ::-1, ::-1, ::-1]
         found["pressure_offset"] = -cycle.pressure_offset[mesh][:, ::-1]
         found["pressure_centre"] = -cycle.pressure_centre[mesh][:, ::-1, ::-1]
-    if cycle.compliance is not None:
-        found["compliance"] = cycle.compliance[mesh][:, mesh][:, :, ::-1]
+    if cycle.held_stiffness is not None:
+        found["held_stiffness"] = cycle.held_stiffness[mesh][:, ::-1]
+        found["held_compliance"] = cycle.held_compliance[mesh][:, mesh][:, :, ::-1]
     return replace(
         cycle,
         position=0.0 - cycle.position[::-1],

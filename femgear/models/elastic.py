@@ -253,37 +253,40 @@ def ring_mesh_compliance(harmonic_compliance, nodal_diameters, count, angles) ->
     return np.einsum("n,n,nij->ij", weight, np.asarray(harmonic_compliance), wave.conj()).real
 
 
-def body_flexibility(compliance, ring_compliance) -> np.ndarray:
+def body_flexibility(compliance, held_compliance) -> np.ndarray:
     """Compliance between the meshes through their bodies that neither springs nor ring modes hold, (2N, 2N).
 
     Parameters
     ----------
     compliance : (2N, 2N) array
-        Between the static meshes [m/N]; its diagonal belongs to the mesh springs.
-    ring_compliance : (N, N) array
+        Between the static meshes, the ring held [m/N]; its diagonal belongs to the mesh springs.
+    held_compliance : (N, N) array
         That of the dynamic ring, see `ring_mesh_compliance` [m/N].
     """
-    N = len(ring_compliance)
+    N = len(held_compliance)
     flexibility = 0.5 * (compliance + compliance.T)
-    flexibility[N:, N:] -= ring_compliance
+    flexibility[N:, N:] -= held_compliance
     np.fill_diagonal(flexibility, 0.0)
     return flexibility
 
 
 def mesh_excitation(
-    stiffness, deflection, force, ring_compliance, *, flexibility=None, backlash
+    stiffness, deflection, force, held_compliance, *, ring_compliance=None, flexibility=None, backlash
 ) -> MeshExcitation:
     """Mesh springs of the dynamic model: the static meshes less what the other parts keep elastic.
 
-    ``1/k_dyn = 1/k - c_jj`` for the tangent stiffness, and ``delta - C F`` for the deflection, with ``C`` the
-    compliance of the dynamic ring between its mesh points and of the bodies between theirs.
+    ``1/k_dyn = 1/k - c_jj`` for the tangent stiffness, both with the ring held, so that what the foundation
+    gives way, which may be by far the most, cancels nowhere; and ``delta - C F`` for the deflection, with
+    ``C`` the compliance of the dynamic ring between its mesh points and of the bodies between theirs.
 
     Parameters
     ----------
     stiffness, deflection, force : (2N, P) arrays
-        Tangent stiffness [N/m], deflection [m] and force [N] of the static meshes.
-    ring_compliance : (N, N) array
-        See `ring_mesh_compliance` [m/N].
+        Tangent stiffness with the ring held [N/m], deflection [m] and force [N] of the static meshes.
+    held_compliance : (N, N) array
+        See `ring_mesh_compliance`, the outer surface held [m/N].
+    ring_compliance : (N, N) array, optional
+        The same with the ring as it is in `deflection`; held when left out.
     flexibility : (2N, 2N) array, optional
         See `body_flexibility` [m/N].
     backlash : float or (2N,) array
@@ -299,6 +302,7 @@ def mesh_excitation(
     force, stiffness = np.asarray(force), np.asarray(stiffness)
     N = len(force) // 2
     flexibility = np.zeros((2 * N, 2 * N)) if flexibility is None else flexibility
+    ring_compliance = held_compliance if ring_compliance is None else ring_compliance
     if not force.any():
         raise CaseError(
             "without torque no tooth carries load, so there is no mesh stiffness for the dynamic model",
@@ -317,7 +321,7 @@ def mesh_excitation(
             remedy="raise operation.torque or reduce the errors",
         )
     own = np.zeros((2 * N, 1))
-    own[N:, 0] = np.diag(ring_compliance)
+    own[N:, 0] = np.diag(held_compliance)
     remaining = 1.0 / stiffness - own
     between = np.diag(remaining.min(axis=1)) + flexibility
     if remaining.min() <= 0 or np.linalg.eigvalsh(between)[0] <= 0:

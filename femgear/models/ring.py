@@ -35,11 +35,14 @@ class RingModel:
         Angle from a planet to the centre of the ring tooth that it loads [rad].
     compliance : (n_max + 1,) array
         Static compliance of each nodal diameter at the load, on the foundation [m/N].
+    held_compliance : (n_max + 1,) array
+        The same with the outer surface held [m/N].
     """
 
     modes: CyclicModes
     load_angle: float
     compliance: np.ndarray
+    held_compliance: np.ndarray
 
 
 def outer_surface_outputs(grid: Grid) -> np.ndarray:
@@ -95,12 +98,17 @@ def ring_model(
         outputs=outer_surface_outputs(grid),
         max_frequency=max_frequency,
     )
-    condensed = condense_sector(
-        grid, stiffness + foundation, count=ring.teeth, held=None, loads=load, observations=load
-    )
+    compliance = [
+        cyclic_harmonics(
+            condense_sector(grid, matrix, count=ring.teeth, held=held, loads=load, observations=load),
+            diameters,
+        )[:, 0, 0].real
+        for matrix, held in ((stiffness + foundation, None), (stiffness, "rim"))
+    ]
     pitch_radius = ring.base_radius / np.cos(planetary_set.working_pressure_angle_planet_ring)
     return RingModel(
         modes=modes,
         load_angle=-side * float(half_thickness_angle(ring, pitch_radius)),
-        compliance=cyclic_harmonics(condensed, diameters)[:, 0, 0].real,
+        compliance=compliance[0],
+        held_compliance=compliance[1],
     )

@@ -519,7 +519,7 @@ def test_turning_set_with_a_rigid_ring_is_the_planar_set():
         count=108, nodal_diameter=np.zeros(1, int), frequency=np.array([1e5]), load=np.zeros((1, 1)),
         output=np.zeros((1, 2)), reduced=np.zeros((1, 1)), recovery=np.zeros((2, 1)),
     )  # fmt: skip
-    model = make(gears, RingModel(rigid, 0.0, np.zeros(1)), motor=None, brake=None)
+    model = make(gears, RingModel(rigid, 0.0, np.zeros(1), np.zeros(1)), motor=None, brake=None)
     system = turning(model, speed)
     K = np.array(system.K)
     # the preload of the pins, which the published model leaves out
