@@ -10,16 +10,12 @@ import numpy as np
 from femgear.case import Case, set_deviations
 from femgear.case_floating import check_floating
 from femgear.errors import CaseError, ContactError
+from femgear.frequency_limit import HIGHEST_RESPONSE
 
 if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
     from femgear.fe.reduction import CyclicModes
     from femgear.gears import PlanetarySet
-
-# the wavelength of shear in steel at 200 kHz is 16 mm: shorter waves are no matter of plane gear bodies
-HIGHEST_RESPONSE = 200e3
-# however slow the set turns, its modes up to here are kept [Hz]
-LOWEST_TOP = 10e3
 
 
 def max_nodal_diameter(case: Case) -> int:
@@ -29,8 +25,8 @@ def max_nodal_diameter(case: Case) -> int:
     return max(min(MAX_DIAMETER, case.ring.teeth // 2 - 1), 2)
 
 
-def highest_frequency(case: Case, gears: PlanetarySet) -> float:
-    """Frequency up to which ring and set have modes of their own [Hz]: twice the highest of the response.
+def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
+    """Mesh frequency of the fastest speed [Hz].
 
     Raises
     ------
@@ -40,18 +36,19 @@ def highest_frequency(case: Case, gears: PlanetarySet) -> float:
     from femgear.gears import speeds
 
     fastest = speeds(gears, input=case.operation.input, fixed="ring", speed=max(case.operation.speeds))
-    response = case.response_harmonics * fastest.mesh_frequency
+    harmonics = case.response_harmonics or 3
+    response = max(harmonics * fastest.mesh_frequency, case.dynamics.up_to or 0.0)
     if response > HIGHEST_RESPONSE:
         allowed = max(case.operation.speeds) * HIGHEST_RESPONSE / response
         raise CaseError(
-            f"{case.response_harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
+            f"{harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
             code="E-FREQUENCY",
             key="operation.speeds",
             value=f"{max(case.operation.speeds) * 30 / np.pi:.6g} rpm",
             limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed * 30 / np.pi:.4g} rpm here",
             remedy="leave the highest speeds out, or fewer dynamics.response_harmonics",
         )
-    return max(2.0 * response, LOWEST_TOP)
+    return fastest.mesh_frequency
 
 
 def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
@@ -72,7 +69,8 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             key="operation.fixed",
             value=case.operation.fixed,
             limit='"ring"',
-            remedy="run with --only static, or fix the ring",
+            remedy="run with --only static, fix the ring, or write the section [planar]: rigid bodies, for "
+            "which any member may be the fixed one",
         )
     check_floating(case, gears, dynamic=True)
     if case.operation.torque == 0:
@@ -93,7 +91,34 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             limit="errors that repeat with every tooth",
             remedy="run with --only static, or leave pitch errors and runouts out",
         )
-    highest_frequency(case, gears)
+    fastest_mesh_frequency(case, gears)
+
+
+def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
+    """Refuse a modal basis that was made for slower excitation.
+
+    Parameters
+    ----------
+    case : Case
+    reach : float
+        Frequency up to which the basis carries excitation [Hz].
+    mesh_frequency : float
+        Of the fastest speed [Hz].
+
+    Raises
+    ------
+    CaseError
+        E-OTHER-CASE.
+    """
+    wanted = max(case.dynamics.up_to or 0.0, (case.mesh_harmonics or 3) * mesh_frequency)
+    if wanted > reach * (1.0 + 1e-9):
+        raise CaseError(
+            f"the modal basis was made for excitation up to {reach:.4g} Hz, and this case has {wanted:.4g} Hz",
+            code="E-OTHER-CASE",
+            key="operation.speeds" if case.dynamics.up_to is None else "dynamics.up_to",
+            limit=f"up to {reach:.4g} Hz",
+            remedy="compute the modes of this case",
+        )
 
 
 def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
@@ -158,6 +183,23 @@ def check_motions(cycle: MeshCycle, module: float) -> None:
             )
 
 
+def _deflection_warning(cycle: MeshCycle, moved: float) -> str:
+    """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(cycle.deflection, 2))
+    if not cycle.member_names:
+        return (
+            f"[W-DEFLECTION] the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: "
+            "small displacements no longer hold"
+        )
+    return (
+        f"[W-DEFLECTION] the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
+        "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
+        "not the deflection of the teeth alone: it contains the motion of the members, up to "
+        f"{moved * 1e6:.0f} um, and between planets and ring that of the ring on its foundation; "
+        'static.members = "fixed" shows the teeth'
+    )
+
+
 def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
     """What is wrong with a static result in an engineer's eyes, in sentences."""
     found = []
@@ -166,12 +208,10 @@ def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
             f"[W-PRESSURE] the contact pressure reaches {cycle.max_pressure.max() * 1e-6:.0f} MPa: no steel "
             "carries that, and the model stays elastic"
         )
+    moved = np.abs(cycle.member_motion).max(initial=0.0)
     if np.abs(cycle.deflection).max(initial=0.0) > 0.05 * module:
-        found.append(
-            f"[W-DEFLECTION] the teeth deflect by {np.abs(cycle.deflection).max() * 1e6:.0f} um, more than "
-            "5 % of the module: small displacements no longer hold"
-        )
-    if (moved := np.abs(cycle.member_motion).max(initial=0.0)) > 0.05 * module:
+        found.append(_deflection_warning(cycle, moved))
+    if moved > 0.05 * module:
         found.append(
             f"[W-MOTION] a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points "
             "and arms are those of the unmoved set"

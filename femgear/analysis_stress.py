@@ -10,6 +10,7 @@ import numpy as np
 
 from femgear.analysis_spectrum import load_spectrum, loaded_teeth, root_ranges
 from femgear.case import Case, set_deviations
+from femgear.dependencies import check_entries, static_entries
 from femgear.errors import GeometryError
 from femgear.threads import one_blas_thread
 
@@ -114,6 +115,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None 
     """
     from femgear.gears.deviations import common_period
 
+    check_entries(static.entries, static_entries(case), "static solution")
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
     influences = _influences(case, static)
     if progress is not None:
@@ -173,8 +175,7 @@ def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
     done, roots, first = {}, [], []
     for number, one in enumerate(ranges):
         slot, position = one.worst
-        period = (position - 1 if reverse else position) // each
-        start = (period - slot - 2) % cycle.periods
+        start = (position // each - slot - 2) % cycle.periods
         if start not in done:
             part = _excerpt(cycle, start, length)
             done[start] = root_stress_cycle(gears, influences, part, reverse=reverse)

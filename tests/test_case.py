@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from femgear.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value
+from femgear.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value, with_values
 from femgear.casefile import tomlfile
-from femgear.errors import CaseError
+from femgear.errors import CaseError, GeometryError
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -57,7 +57,8 @@ def test_the_reference_case_in_si_units():
     assert case.motor.coupling_stiffness == 400
     assert case.operation.torque == 100
     assert case.operation.speeds == pytest.approx([250 * math.pi / 30, 3100 * math.pi / 30], rel=1e-14)
-    assert case.response_harmonics == 18
+    # the reach of the excitation is found
+    assert case.mesh_harmonics is None and case.response_harmonics is None
     assert case.notices == ()
 
 
@@ -67,13 +68,14 @@ def test_optional_sections_have_defaults_and_motor_and_brake_may_be_left_out():
     case = parse_case(text[:start] + text[end:])
     assert case.motor is None and case.brake is None
     assert (case.static.positions, case.static.contact, case.housing.points) == (64, "profile", 54)
-    assert case.response_harmonics == 3 * case.dynamics.mesh_harmonics
+    assert case.housing.form == "exact" and case.dynamics.up_to is None
+    assert with_value(case, "dynamics.mesh_harmonics", 5).response_harmonics == 15
 
 
 def test_the_commented_entries_of_the_reference_case_are_valid():
     text, count = re.subn(r"(?m)^# ([a-z_]+ = )", r"\1", TEXT)
     case = parse_case(text)
-    assert count == 7 and case != parse_case(TEXT)
+    assert count == 10 and case != parse_case(TEXT)
     gears = planetary_set(case)
     assert gears.sun.tip_diameter == 0.045 and gears.sun.rack.root_radius == 0.3
     # half of 0.1 mm from either gear, along the line of action
@@ -406,8 +408,12 @@ WRONG = [
     ("operation.fixed", "planet", "E-CHOICE", "'carrier'"),  # 49
     ("ring.foundation_tangential", "0 N/m^3", "E-MECHANISM", "turning"),  # 49
     ("static.contact", "hertz", "E-CHOICE", "line_of_action"),
-    ("static.positions", 12, "E-RANGE", "6 mesh harmonics"),
-    ("dynamics.response_harmonics", 5, "E-RANGE", "12 or more"),
+    ("dynamics", {"mesh_harmonics": 6, "response_harmonics": 5}, "E-RANGE", "12 or more"),
+    ("dynamics", {"mesh_harmonics": 6, "up_to": "20 kHz"}, "E-RANGE", "given twice"),
+    ("dynamics", {"response_harmonics": 18}, "E-RANGE", "together with dynamics.mesh_harmonics"),
+    ("dynamics.up_to", "300 kHz", "E-RANGE", "200000 Hz"),
+    ("housing", {"form": "linear", "points": 55}, "E-POINTS", "multiple of 3"),
+    ("housing.form", "hat", "E-CHOICE", "'linear'"),
     ("dynamics.damping_ratio", math.nan, "E-FINITE", "dynamics.damping_ratio"),  # 10
     pytest.param("dynamics.damping_ratio", 10**5000, "E-RANGE", "too long", id="5000 digits"),  # 12
     pytest.param("sun.teeth", 10**1000, "E-RANGE", "5 to 5000", id="1000 digits"),  # 12
@@ -518,7 +524,8 @@ def test_published_lines_need_their_speed_and_harmonic(tmp_path):
     error = refused(replaced('speeds = ["250 rpm", "3100 rpm"]', 'speeds = ["250 rpm"]'), tmp_path)
     assert [p.key for p in error.problems] == [f"housing.published[{i}].speed" for i in (1, 2)]
     assert {p.code for p in error.problems} == {"E-PUBLISHED"} and error.problems[0].value == "3100 rpm"
-    error = refused(replaced("harmonic = 6", "harmonic = 19"), tmp_path)
+    six = replaced("tolerance = 1e-6", "tolerance = 1e-6\nmesh_harmonics = 6")
+    error = refused(replaced("harmonic = 6\norders", "harmonic = 19\norders", six), tmp_path)
     assert error.key == "housing.published[2].harmonic" and "1 to 18" in error.limit
 
 
@@ -527,3 +534,76 @@ def test_published_lines_that_a_change_leaves_behind_are_dropped_and_said():
     assert [entry.harmonic for entry in case.housing.published] == [1]
     assert any("2 of 3 entries housing.published" in notice for notice in case.notices)
     assert parse_case(to_toml(case)) == case
+
+
+def test_several_entries_change_at_once():
+    """Input and fixed member cannot be swapped one by one: half way one member is both."""
+    case = read_case(CASE)
+    with pytest.raises(CaseError, match="E-MECHANISM"):
+        with_value(case, "operation.fixed", case.operation.input)
+    swapped = {"operation.input": "ring", "operation.fixed": "sun"}
+    changed = with_values(case, swapped)
+    assert (changed.operation.input, changed.operation.fixed) == ("ring", "sun")
+    assert with_values(case, {}).source == with_value(case, "title", case.title).source
+    assert with_values(case, {"operation.torque": "50 N m"}) == with_value(case, "operation.torque", "50 N m")
+    with pytest.raises(CaseError, match="E-KEY-UNKNOWN"):
+        with_values(case, swapped | {"operation.speed": "1 rpm"})
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "advice"),
+    [
+        ("sun.module", 0.0012, '"1.2 mm" if it is in m'),
+        ("sun.module", 1.5, '"1.5 mm"'),
+        ("sun.bore_radius", 0.5, '"0.5 mm", or "500 mm" if it is in m'),
+        ("sun.pressure_angle", 0.35, '"20.0535 deg" if it is in rad'),
+        ("operation.speeds", [100.0], '"100.0 rpm", or "954.93 rpm" if it is in rad/s'),
+        ("sun.mass", 2, '"2 kg"'),
+        ("sun.module", 10**400, 'such as "1 mm"'),
+    ],
+)
+def test_bare_numbers_are_told_how_to_be_written(key, value, advice):
+    """The text that the remedy shows is accepted as it stands, and means the number given in SI units."""
+    case = read_case(CASE)
+    with pytest.raises(CaseError, match="E-UNIT") as caught:
+        with_value(case, key, value)
+    assert caught.value.remedy == f"write it as text with the unit, {advice}"
+
+
+@pytest.mark.parametrize("open_shifts", [("ring",), ("sun",), ("sun", "ring")])
+def test_largest_root_radius_is_accepted_as_printed(open_shifts):
+    """The limit holds for all gears, with the shifts that close the set, and is rounded down."""
+    changes = {"sun.pressure_angle": "25 deg"}
+    changes |= {f"{name}.profile_shift": None for name in open_shifts}
+    case = with_values(read_case(CASE), changes)
+    with pytest.raises(GeometryError, match="E-ROOT-RADIUS") as caught:
+        planetary_set(case)
+    limit = float(re.search(r"<= ([0-9.]+) modules", caught.value.limit)[1])
+    assert _root_radius_code(case, limit) != "E-ROOT-RADIUS"
+    assert _root_radius_code(case, limit + 1e-4) == "E-ROOT-RADIUS"
+
+
+def _root_radius_code(case, value):
+    try:
+        planetary_set(with_value(case, "rack.root_radius", value))
+    except GeometryError as error:
+        return error.code
+    return None
+
+
+def test_refused_root_radius_of_one_gear_names_its_own_rack():
+    case = with_value(read_case(CASE), "planet.rack", {"root_radius": 0.6})
+    with pytest.raises(GeometryError, match="E-ROOT-RADIUS") as caught:
+        planetary_set(case)
+    assert caught.value.key == "planet.rack.root_radius" and caught.value.value == 0.6
+
+
+def test_refusals_show_values_in_the_unit_of_their_entry():
+    case = read_case(CASE)
+    for changes, key, found in (
+        ({"sun.profile_shift": -0.5}, "set.centre_distance", "contact ratio 0.8283"),
+        ({"set.backlash": "6 mm"}, "set.backlash", "6 mm"),
+    ):
+        with pytest.raises(GeometryError) as caught:
+            planetary_set(with_values(case, changes))
+        assert (caught.value.key, caught.value.value) == (key, found)

@@ -54,7 +54,7 @@ class MeshWindows:
     tooth : tuple of two integer arrays (2N, pairs)
         Tooth numbers on gear 1 and gear 2 during the first mesh period.
     turns : (P,) int array
-        Whole mesh periods passed at each position.
+        Mesh periods passed at each position; one of the record's periods has one number.
     local : (2, cells, cells) array
         Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh.
     cell_area : (2N,) array
@@ -155,12 +155,11 @@ def mesh_windows(
     bodies: Bodies,
     *,
     share: float,
-    positions: int,
+    positions: int | np.ndarray,
     cells: int,
     nearest: float,
     contact: str,
     periods: int = 1,
-    first: int = 0,
     deviations: SetDeviations | None = None,
     planet_gaps=None,
     both_flanks: bool = False,
@@ -173,8 +172,8 @@ def mesh_windows(
     bodies : Bodies
     share : float
         Mesh force that sizes the windows [N].
-    positions : int
-        Positions in one mesh period.
+    positions : int or (P,) array
+        Number of equidistant positions in one mesh period, or the positions themselves [mesh periods].
     cells : int
         Pressure cells in a window.
     nearest : float
@@ -182,8 +181,6 @@ def mesh_windows(
     contact : {"profile", "line_of_action"}
     periods : int
         Number of mesh periods.
-    first : int
-        Number of the first position, zero being where "sun-planet 1" touches at its pitch point.
     deviations : SetDeviations, optional
     planet_gaps : (N,) array, optional
         Extra separation of the sun-side flanks of each planet [m].
@@ -192,17 +189,20 @@ def mesh_windows(
     """
     pitch = planetary_set.sun.base_pitch
     pairs = mesh_pairs(planetary_set)
-    tau = (first + np.arange(positions * periods)) / positions
-    turns = np.floor(tau).astype(int)
+    tau = cycle_positions(positions, periods=periods)
+    # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
+    start = np.ceil(tau[0]) if tau[0] < 0 else np.floor(tau[0])
+    begun = tau[0] if tau[0] < 0 else start
+    turns = (start + np.floor(tau - begun + 1e-9)).astype(int)
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
     count = int(np.ceil(end - begin)) + 4
     found, teeth = [], []
     for direction in (DRIVE, BACK) if both_flanks else (DRIVE,):
         side = flank_side(planetary_set, direction)
-        first = np.floor(begin - side.phase - 0.5 * (1.0 + direction)).astype(int) - 1
-        index = first[:, None] + np.arange(count)
         passed = direction * (tau - turns)
+        lowest = np.floor(begin - side.phase - np.ceil(passed.max())).astype(int) - 1
+        index = lowest[:, None] + np.arange(count)
         zeta = pitch * (passed[None, :, None] + side.phase[:, None, None] + index[:, None, :])
         tooth = side_teeth(planetary_set, index, direction)
         shift = pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
@@ -216,6 +216,13 @@ def mesh_windows(
         teeth.append(tooth)
     tooth = tuple(np.concatenate([t[gear] for t in teeth]) for gear in (0, 1))
     return _gather(found, tooth, turns, planetary_set.n_planets, bodies, cells)
+
+
+def cycle_positions(positions, *, periods: int = 1) -> np.ndarray:
+    """Positions in mesh periods, (P,): as given, or equidistant ones from the pitch point on."""
+    if np.ndim(positions):
+        return np.asarray(positions, float)
+    return np.arange(positions * periods) / positions
 
 
 def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells, nearest, contact):

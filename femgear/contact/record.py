@@ -27,7 +27,8 @@ class MeshCycle:
     stiffness : (2N, P) array
         Tangent mesh stiffness dF/d delta at constant loads of the other meshes [N/m].
     tooth_load : (2N, T, P) array
-        Load of each simultaneous tooth pair, in the order of the path coordinate [N].
+        Load of each simultaneous tooth pair, in the order of the path coordinate [N]; from one mesh period to
+        the next a pair goes on to the next place, whatever the sign of the torque.
     path : (2N, T, P) array
         Path coordinate of each tooth pair, from the pitch point in the direction of motion [m].
     tooth : (2, 2N, T) int array
@@ -74,6 +75,9 @@ class MeshCycle:
     pressure_centre : (2N, T, P) array, optional
         Place of the middle of each window from the point on the path [m]: zero but for windows that end at
         the end of a flank or follow modified profiles. To be added to `pressure_offset`.
+    compliance : (2N, 2N, P) array, optional
+        Tangent compliance between the meshes through their common bodies, supports left out [m/N]; zero
+        where a mesh carries nothing.
     """
 
     position: np.ndarray
@@ -103,6 +107,7 @@ class MeshCycle:
     pressure: np.ndarray | None = None
     pressure_offset: np.ndarray | None = None
     pressure_centre: np.ndarray | None = None
+    compliance: np.ndarray | None = None
 
     @property
     def overall_deflection(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The ring alone: cyclic modes of one sector against the annulus and against a whole toothed ring.
+"""The ring alone: cyclic modes of one sector against the annulus and a whole toothed ring, waves from the carrier.
 
 The annulus cannot have the frequencies of a ring with teeth; what the teeth do to them is information.
 """
@@ -14,8 +14,8 @@ from femgear.contact.bodies import RING_STATE, active_flank_load
 from femgear.fe.annulus import annulus_frequencies
 from femgear.fe.elasticity import mass, stiffness
 from femgear.fe.reduction import cyclic_modes, sector_basis
-from femgear.validation.reference import reference_static
-from femgear.validation.rows import Row, information, within
+from femgear.validation.reference import PAPER, reference_modes, reference_static
+from femgear.validation.rows import Row, at_most, information, within
 from femgear.validation.whole_ring import free_modes, whole_grid
 
 DIAMETERS = np.arange(2, 7)
@@ -26,6 +26,9 @@ SHARP = 0.05
 EXACT = "exact annulus in plane stress (degree-converged Ritz, agrees with the Bessel determinant)"
 # a part that shall not count keeps this share of its thickness
 NOTHING = 1e-9
+# largest carrier speed [rad/s] and change of the natural frequencies up to there, as the paper claims
+FASTEST, CLAIM = 120.0, 0.01
+SLIGHT = f"{PAPER}: less than 1 % between 0 and 120 rad/s"
 
 
 def _lowest(grid, stiffness_matrix, mass_matrix, count, load) -> np.ndarray:
@@ -235,6 +238,76 @@ def whole_ring() -> tuple[Row, ...]:
             name = f"free toothed ring, {words}, n = {n} [Hz]"
             rows.append(within("ring", source, name, reference, value, own[k] + other[k], note=note))
     return tuple(rows)
+
+
+def turning_carrier() -> tuple[Row, ...]:
+    """Natural frequencies in the carrier frame, gyroscopic and convective terms included, up to 120 rad/s."""
+    from femgear.models.elastic import ring_wave_shares, turning_system
+    from femgear.solvers.campbell import campbell_data
+
+    basis = reference_modes()
+    distance = reference_static().planetary_set.centre_distance
+    elastic = np.flatnonzero(basis.modes.frequency > 0.0)
+    below = elastic[basis.modes.frequency[elastic] < 10e3]
+    found = campbell_data(
+        lambda speed: turning_system(basis.model, centre_distance=distance, carrier_speed=speed),
+        np.linspace(0.0, FASTEST, 13),
+        basis.modes.mesh_stiffness,
+        count=len(below),
+    )
+    still, last = found.frequency[0], found.frequency[-1]
+    change = np.abs(found.frequency / still - 1.0).max(axis=0)
+    shares = ring_wave_shares(basis.model, found.tracked.shape[-1])
+    wave = shares.argmax(axis=0) - len(shares) // 2
+    heard = last - wave * FASTEST / (2.0 * np.pi)
+    why = "waves that run around the ring; the next row has them as the ring hears them"
+    rows = list(_bare_ring_turning(basis))
+    first = np.append(True, np.diff(still) > 1e-6 * still[1:])
+    for members in np.split(np.arange(len(still)), np.flatnonzero(first)[1:]):
+        i = members[0]
+        kind, n = basis.modes.kind[below[i]], basis.modes.nodal_diameter[below[i]]
+        name = f"mode {i + 1}, {kind}" + (f", n = {n}" if n >= 0 else "")
+        ends = ", ".join(f"{f:.2f}" for f in last[members])
+        note = f"{still[i]:.2f} Hz at rest, {ends} Hz at 120 rad/s"
+        text = f"{name}, in the carrier frame: largest change"
+        largest = change[members].max()
+        rows.append(at_most("turning", SLIGHT, text, CLAIM, largest, note=note, explanation=why))
+        if largest > CLAIM:
+            away = np.abs(heard[members] / still[i] - 1.0).max()
+            ends = ", ".join(f"{f:.2f}" for f in heard[members])
+            text = f"{name}, strongest wave as heard on the ring: largest change"
+            rows.append(at_most("turning", SLIGHT, text, CLAIM, away, note=f"{ends} Hz at 120 rad/s"))
+        elif len(members) == 1 and wave[i] and shares[:, i].sum() > 0.5:
+            apart = abs(wave[i]) * FASTEST / (2.0 * np.pi)
+            text = f"{name}, standing wave, heard on the ring as two lines: their distance from the middle"
+            note = f"{last[i] - apart:.2f}, {last[i] + apart:.2f} Hz at 120 rad/s"
+            rows.append(information("turning", SLIGHT, text, CLAIM, apart / still[i], note=note))
+    name = "modes below 10 kHz in the carrier frame (reference), with a change below 1 % (femgear)"
+    rows.append(information("turning", SLIGHT, name, len(change), int(np.sum(change < CLAIM))))
+    return tuple(rows)
+
+
+def _bare_ring_turning(basis) -> list[Row]:
+    """The ring alone on its foundation, seen from the carrier at 120 rad/s."""
+    from femgear.models.elastic import turning_system
+    from femgear.solvers.complex_modes import complex_modes
+
+    alone = replace(basis.model.system, W=np.zeros((len(basis.model.system.M), 0)), flexibility=None)
+    alone = turning_system(replace(basis.model, system=alone), centre_distance=0.0, carrier_speed=FASTEST)
+    found = complex_modes(alone, np.zeros(0), speed=FASTEST).frequency
+    rows, modes = [], basis.ring.modes
+    for n in range(1, 6):
+        lowest, split = modes.frequency[modes.nodal_diameter == n].min(), n * FASTEST / (2.0 * np.pi)
+        for sign, source in ((-1, "f - n Omega / 2 pi"), (1, "f + n Omega / 2 pi")):
+            seen = lowest + sign * split
+            text = f"ring alone on its foundation, n = {n}, seen from 120 rad/s [Hz]"
+            nearest = found[np.argmin(np.abs(found - seen))]
+            rows.append(within("turning", source, text, seen, nearest, 1e-9))
+        text = f"ring alone, n = {n}, in the carrier frame: n Omega / 2 pi over f = {lowest:.2f} Hz"
+        rows.append(
+            information("turning", SLIGHT, text, CLAIM, split / lowest, note="on the ring: no change")
+        )
+    return rows
 
 
 def other_outline() -> tuple[Row, ...]:
