@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from femgear.gears import involute
-from femgear.validation.rows import Row, counted, printed
+from femgear.validation.rows import REPEATED, Row, counted, printed
 
 TWENTY = math.radians(20.0)
 
@@ -42,7 +42,7 @@ def _pair(teeth, shifts, degrees, *, internal=False, module=1.0, truncated=False
 
 def external_pairs() -> tuple[Row, ...]:
     """D2: contact ratios of external pairs."""
-    source = "path of contact over base pitch (ISO 21771), evaluated independently"
+    source = f"path of contact over base pitch (ISO 21771), evaluated independently ({REPEATED})"
     rows = [
         printed(
             "D2",
@@ -80,7 +80,7 @@ def external_pairs() -> tuple[Row, ...]:
 
 def internal_pairs() -> tuple[Row, ...]:
     """D3: contact ratios of internal pairs."""
-    source = "path of contact over base pitch, evaluated independently"
+    source = f"path of contact over base pitch, evaluated independently ({REPEATED})"
     return tuple(
         printed(
             "D3",
@@ -99,7 +99,7 @@ def internal_pairs() -> tuple[Row, ...]:
 
 def limits() -> tuple[Row, ...]:
     """D4: undercut, pointed tips, tip thickness."""
-    source = "closed forms, 20 deg, addendum 1, evaluated independently"
+    source = f"closed forms, 20 deg, addendum 1, evaluated independently ({REPEATED})"
     base = 10.0 * math.cos(TWENTY)
     pointed = base / math.cos(involute.pointed_tip_angle(20, 0.0, TWENTY))
     tip = involute.inv(involute.pointed_tip_angle(20, 0.0, TWENTY)) - involute.inv(
@@ -149,7 +149,7 @@ def _least_ring(planet):
 
 def helical() -> tuple[Row, ...]:
     """D5: a helical pair."""
-    source = "closed forms, m_n 3, beta 15 deg, 20/40, b 40; evaluated independently"
+    source = f"closed forms, m_n 3, beta 15 deg, 20/40, b 40; evaluated independently ({REPEATED})"
     beta = math.radians(15.0)
     alpha = involute.transverse_angle(TWENTY, beta)
     scale = 3.0 / (2 * math.cos(beta))

@@ -19,10 +19,10 @@ from femgear.solvers.newmark import (
 from femgear.solvers.sweep_response import sweep_response
 from femgear.solvers.transient import solve_transient
 from femgear.validation.nonlinear import duffing, oscillator, response_curve
-from femgear.validation.rows import Row, at_most, counted, printed, within
+from femgear.validation.rows import REPEATED, Row, at_most, counted, printed, within
 
 HUGHES = "T. J. R. Hughes, The Finite Element Method (2000), Eq. 9.1.22"
-STEP = "eigenvalues of the step, independent computation"
+STEP = f"eigenvalues of the step ({REPEATED})"
 # m = 1, c = 0.1, k = 4, p = cos 3 t, start (1, 0): the closed form at t = 10
 END = 0.2650852834949518
 

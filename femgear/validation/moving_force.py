@@ -26,7 +26,7 @@ from femgear.system import MechanicalSystem, Modes
 from femgear.threads import one_blas_thread
 from femgear.validation.mapped import mapped_grid, ring_mapping
 from femgear.validation.planetary import reference_set
-from femgear.validation.rows import Row, at_most, within
+from femgear.validation.rows import Row, at_most, information, within
 
 ELEMENTS = 36  # around the ring, one across it
 DIAMETERS = 15  # p
@@ -209,31 +209,31 @@ NAMES = {
     "guyan": "Guyan, {} masters, exact steps",
     "full": "exact steps of all {} degrees of freedom",
 }
-# route, steps a mesh period, options, largest error
+# route, steps a mesh period, options; their errors are the result of the comparison, so that no gate is set
 TABLE = (
-    ("full", 64, {}, 2e-3),
-    ("modal", 64, {}, 2e-3),
-    ("modal", 256, {}, 2e-4),
-    ("modal", 64, {"count": 20}, 2e-3),
-    ("modal", 256, {"count": 20}, 1e-3),
-    ("average acceleration", 64, {}, 0.05),
-    ("average acceleration", 128, {}, 0.02),
-    ("average acceleration", 256, {}, 5e-3),
-    ("generalised alpha", 128, {}, 0.03),
-    ("guyan", 64, {"count": 72}, 1e-2),
-    ("guyan", 256, {"count": 72}, 1e-2),
-    ("guyan", 64, {"count": 144}, 5e-3),
+    ("full", 64, {}),
+    ("modal", 64, {}),
+    ("modal", 256, {}),
+    ("modal", 64, {"count": 20}),
+    ("modal", 256, {"count": 20}),
+    ("average acceleration", 64, {}),
+    ("average acceleration", 128, {}),
+    ("average acceleration", 256, {}),
+    ("generalised alpha", 128, {}),
+    ("guyan", 64, {"count": 72}),
+    ("guyan", 256, {"count": 72}),
+    ("guyan", 64, {"count": 144}),
 )
 
 
 def table() -> tuple[Row, ...]:
     """Error against time taken of all routes, and the orders that theory gives them."""
-    runs = {(route, steps, *more.values()): run(route, steps, **more) for route, steps, more, _ in TABLE}
+    runs = {(route, steps, *more.values()): run(route, steps, **more) for route, steps, more in TABLE}
     source, rows = "closed form in every mode", []
-    for (*_, gate), found in zip(TABLE, runs.values(), strict=True):
+    for found in runs.values():
         name = f"{NAMES[found.name].format(found.unknowns)}, {found.steps} steps a mesh period: error"
         note = f"{found.seconds:.2g} s of one processor for {PERIODS} mesh periods"
-        rows.append(at_most("moving", source, name, gate, found.error, note=note))
+        rows.append(information("moving", source, name, None, found.error, note=note))
     newmark = [runs["average acceleration", steps].error for steps in (64, 128, 256)]
     duhamel = [runs["modal", steps].error for steps in (64, 256)]
     same = abs(runs["full", 64].error - runs["modal", 64].error)

@@ -9,7 +9,7 @@ import numpy as np
 from femgear.solvers.floquet import floquet_multipliers, monodromy
 from femgear.solvers.spectral import solve_spectral
 from femgear.system import MeshExcitation, Modes
-from femgear.validation.rows import Row, counted, printed, within
+from femgear.validation.rows import REPEATED, Row, counted, printed, within
 
 RATIO, SOFT = 0.635, 0.65
 MEAN = RATIO + (1 - RATIO) * SOFT
@@ -57,7 +57,7 @@ def mathieu() -> tuple[Row, ...]:
         rows.append(within("G1", source, quantity, expected, trace, 1e-7, relative=False))
     multipliers = np.sort(np.linalg.eigvals(mathieu_monodromy(1.0, 1.0)).real)
     circle = np.abs(np.linalg.eigvals(mathieu_monodromy(2.5, 1.0)))
-    source = "independent integration (DOP853)"
+    source = f"independent integration, DOP853 ({REPEATED})"
     rows += [
         printed("G2", source, "Mathieu a = 1, q = 1: larger multiplier", "-4.15605494", multipliers[0]),
         printed("G2", source, "Mathieu a = 1, q = 1: smaller multiplier", "-.2406128", multipliers[1]),
@@ -66,7 +66,7 @@ def mathieu() -> tuple[Row, ...]:
     for damping, q in ((0.1, 0.1000546711), (0.2, 0.2004369763)):
         largest = np.abs(np.linalg.eigvals(mathieu_monodromy(1.0, q, damping))).max()
         quantity = f"damped Mathieu a = 1, c = {damping}, at the threshold q: largest multiplier"
-        rows.append(within("G3", "independent continuation of the threshold", quantity, 1.0, largest, 1e-9))
+        rows.append(within("G3", f"threshold by DOP853 ({REPEATED})", quantity, 1.0, largest, 1e-9))
     return tuple(rows)
 
 
@@ -145,7 +145,7 @@ def fixed_point() -> tuple[Row, ...]:
     response = solve_spectral(modes, excitation, frequency, excitation_harmonics=40, response_harmonics=80)
     multipliers = floquet_multipliers(modes, excitation, frequency, excitation_harmonics=40)
     rows = []
-    source, name = "independent solution", "damping ratio 0.03, w_m/w_n = "
+    source, name = f"operator of 200 harmonics, exponentials ({REPEATED})", "damping ratio 0.03, w_m/w_n = "
     for ratio, value, radius in zip(ratios, (".096", "1.022", ".579"), response.spectral_radius, strict=True):
         quantity = f"{name}{ratio:g}: spectral radius of the fixed point"
         rows.append(printed("G6", source, quantity, value, radius))

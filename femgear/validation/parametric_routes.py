@@ -16,7 +16,7 @@ from femgear.solvers.shooting import solve_shooting
 from femgear.solvers.stability_chart import stability_boundary
 from femgear.validation.nonlinear import oscillator
 from femgear.validation.parametric import EXACT, NATURAL, RATIO, SOFT
-from femgear.validation.rows import Row, at_most, counted, printed, within
+from femgear.validation.rows import REPEATED, Row, at_most, counted, printed, within
 
 RECTANGLE = StepSeries([[1.0, SOFT]], [0.0, RATIO])
 
@@ -62,7 +62,7 @@ def mathieu_boundaries() -> tuple[Row, ...]:
         wave = FourierSeries([[1.0, -2.0]])
         found = stability_boundary(oscillator(damping=damping), wave, (0.02, 0.4), frequency=2.0)
         quantity = f"damped Mathieu a = 1, c = {damping}: threshold q"
-        source = "independent continuation of the threshold"
+        source = f"threshold by DOP853 ({REPEATED})"
         rows.append(printed("G3", source, quantity, q, found))
     return tuple(rows)
 
@@ -72,7 +72,7 @@ def mathieu_verdicts() -> tuple[Row, ...]:
     rows = []
     for method in ("monodromy", "hill"):
         found = verdict_at(loaded(FourierSeries([[1.0, -2.0]])), 2.0, method=method, tolerance=1e-11)
-        name, source = f"({found.method})", "independent integration (DOP853)"
+        name, source = f"({found.method})", f"independent integration, DOP853 ({REPEATED})"
         low, high = np.sort(found.multipliers.real)
         rows += [
             printed("G2", source, f"Mathieu a = 1, q = 1: larger multiplier {name}", "-4.15605494", low),
@@ -145,12 +145,16 @@ def verdict_against_fixed_point() -> tuple[Row, ...]:
         name = f"damping ratio 0.03, w_m/w_n = {ratio:g}:"
         note = f"the fixed point has the radius {radius[ratio]}"
         quantity = f"{name} largest multiplier of the verdict"
-        source = "independent solution"
+        source = f"operator of 200 harmonics, exponentials ({REPEATED})"
         rows.append(printed("G6", source, quantity, value, abs(found.multipliers[0]), note=note))
         rows.append(counted("G6", source, f"{name} stable (1 yes)", 0, found.stable is True, note=note))
     found = verdict_at(loaded(RECTANGLE, damping=0.06 * NATURAL), 0.5 * NATURAL)
     quantity = "damping ratio 0.03, w_m/w_n = 0.5: stable (1 yes)"
-    rows.append(counted("G6", "independent solution", quantity, 1, found.stable is True))
+    rows.append(
+        counted(
+            "G6", f"operator of 200 harmonics, exponentials ({REPEATED})", quantity, 1, found.stable is True
+        )
+    )
     quantity = "damping ratio 0.03, w_m/w_n = 2: largest multiplier by shooting less that of the verdict"
     rows.append(at_most("G6", "verdict", quantity, 1e-9, shooting_gap()))
     return tuple(rows)

@@ -17,7 +17,7 @@ from femgear.gears import (
     torques,
 )
 from femgear.gears.checks import check_set, feasible_angles, neighbour_limit
-from femgear.validation.rows import Row, at_most, counted, printed, within
+from femgear.validation.rows import REPEATED, Row, at_most, counted, printed, within
 
 ALPHA = math.radians(20.0)
 KISSSOFT = "KISSsoft report, NREL 5 MW gearbox, planetary stage 2"
@@ -71,7 +71,7 @@ def nrel_set() -> PlanetarySet:
 def reference_geometry() -> tuple[Row, ...]:
     """Working pressure angles, contact ratios, speeds and phases of the reference set."""
     s = reference_set()
-    source = "cos(alpha_w) = a_0 cos(alpha)/a, path of contact over base pitch; evaluated independently"
+    source = f"cos(alpha_w) = a_0 cos(alpha)/a, path of contact over base pitch; independently ({REPEATED})"
     name = "27/40/108 at 51 mm: "
     rows = [
         printed(

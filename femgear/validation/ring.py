@@ -1,4 +1,4 @@
-"""The ring alone: cyclic modes of one sector against the annulus and a whole toothed ring, waves from the carrier.
+"""The ring alone: cyclic modes of one sector against annulus and whole toothed ring, waves from the carrier.
 
 The annulus cannot have the frequencies of a ring with teeth; what the teeth do to them is information.
 """

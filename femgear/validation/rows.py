@@ -7,6 +7,8 @@ from decimal import Decimal
 
 # Below this relative (or, for a zero reference, absolute) size an error is rounding and is not printed.
 ROUNDING = 1e-12
+# computes references again that stand as printed numbers in the functions of the tables
+REPEATED = "tests/validation/test_printed_references.py"
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 
 from femgear.gears.iso6336 import mesh_stiffness_method_b, theoretical_single_stiffness
 from femgear.validation.planetary import KISSSOFT, nrel_set
-from femgear.validation.rows import Row, printed, within
+from femgear.validation.rows import REPEATED, Row, printed, within
 
 UNIT = 1e-9  # N/m^2 in N/(mm um)
 NOTE = "with the printed C_R 0.862, C_M 0.8, C_B 0.975; C_R has three digits"
@@ -14,7 +14,7 @@ NOTE = "with the printed C_R 0.862, C_M 0.8, C_B 0.975; C_R has three digits"
 
 def single_pairs() -> tuple[Row, ...]:
     """E1: standard pairs."""
-    source = "ISO 6336-1, method B, evaluated independently"
+    source = f"ISO 6336-1, method B, evaluated independently ({REPEATED})"
     rows = [
         printed(
             "E1",

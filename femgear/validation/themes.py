@@ -112,7 +112,11 @@ THEMES = (
         "static",
         "Static solution of the reference set",
         "27/40/108, 100 N m at the sun, 64 positions. The convergence rows compare the case as it stands "
-        "with one numerical parameter changed.",
+        "with one numerical parameter changed. Their gates come from what the results are for: 1 % of the "
+        "mean mesh stiffness moves a natural frequency by 0.5 %, a twentieth of the half-power width at 5 % "
+        "damping, and 3 % of the transmission error is 0.26 dB of the excitation. The depth at which half "
+        "plane and elements are joined goes from two half widths of the contact, a third of the default, up "
+        "to what fits into a tooth, three times the default.",
         (static.equilibrium, static.iso_stiffness, static.planet_gaps, static.some_random_problems),
         (static.numerical_parameters, static.element_size, static.random_problems),
     ),
