@@ -7,7 +7,7 @@ goes to disk.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,12 +16,14 @@ import numpy as np
 from femgear.analysis_checks import (
     check_dynamic_case,
     check_motions,
+    check_reach,
     check_rim_speed,
-    highest_frequency,
+    fastest_mesh_frequency,
     max_nodal_diameter,
     static_warnings,
 )
 from femgear.case import Case, planetary_set, set_deviations
+from femgear.dependencies import Entries, check_entries, dynamic_entries, modal_entries, static_entries
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -30,8 +32,10 @@ if TYPE_CHECKING:
     from femgear.contact.assembly import Bodies
     from femgear.contact.bodies import Sectors
     from femgear.contact.cycle import MeshCycle
+    from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears import PlanetarySet, Speeds
     from femgear.housing import HousingSignal, SensorLines
+    from femgear.frequency_limit import FrequencyLimit
     from femgear.models.elastic import ElasticSet
     from femgear.models.ring import RingModel
     from femgear.solvers.floquet import Stability
@@ -39,16 +43,26 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, float, float], None]
 
+RECORD = 2**13
+"""Positions of the excitation in one mesh period at least."""
+MODES_ABOVE = 4.0
+"""The modal basis reaches this many times the excitation: the excitation may be doubled once, and modes up to
+twice a frequency carry the response there."""
+
 
 @dataclass(frozen=True)
 class StaticResult:
-    """Static transmission error, load sharing and mesh stiffness of all meshes."""
+    """Static transmission error, load sharing and mesh stiffness of all meshes.
+
+    ``entries`` are those of the case that it depends on, as in the results that follow.
+    """
 
     planetary_set: PlanetarySet
     sectors: Sectors
     bodies: Bodies
     cycle: MeshCycle
     sun_torque: float
+    entries: Entries
     period_message: str = ""
 
     @property
@@ -65,13 +79,27 @@ class StaticResult:
 
 @dataclass(frozen=True)
 class ModesResult:
-    """Mechanical system with its elastic ring, and its modal basis."""
+    """Mechanical system with its elastic ring, its loaded state, and its modal basis.
+
+    Parameters
+    ----------
+    bodies : Bodies
+        Flank compliances with the ring on its foundation.
+    state : LoadedPeriod
+        Static state of the set on its supports, whatever ``static.members`` shows.
+    reach : float
+        Frequency for whose excitation the basis was made [Hz].
+    """
 
     ring: RingModel
     model: ElasticSet
     excitation: MeshExcitation
     modes: Modes
     max_diameter: int
+    bodies: Bodies
+    state: LoadedPeriod
+    reach: float
+    entries: Entries
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc."""
@@ -85,7 +113,9 @@ class DynamicsResult:
     """Periodic response at every speed, its stability, and the field on the ring's outer surface.
 
     ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial`` and
-    ``ring_tangential`` (speeds, H + 1, 2 n_max + 1) are circumferential components [m].
+    ``ring_tangential`` (speeds, H + 1, 2 n_max + 1) are circumferential components [m]. The excitation ends
+    at ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB] is what the level of the housing
+    changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that were not looked at.
     """
 
     input_speed: np.ndarray
@@ -97,6 +127,18 @@ class DynamicsResult:
     ring_tangential: np.ndarray
     mesh_names: tuple[str, ...]
     ring_teeth: int
+    excitation_limit: np.ndarray
+    level_change: np.ndarray
+    compared_to: float
+    entries: Entries
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What an engineer should not overlook in this result."""
+        from femgear.frequency_limit import missing_level
+
+        rpm = self.input_speed * 30.0 / np.pi
+        return missing_level(rpm, self.level_change, self.excitation_limit, self.compared_to)
 
     def dataset(self) -> xr.Dataset:
         """Contents of dynamics.nc."""
@@ -107,13 +149,20 @@ class DynamicsResult:
 
 @dataclass(frozen=True)
 class HousingResult:
-    """What a fixed sensor on the ring hears: linear interpolation over P points, and exact lines."""
+    """What a fixed sensor on the ring hears.
+
+    ``lines`` are of the case's ``form``, "exact" or "linear" (interpolated over ``points`` points of the
+    ring), and ``signal`` is theirs; ``exact`` are the exact ones. The excitation ends at
+    ``excitation_limit`` (speeds,) [Hz].
+    """
 
     input_speed: np.ndarray
-    linear: SensorLines
+    lines: SensorLines
     exact: SensorLines
     signal: HousingSignal
+    form: str
     points: int
+    excitation_limit: np.ndarray
 
     def dataset(self) -> xr.Dataset:
         """Contents of housing.nc."""
@@ -155,7 +204,7 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
         gears,
         bodies,
         sun_torque=sun_torque,
-        positions=case.static.positions,
+        positions=gears.equal_positions(case.static.positions),
         contact=case.static.contact,
         # thickness errors separate the back flanks alone
         deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
@@ -166,59 +215,130 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
         progress=None if progress is None else lambda done, total: progress("contact", done, total),
     )
     check_motions(cycle, gears.sun.module)
-    return StaticResult(gears, sectors, bodies, cycle, sun_torque, period_message)
+    return StaticResult(gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message)
 
 
 @one_blas_thread()
-def solve_modes(case: Case, static: StaticResult) -> ModesResult:
+def solve_modes(
+    case: Case, static: StaticResult, *, progress: Progress | None = None
+) -> ModesResult:
     """Modal basis of the set with its elastic ring and mean mesh stiffnesses.
+
+    Its loaded state, from which the meshes take stiffness and excitation, is that of the set on its supports
+    and of the ring on its foundation, whatever ``static.members`` shows.
+
+    Parameters
+    ----------
+    case : Case
+    static : StaticResult
+    progress : callable, optional
+        Called with (stage, done, total).
 
     Raises
     ------
     CaseError
         Without torque, or when the ring, which is the housing of this model, is not the fixed member.
     """
-    from femgear.contact.bodies import active_flank_load
+    from femgear.contact.bodies import active_flank_load, ring_on_foundation
     from femgear.fe.elasticity import Material, mass
-    from femgear.models.elastic import elastic_set, mesh_excitation, ring_mesh_compliance
     from femgear.models.ring import ring_model
-    from femgear.solvers.modal import solve_modes as modal_basis
 
-    gears, sector, cycle = static.planetary_set, static.sectors.ring, static.cycle
+    check_entries(static.entries, static_entries(case), "static solution")
+    gears, sector = static.planetary_set, static.sectors.ring
     check_dynamic_case(case, gears)
     side = 1.0 if static.sun_torque >= 0 else -1.0
+    foundation = _ring_foundation(case, sector)
+    bodies = static.bodies
+    if case.static.members != "elastic":
+        bodies = ring_on_foundation(bodies, static.sectors, foundation, depth=case.static.depth)
+    state = state_on_supports(case, bodies, static.sun_torque, progress=progress)
+    reach = excitation_reach(case, state, static.sun_torque)
     material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-    top = highest_frequency(case, gears)
     diameter = max_nodal_diameter(case)
-    thickness = gears.ring.face_width
     ring = ring_model(
         gears,
         sector.grid,
         sector.stiffness,
-        mass(sector.grid, material, thickness),
-        _ring_foundation(case, sector),
+        mass(sector.grid, material, gears.ring.face_width),
+        foundation,
         active_flank_load(sector.grid, gears, side),
         max_diameter=diameter,
-        max_frequency=top,
+        max_frequency=MODES_ABOVE * reach,
         side=side,
-        static_on_foundation=case.static.members == "elastic",
     )
-    compliance = ring_mesh_compliance(
-        ring.held_compliance, np.arange(diameter + 1), gears.ring.teeth, gears.planet_angles
+    return modal_basis(case, ring, bodies, state, sun_torque=static.sun_torque, reach=reach)
+
+
+def state_on_supports(case: Case, bodies: Bodies, sun_torque: float, *, progress=None) -> LoadedPeriod:
+    """Loaded state of the set on its supports and of the ring on its foundation, over one mesh period."""
+    from femgear.contact.loaded_period import loaded_period
+
+    deviations = set_deviations(case)
+    return loaded_period(
+        planetary_set(case),
+        bodies,
+        sun_torque=sun_torque,
+        positions=case.static.positions,
+        contact=case.static.contact,
+        deviations=None if deviations.ideal else deviations,
+        # the bearings of the dynamic model are linear
+        supports=replace(_supports_of(case), planet_clearance=0.0),
+        progress=None if progress is None else lambda done, total: progress("modes", done, total),
     )
+
+
+def excitation_reach(case: Case, state: LoadedPeriod, sun_torque: float) -> float:
+    """Frequency to which the excitation reaches [Hz], see `femgear.frequency_limit.highest_excitation`."""
+    from femgear.frequency_limit import highest_excitation
+    from femgear.models.elastic import highest_mesh_mode
+
+    gears, stiffness = planetary_set(case), state.resampled("stiffness", RECORD).mean(axis=1)
+    mesh_mode = highest_mesh_mode(gears, stiffness, **_bodies_of(case), sun_torque=sun_torque)
+    return highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
+
+
+def modal_basis(case: Case, ring: RingModel, bodies: Bodies, state: LoadedPeriod, *, sun_torque, reach):
+    """Modes of the set with the ring given and the meshes of the loaded state."""
+    from femgear.models.elastic import body_flexibility, elastic_set, mesh_excitation, ring_mesh_compliance
+    from femgear.solvers.modal import solve_modes as modal_basis
+
+    gears, diameters = planetary_set(case), np.arange(len(ring.compliance))
+    compliance = ring_mesh_compliance(ring.compliance, diameters, gears.ring.teeth, gears.planet_angles)
+    flexibility = body_flexibility(state.compliance, compliance)
+    # equal planets are equal to rounding when their phases are among the positions
+    record = gears.n_planets * -(-RECORD // gears.n_planets)
     excitation = mesh_excitation(
-        cycle.stiffness, cycle.deflection, cycle.force, compliance, backlash=_backlash(gears)
+        *(state.resampled(name, record) for name in ("stiffness", "deflection", "force")),
+        compliance,
+        flexibility=flexibility,
+        backlash=_backlash(gears),
     )
     model = elastic_set(
-        gears, ring, **_bodies_of(case), sun_torque=static.sun_torque, driven=case.operation.input
+        gears,
+        ring,
+        **_bodies_of(case),
+        **_shafts_of(case),
+        sun_torque=sun_torque,
+        driven=case.operation.input,
+        flexibility=flexibility,
     )
     modes = modal_basis(
         model.system,
         excitation.stiffness.mean(axis=1),
         damping_ratio=case.dynamics.damping_ratio,
-        max_frequency=top,
+        max_frequency=MODES_ABOVE * reach,
     )
-    return ModesResult(ring, model, excitation, _named(modes, model), diameter)
+    return ModesResult(
+        ring=ring,
+        model=model,
+        excitation=excitation,
+        modes=_named(modes, model),
+        max_diameter=int(diameters[-1]),
+        bodies=bodies,
+        state=state,
+        reach=reach,
+        entries=modal_entries(case),
+    )
 
 
 @one_blas_thread()
@@ -233,28 +353,23 @@ def solve_dynamics(
         A carrier that runs around the ring faster than its waves (E-CRITICAL-SPEED).
     ConvergenceError
     """
-    from femgear.gears import speeds
+    from femgear.solvers.floquet import decisive_harmonics
     from femgear.solvers.floquet import stability as floquet_verdict
-    from femgear.solvers.spectral import solve_spectral
 
+    check_entries(static.entries, static_entries(case), "static solution")
+    check_entries(modes.entries, modal_entries(case), "modal basis")
     gears, basis = static.planetary_set, modes.modes
-    all_speeds = tuple(
-        speeds(gears, input=case.operation.input, fixed="ring", speed=s) for s in case.operation.speeds
-    )
+    all_speeds = turning_speeds(case, gears)
+    check_reach(case, modes.reach, fastest_mesh_frequency(case, gears))
     check_rim_speed(modes.ring.modes, [s.carrier for s in all_speeds])
-    frequency = np.array([s.mesh_frequency for s in all_speeds])
-    response = solve_spectral(
-        basis,
-        modes.excitation,
-        frequency,
-        excitation_harmonics=case.dynamics.mesh_harmonics,
-        response_harmonics=case.response_harmonics,
-        tolerance=case.dynamics.tolerance,
-    )
+    limit, response, change, compared_to = _checked_response(case, modes, all_speeds)
     if progress is not None:
         progress("dynamics", 1, 2)
     stability = floquet_verdict(
-        basis, modes.excitation, frequency, excitation_harmonics=case.dynamics.mesh_harmonics
+        basis,
+        modes.excitation,
+        response.mesh_frequency,
+        excitation_harmonics=decisive_harmonics(basis, modes.excitation, int(limit.excitation.max())),
     )
     if progress is not None:
         progress("dynamics", 2, 2)
@@ -269,7 +384,89 @@ def solve_dynamics(
         ring_tangential=field[1],
         mesh_names=gears.mesh_names,
         ring_teeth=gears.ring.teeth,
+        excitation_limit=limit.frequency,
+        level_change=change,
+        compared_to=compared_to,
+        entries=dynamic_entries(case),
     )
+
+
+def turning_speeds(case: Case, gears: PlanetarySet) -> tuple[Speeds, ...]:
+    """Speeds of all members at the speeds of the input."""
+    from femgear.gears import speeds
+
+    return tuple(
+        speeds(gears, input=case.operation.input, fixed="ring", speed=s) for s in case.operation.speeds
+    )
+
+
+def periodic_response(
+    case: Case, modes: ModesResult, mesh_frequency, up_to: float, *, given: int | None
+) -> tuple[FrequencyLimit, Response]:
+    """Periodic response to excitation up to a frequency, or of a given number of mesh harmonics.
+
+    Parameters
+    ----------
+    case : Case
+    modes : ModesResult
+    mesh_frequency : (n_speeds,) array
+        [Hz]
+    up_to, given
+        As for `femgear.frequency_limit.limited`.
+    """
+    from femgear.frequency_limit import limited
+    from femgear.solvers.spectral import solve_spectral
+
+    limit = limited(case, planetary_set(case), mesh_frequency, up_to, given=given)
+    response = solve_spectral(
+        modes.modes,
+        modes.excitation,
+        mesh_frequency,
+        excitation_harmonics=limit.excitation,
+        response_harmonics=limit.response,
+        tolerance=case.dynamics.tolerance,
+    )
+    return limit, response
+
+
+def _checked_response(case: Case, modes: ModesResult, all_speeds):
+    """Response, its frequency limit, what the level changes beyond it [dB], and the limit compared with [Hz].
+
+    Where the case sets no limit it is doubled once where that changes the level by 1 dB or more.
+    """
+    from femgear.frequency_limit import NOTICEABLE, checked_speeds
+
+    frequency = np.array([s.mesh_frequency for s in all_speeds])
+    given, up_to = case.dynamics.mesh_harmonics, modes.reach
+    some = checked_speeds(len(frequency))
+    limit, response = periodic_response(case, modes, frequency, up_to, given=given)
+    while True:
+        beyond = 2.0 * up_to if given is None else max(up_to, 2.0 * float(limit.frequency.max()))
+        further, wider = periodic_response(case, modes, frequency[some], beyond, given=None)
+        levels = [_level(case, modes, one, all_speeds, some) for one in (response, wider)]
+        change = np.full(len(frequency), np.nan)
+        change[some] = 20.0 * np.log10(levels[1] / levels[0])
+        automatic = given is None and case.dynamics.up_to is None
+        if not automatic or up_to > modes.reach or np.abs(change[some]).max() < NOTICEABLE:
+            return limit, response, change, float(beyond)
+        up_to = beyond
+        if len(some) == len(frequency):
+            limit, response = further, wider
+        else:
+            limit, response = periodic_response(case, modes, frequency, up_to, given=None)
+
+
+def _level(case: Case, modes: ModesResult, response: Response, all_speeds, some) -> np.ndarray:
+    """Root mean square of the acceleration of the sensor at some of the speeds [m/s^2]."""
+    from femgear.housing import fixed_sensor_lines, order_level
+
+    if len(response.force) > len(some):
+        parts = {name: getattr(response, name)[some] for name in ("deflection", "force", "modal")}
+        response = replace(response, **parts)
+    carrier = np.array([all_speeds[i].carrier for i in some])
+    field = _outputs(modes, response)[1][0]
+    teeth = planetary_set(case).ring.teeth
+    return order_level(fixed_sensor_lines(field, teeth, carrier, case.housing.sensor_angle))
 
 
 def _outputs(result: ModesResult, response: Response):
@@ -301,26 +498,32 @@ def _outputs(result: ModesResult, response: Response):
 def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     """Signal and carrier orders of a sensor fixed on the ring while the carrier turns past it.
 
-    The static deflection (harmonic zero) is carried exactly in both forms: its images, where the teeth of
-    the ring are a multiple of the number of points, would fall on the mesh orders.
+    With ``housing.form = "linear"`` the static deflection (harmonic zero) is carried exactly all the same:
+    its images, where the teeth of the ring are a multiple of the number of points, would fall on the mesh
+    orders.
     """
-    from dataclasses import replace
-
     from femgear.housing import fixed_sensor_lines, fixed_sensor_signal, heaviside_linear_lines
 
+    check_entries(dynamics.entries, dynamic_entries(case), "dynamic response")
     carrier = np.array([s.carrier for s in dynamics.speeds])
     arguments = (dynamics.ring_teeth, carrier, case.housing.sensor_angle)
-    static = np.zeros_like(dynamics.ring_radial)
-    static[:, 0] = dynamics.ring_radial[:, 0]
-    moving = heaviside_linear_lines(dynamics.ring_radial - static, *arguments, points=case.housing.points)
-    still = fixed_sensor_lines(static, *arguments)
-    linear = replace(moving, displacement=moving.displacement + still.displacement)
+    lines = exact = fixed_sensor_lines(dynamics.ring_radial, *arguments)
+    if case.housing.form == "linear":
+        static = np.zeros_like(dynamics.ring_radial)
+        static[:, 0] = dynamics.ring_radial[:, 0]
+        moving = heaviside_linear_lines(
+            dynamics.ring_radial - static, *arguments, points=case.housing.points
+        )
+        still = fixed_sensor_lines(static, *arguments)
+        lines = replace(moving, displacement=moving.displacement + still.displacement)
     return HousingResult(
         input_speed=np.array(case.operation.speeds),
-        linear=linear,
-        exact=fixed_sensor_lines(dynamics.ring_radial, *arguments),
-        signal=fixed_sensor_signal(linear),
+        lines=lines,
+        exact=exact,
+        signal=fixed_sensor_signal(lines),
+        form=case.housing.form,
         points=case.housing.points,
+        excitation_limit=dynamics.excitation_limit,
     )
 
 
@@ -334,10 +537,15 @@ def _ring_foundation(case: Case, sector):
 
 def _supports(case: Case):
     """Supports of the static problem: rigid, or those of the case's bodies."""
-    from femgear.contact.supports import RIGID, Supports
+    from femgear.contact.supports import RIGID
 
-    if case.static.members == "fixed":
-        return RIGID
+    return RIGID if case.static.members == "fixed" else _supports_of(case)
+
+
+def _supports_of(case: Case):
+    """Supports of the case's bodies."""
+    from femgear.contact.supports import Supports
+
     return Supports(
         sun=case.sun.support_stiffness,
         carrier=case.carrier.support_stiffness,
@@ -352,25 +560,28 @@ def _backlash(gears: PlanetarySet) -> np.ndarray:
 
 
 def _bodies_of(case: Case) -> dict:
-    """Rigid bodies and shafts of the case as the elastic model takes them."""
-    from femgear.models.elastic import BodyData, ShaftData
-
-    def shaft(section):
-        return None if section is None else ShaftData(section.inertia, section.coupling_stiffness)
+    """Rigid bodies of the case as the elastic model takes them."""
+    from femgear.models.elastic import BodyData
 
     return {
         "sun": BodyData(case.sun.mass, case.sun.inertia, case.sun.support_stiffness),
         "carrier": BodyData(case.carrier.mass, case.carrier.inertia, case.carrier.support_stiffness),
         "planet": BodyData(case.planet.mass, case.planet.inertia, case.planet.bearing_stiffness),
-        "motor": shaft(case.motor),
-        "brake": shaft(case.brake),
     }
+
+
+def _shafts_of(case: Case) -> dict:
+    """Motor and brake of the case as the elastic model takes them."""
+    from femgear.models.elastic import ShaftData
+
+    def shaft(section):
+        return None if section is None else ShaftData(section.inertia, section.coupling_stiffness)
+
+    return {"motor": shaft(case.motor), "brake": shaft(case.brake)}
 
 
 def _named(modes: Modes, model: ElasticSet) -> Modes:
     """The modes with their kinds and nodal diameters."""
-    from dataclasses import replace
-
     from femgear.models.kinds import mode_kinds
 
     kinds, diameters = mode_kinds(

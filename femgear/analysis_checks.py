@@ -10,16 +10,13 @@ import numpy as np
 from femgear.case import Case, set_deviations
 from femgear.case_floating import check_floating
 from femgear.errors import CaseError, ContactError
+from femgear.frequency_limit import HIGHEST_RESPONSE
 
 if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
     from femgear.fe.reduction import CyclicModes
     from femgear.gears import PlanetarySet
 
-# the wavelength of shear in steel at 200 kHz is 16 mm: shorter waves are no matter of plane gear bodies
-HIGHEST_RESPONSE = 200e3
-# however slow the set turns, its modes up to here are kept [Hz]
-LOWEST_TOP = 10e3
 
 
 def max_nodal_diameter(case: Case) -> int:
@@ -29,8 +26,8 @@ def max_nodal_diameter(case: Case) -> int:
     return max(min(MAX_DIAMETER, case.ring.teeth // 2 - 1), 2)
 
 
-def highest_frequency(case: Case, gears: PlanetarySet) -> float:
-    """Frequency up to which ring and set have modes of their own [Hz]: twice the highest of the response.
+def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
+    """Mesh frequency of the fastest speed [Hz].
 
     Raises
     ------
@@ -40,18 +37,19 @@ def highest_frequency(case: Case, gears: PlanetarySet) -> float:
     from femgear.gears import speeds
 
     fastest = speeds(gears, input=case.operation.input, fixed="ring", speed=max(case.operation.speeds))
-    response = case.response_harmonics * fastest.mesh_frequency
+    harmonics = case.response_harmonics or 3
+    response = max(harmonics * fastest.mesh_frequency, case.dynamics.up_to or 0.0)
     if response > HIGHEST_RESPONSE:
         allowed = max(case.operation.speeds) * HIGHEST_RESPONSE / response
         raise CaseError(
-            f"{case.response_harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
+            f"{harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
             code="E-FREQUENCY",
             key="operation.speeds",
             value=f"{max(case.operation.speeds) * 30 / np.pi:.6g} rpm",
             limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed * 30 / np.pi:.4g} rpm here",
             remedy="leave the highest speeds out, or fewer dynamics.response_harmonics",
         )
-    return max(2.0 * response, LOWEST_TOP)
+    return fastest.mesh_frequency
 
 
 def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
@@ -93,7 +91,34 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             limit="errors that repeat with every tooth",
             remedy="run with --only static, or leave pitch errors and runouts out",
         )
-    highest_frequency(case, gears)
+    fastest_mesh_frequency(case, gears)
+
+
+def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
+    """Refuse a modal basis that was made for slower excitation.
+
+    Parameters
+    ----------
+    case : Case
+    reach : float
+        Frequency up to which the basis carries excitation [Hz].
+    mesh_frequency : float
+        Of the fastest speed [Hz].
+
+    Raises
+    ------
+    CaseError
+        E-OTHER-CASE.
+    """
+    wanted = max(case.dynamics.up_to or 0.0, (case.mesh_harmonics or 3) * mesh_frequency)
+    if wanted > reach * (1.0 + 1e-9):
+        raise CaseError(
+            f"the modal basis was made for excitation up to {reach:.4g} Hz, and this case has {wanted:.4g} Hz",
+            code="E-OTHER-CASE",
+            key="operation.speeds" if case.dynamics.up_to is None else "dynamics.up_to",
+            limit=f"up to {reach:.4g} Hz",
+            remedy="compute the modes of this case",
+        )
 
 
 def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:

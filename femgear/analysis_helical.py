@@ -25,6 +25,7 @@ from femgear.analysis_helical_section import (
     shared_load,
 )
 from femgear.case import Case, planetary_set
+from femgear.dependencies import check_entries, static_entries
 from femgear.system import MeshExcitation
 from femgear.threads import one_blas_thread
 
@@ -88,8 +89,13 @@ def solve_helical_static(
     case: Case, *, cache: Path | None = None, progress: Progress | None = None
 ) -> StaticResult:
     """Static solution of the spur gears of the transverse section, the whole face width loaded at once."""
+    return analysis.solve_static(_drive_flanks(case), cache=cache, progress=progress)
+
+
+def _drive_flanks(case: Case) -> Case:
+    """The case whose static solution has drive flanks alone."""
     plain = case.static.model_copy(update={"stresses": False, "back_flanks": False})
-    return analysis.solve_static(case.model_copy(update={"static": plain}), cache=cache, progress=progress)
+    return case.model_copy(update={"static": plain})
 
 
 @one_blas_thread()
@@ -126,6 +132,7 @@ def solve_helical_modes(
     check_helical_case(case, gears)
     excitation, whole = None, None
     if case.helical.mesh_stiffness is None:
+        check_entries(static.entries, static_entries(_drive_flanks(case)), "static solution")
         factor = np.ones(2)
         if case.helical.section == "normal":
             section = section or section_stiffness(case, gears, cache=cache)
@@ -170,14 +177,14 @@ def solve_helical_dynamics(
         modes.modes,
         modes.excitation,
         frequency,
-        excitation_harmonics=dynamics.mesh_harmonics,
+        excitation_harmonics=case.mesh_harmonics,
         response_harmonics=case.response_harmonics,
         tolerance=dynamics.tolerance,
     )
     if progress is not None:
         progress("dynamics", 1, 2)
     verdict = floquet_verdict(
-        modes.modes, modes.excitation, frequency, excitation_harmonics=dynamics.mesh_harmonics
+        modes.modes, modes.excitation, frequency, excitation_harmonics=case.mesh_harmonics
     )
     if progress is not None:
         progress("dynamics", 2, 2)

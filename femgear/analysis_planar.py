@@ -19,6 +19,7 @@ from femgear.analysis_planar_checks import (
 )
 from femgear.case import Case, planetary_set
 from femgear.casefile.planar import output_member
+from femgear.dependencies import check_entries, static_entries
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -266,6 +267,8 @@ def planar_model(
     from femgear.models.planar_problem import Clearances, planar_problem
     from femgear.models.planar_response import PlanarModel
 
+    if static is not None:
+        check_entries(static.entries, static_entries(case), "static solution")
     planar, operation = case.planar, case.operation
     data = planar_data(case, gears, static)
     output = None if planar.reaction == "supports" else output_member(case)
@@ -334,7 +337,7 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
     return planar_meshes(
         data,
         stiffness=record,
-        harmonics=case.dynamics.mesh_harmonics,
+        harmonics=case.mesh_harmonics,
         orders=(0, sense),
         backlash=backlash,
         smoothing=planar.smoothing,

@@ -10,6 +10,7 @@ import numpy as np
 
 from femgear.analysis_spectrum import load_spectrum, loaded_teeth, root_ranges
 from femgear.case import Case, set_deviations
+from femgear.dependencies import check_entries, static_entries
 from femgear.errors import GeometryError
 from femgear.threads import one_blas_thread
 
@@ -114,6 +115,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None 
     """
     from femgear.gears.deviations import common_period
 
+    check_entries(static.entries, static_entries(case), "static solution")
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
     influences = _influences(case, static)
     if progress is not None:

@@ -199,8 +199,17 @@ def dynamics_dataset(result: DynamicsResult) -> xr.Dataset:
         ("ring", field, result.ring_radial, "m", "outer radial displacement of the ring"),
         ("ring_tangential", field, result.ring_tangential, "m", "outer tangential displacement of the ring"),
     )
+    reach = {
+        "excitation_limit": (("speed",), result.excitation_limit, "Hz", "highest frequency of the excitation"),
+        "level_change": (
+            ("speed",),
+            result.level_change,
+            "dB",
+            "change of the housing level with excitation up to the frequency compared_to",
+        ),
+    }
     return dataset(
-        response_entries(result) | complex_entries(entries),
+        response_entries(result) | reach | complex_entries(entries),
         coords={
             "speed": (("speed",), result.input_speed / RPM, "rpm", "speed of the input"),
             "mesh": (("mesh",), list(result.mesh_names), "1", "gear mesh"),
@@ -210,6 +219,8 @@ def dynamics_dataset(result: DynamicsResult) -> xr.Dataset:
         attrs={
             "title": "periodic response by the spectral method",
             "message": response.message,
+            "compared_to": result.compared_to,
+            "warnings": " ".join(result.warnings),
             "ring_teeth": result.ring_teeth,
             "fourier_convention": FOURIER,
         },
@@ -218,6 +229,8 @@ def dynamics_dataset(result: DynamicsResult) -> xr.Dataset:
 
 def housing_dataset(result: HousingResult) -> xr.Dataset:
     """Contents of housing.nc."""
+    from femgear.housing import order_level
+
     signal, speed = result.signal, ("speed",)
     order = ("speed", "order")
     variables = {
@@ -231,9 +244,9 @@ def housing_dataset(result: HousingResult) -> xr.Dataset:
         "displacement": (("speed", "time"), signal.displacement, "m", "radial displacement at the sensor"),
         "order_amplitude": (
             order,
-            np.abs(result.linear.acceleration),
+            np.abs(result.lines.acceleration),
             "m/s^2",
-            f"acceleration, linear over {result.points} points",
+            f"acceleration, {result.lines.method}",
         ),
         "order_amplitude_exact": (
             order,
@@ -247,19 +260,22 @@ def housing_dataset(result: HousingResult) -> xr.Dataset:
             "rad",
             "displacement phase, exact lines",
         ),
+        "excitation_limit": (speed, result.excitation_limit, "Hz", "highest frequency of the excitation"),
+        "level": (speed, order_level(result.lines), "m/s^2", "root mean square of the acceleration"),
     }
     return dataset(
         variables,
         coords={
             "speed": (speed, result.input_speed / RPM, "rpm", "speed of the input"),
             "time": (("time",), signal.revolution, "1", "fraction of one carrier revolution"),
-            "order": (("order",), result.linear.order, "1", "carrier order"),
+            "order": (("order",), result.lines.order, "1", "carrier order"),
         },
         attrs={
             "title": "what a sensor fixed on the housing hears",
-            "sensor_angle": result.linear.sensor_angle,
+            "sensor_angle": result.lines.sensor_angle,
+            "form": result.form,
             "points": result.points,
-            "ring_teeth": result.linear.z_ring,
+            "ring_teeth": result.lines.z_ring,
         },
     )
 

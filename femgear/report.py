@@ -20,6 +20,7 @@ from femgear.summary_warnings import case_warnings, result_warnings
 _LARGEST_PICTURE = 8_000_000  # bytes
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
 _FEW = 4
+_FIRST, _STRONGEST = 6, 4  # bands of the housing that are listed
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1b1b1b; background: #fff;
@@ -169,9 +170,7 @@ def _bands(results: Results) -> Block:
         spectrum = order_spectrum(housing["acceleration"].values[s])
         windowed = _hanning_spectrum(results, s)
         rpm = float(housing["speed"][s])
-        for h in range(1, case.dynamics.mesh_harmonics + 1):
-            if h * teeth + teeth // 2 > spectrum.order[-1]:
-                break
+        for h in _shown_harmonics(spectrum, teeth, case.dynamics.mesh_harmonics):
             found = analyse_band(spectrum, teeth, h, count=3)
             threshold = found.lobes.threshold
             lines = [_line(line, h * teeth) for line in found.lines[:2]] + ["-", "-"]
@@ -200,6 +199,16 @@ def _bands(results: Results) -> Block:
     if not case.housing.published:
         header, rows = header[:-1], [row[:-1] for row in rows]
     return Block("Around the mesh harmonics", header, tuple(rows), tuple(notes))
+
+
+def _shown_harmonics(spectrum, teeth: int, given: int | None) -> list[int]:
+    """All mesh harmonics of the excitation; of those up to a frequency the first and the strongest ones."""
+    highest = int((spectrum.order[-1] - teeth // 2) // teeth)
+    if given is not None:
+        return list(range(1, min(given, highest) + 1))
+    bands = np.abs(spectrum.order[None] / teeth - np.arange(1, highest + 1)[:, None]) <= 0.5
+    strongest = np.where(bands, spectrum.amplitude[None], 0.0).max(axis=1).argsort()[::-1][:_STRONGEST] + 1
+    return sorted({*range(1, min(_FIRST, highest) + 1), *strongest.tolist()})
 
 
 def _hanning_spectrum(results: Results, speed: int):

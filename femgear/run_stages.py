@@ -232,7 +232,9 @@ ELASTIC = {
     "static": STATIC,
     "stress": STRESS,
     "modes": Stage(
-        compute=lambda case, results, *_: analysis.solve_modes(case, results["static"]),
+        compute=lambda case, results, _, progress: analysis.solve_modes(
+            case, results["static"], progress=progress
+        ),
         verdict=lambda result: {
             "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.model.system.M),
         },
@@ -247,7 +249,7 @@ ELASTIC = {
     ),
     "housing": Stage(
         compute=lambda case, results, *_: analysis.solve_housing(case, results["dynamics"]),
-        verdict=lambda result: {"points": result.points},
+        verdict=lambda result: {"form": result.form},
         needs=lambda case: ("dynamics",),
     ),
 }  # fmt: skip

@@ -86,7 +86,7 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
     if case.operation.torque < 0:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
     elastic = case.planar is None and case.helical is None
-    if elastic and case.housing.points <= 2 * MAX_DIAMETER:
+    if elastic and case.housing.form == "linear" and case.housing.points <= 2 * MAX_DIAMETER:
         found.append(
             f"[W-POINTS] housing.points: {case.housing.points} points do not resolve the ring's "
             f"{MAX_DIAMETER} nodal diameters; use more than {2 * MAX_DIAMETER}"
@@ -271,10 +271,15 @@ def _dynamics(data: xr.Dataset) -> Block:
     rms = np.sqrt(0.5 * (dte[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
     largest = np.abs(data.floquet_multiplier.values)
     stable = data.stable.values.astype(bool) if "stable" in data else largest < 1.0
+    # helical cases are excited by a number of harmonics
+    reach = [()] * data.sizes["speed"]
+    if "excitation_limit" in data:
+        reach = [(f"{value / 1e3:.2f}",) for value in data.excitation_limit.values]
     rows = tuple(
         (
             f"{float(data.speed[i]):.2f}",
             f"{float(data.mesh_frequency[i]):.2f}",
+            *reach[i],
             f"{rms[i] * 1e6:.4f}",
             str(data.method.values[i]),
             str(int(data.iterations[i])),
@@ -287,6 +292,7 @@ def _dynamics(data: xr.Dataset) -> Block:
     header = (
         "speed [rpm]",
         "mesh [Hz]",
+        *(("excited up to [kHz]",) if reach[0] else ()),
         "DTE rms [um]",
         "method",
         "iterations",
@@ -299,6 +305,12 @@ def _dynamics(data: xr.Dataset) -> Block:
         "which contracts below 1; Floquet: largest multiplier, stable up to 1 (exactly 1 without damping)",
         f"{int(data.converged.sum())} of {len(stable)} speeds converged, {int(stable.sum())} stable",
     )
+    if "level_change" in data:
+        change = data.level_change.values
+        notes += (
+            f"the level of the housing changes by {np.nanmax(np.abs(change)):.2g} dB at most with excitation up "
+            f"to {data.attrs['compared_to'] / 1e3:.4g} kHz, at {int(np.isfinite(change).sum())} speeds looked at",
+        )
     return Block("Dynamics", header, rows, notes)
 
 
@@ -309,10 +321,17 @@ def _housing(data: xr.Dataset) -> Block:
         amplitude = one.order_amplitude.values
         largest = np.argsort(-amplitude, kind="stable")[:5]
         lines = ", ".join(f"{round(float(one.order[j]))} ({amplitude[j]:.3g})" for j in largest)
-        rms = float(np.sqrt(np.mean(one.acceleration.values**2)))
-        rows.append((f"{float(one.speed):.2f}", f"{rms:.4g}", lines))
-    header = ("speed [rpm]", "rms [m/s^2]", "largest lines: carrier order (amplitude [m/s^2])")
-    return Block("Housing", header, tuple(rows))
+        limit = f"{float(one.excitation_limit) / 1e3:.2f}"
+        rows.append((f"{float(one.speed):.2f}", limit, f"{float(one.level):.4g}", lines))
+    header = (
+        "speed [rpm]",
+        "excited up to [kHz]",
+        "rms [m/s^2]",
+        "largest lines: carrier order (amplitude [m/s^2])",
+    )
+    form = data.attrs["form"]
+    note = f"form of the signal: {form}" + (f", {data.attrs['points']} points" if form == "linear" else "")
+    return Block("Housing", header, tuple(rows), (note,))
 
 
 def _chosen(count: int) -> Iterator[int]:

@@ -53,6 +53,8 @@ def result_warnings(results: Results) -> tuple[str, ...]:
 
 
 def _dynamics(data: xr.Dataset) -> Iterator[str]:
+    if warnings := str(data.attrs.get("warnings", "")):
+        yield from (f"[{text.strip()}" for text in warnings.split("[") if text)
     speed = data["speed"].values
     for bad, text in (
         (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),

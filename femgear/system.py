@@ -36,6 +36,9 @@ class MechanicalSystem:
         One name a degree of freedom, such as ``"planet 2: x"``.
     gyroscopic : (n, n) array, optional
         Skew-symmetric matrix that multiplies the speed of rotation [rad/s].
+    flexibility : (n_meshes, n_meshes) array, optional
+        Static compliance of bodies that are rigid in the coordinates, from the force of every mesh to the
+        deflection of every other [m/N]: the spring deflections are then ``W^T q - flexibility f``.
     """
 
     M: np.ndarray
@@ -45,9 +48,10 @@ class MechanicalSystem:
     load: np.ndarray
     dofs: tuple[str, ...]
     gyroscopic: np.ndarray | None = None
+    flexibility: np.ndarray | None = None
 
     def __post_init__(self):
-        _freeze(self, "M", "C", "K", "W", "load", "gyroscopic")
+        _freeze(self, "M", "C", "K", "W", "load", "gyroscopic", "flexibility")
 
 
 @dataclass(frozen=True)
@@ -95,9 +99,10 @@ class Modes:
     mesh_stiffness : (n_meshes,) array
         Mean mesh stiffness [N/m] that the modes contain.
     mesh_deflection : (n_meshes, n_modes) array
-        ``W^T shape``.
+        Deflection of the mesh springs, ``W^T shape`` without `MechanicalSystem.flexibility`.
     residual : (n_meshes, n_meshes) array
-        Static flexibility of the modes left out, ``W^T K^+ W - sum r r^T / omega^2`` [m/N].
+        Static flexibility of what the modes leave out, ``W^T K^+ W - sum r r^T / omega^2`` and
+        `MechanicalSystem.flexibility` [m/N].
     load_deflection : (n_meshes,) array
         Static mesh deflection under the constant external load, ``W^T K^+ load`` [m], all modes included.
     kind : tuple of str

@@ -57,7 +57,8 @@ def test_the_reference_case_in_si_units():
     assert case.motor.coupling_stiffness == 400
     assert case.operation.torque == 100
     assert case.operation.speeds == pytest.approx([250 * math.pi / 30, 3100 * math.pi / 30], rel=1e-14)
-    assert case.response_harmonics == 18
+    # the reach of the excitation is found
+    assert case.mesh_harmonics is None and case.response_harmonics is None
     assert case.notices == ()
 
 
@@ -67,13 +68,14 @@ def test_optional_sections_have_defaults_and_motor_and_brake_may_be_left_out():
     case = parse_case(text[:start] + text[end:])
     assert case.motor is None and case.brake is None
     assert (case.static.positions, case.static.contact, case.housing.points) == (64, "profile", 54)
-    assert case.response_harmonics == 3 * case.dynamics.mesh_harmonics
+    assert case.housing.form == "exact" and case.dynamics.up_to is None
+    assert with_value(case, "dynamics.mesh_harmonics", 5).response_harmonics == 15
 
 
 def test_the_commented_entries_of_the_reference_case_are_valid():
     text, count = re.subn(r"(?m)^# ([a-z_]+ = )", r"\1", TEXT)
     case = parse_case(text)
-    assert count == 7 and case != parse_case(TEXT)
+    assert count == 10 and case != parse_case(TEXT)
     gears = planetary_set(case)
     assert gears.sun.tip_diameter == 0.045 and gears.sun.rack.root_radius == 0.3
     # half of 0.1 mm from either gear, along the line of action
@@ -406,8 +408,12 @@ WRONG = [
     ("operation.fixed", "planet", "E-CHOICE", "'carrier'"),  # 49
     ("ring.foundation_tangential", "0 N/m^3", "E-MECHANISM", "turning"),  # 49
     ("static.contact", "hertz", "E-CHOICE", "line_of_action"),
-    ("static.positions", 12, "E-RANGE", "6 mesh harmonics"),
-    ("dynamics.response_harmonics", 5, "E-RANGE", "12 or more"),
+    ("dynamics", {"mesh_harmonics": 6, "response_harmonics": 5}, "E-RANGE", "12 or more"),
+    ("dynamics", {"mesh_harmonics": 6, "up_to": "20 kHz"}, "E-RANGE", "given twice"),
+    ("dynamics", {"response_harmonics": 18}, "E-RANGE", "together with dynamics.mesh_harmonics"),
+    ("dynamics.up_to", "300 kHz", "E-RANGE", "200000 Hz"),
+    ("housing", {"form": "linear", "points": 55}, "E-POINTS", "multiple of 3"),
+    ("housing.form", "hat", "E-CHOICE", "'linear'"),
     ("dynamics.damping_ratio", math.nan, "E-FINITE", "dynamics.damping_ratio"),  # 10
     pytest.param("dynamics.damping_ratio", 10**5000, "E-RANGE", "too long", id="5000 digits"),  # 12
     pytest.param("sun.teeth", 10**1000, "E-RANGE", "5 to 5000", id="1000 digits"),  # 12
@@ -518,7 +524,8 @@ def test_published_lines_need_their_speed_and_harmonic(tmp_path):
     error = refused(replaced('speeds = ["250 rpm", "3100 rpm"]', 'speeds = ["250 rpm"]'), tmp_path)
     assert [p.key for p in error.problems] == [f"housing.published[{i}].speed" for i in (1, 2)]
     assert {p.code for p in error.problems} == {"E-PUBLISHED"} and error.problems[0].value == "3100 rpm"
-    error = refused(replaced("harmonic = 6", "harmonic = 19"), tmp_path)
+    six = replaced("tolerance = 1e-6", "tolerance = 1e-6\nmesh_harmonics = 6")
+    error = refused(replaced("harmonic = 6\norders", "harmonic = 19\norders", six), tmp_path)
     assert error.key == "housing.published[2].harmonic" and "1 to 18" in error.limit
 
 

@@ -13,7 +13,7 @@ LAYERS = (
     ("files", "system", "threads"),
     ("gears", "fe", "casefile", "netcdf", "solvers"),
     ("contact", "models", "housing", "case"),
-    ("storage", "datasets", "plots", "scene"),
+    ("storage", "datasets", "plots", "scene", "dependencies", "frequency_limit"),
     ("analysis", "design", "summary"),
     ("report", "optimisation", "validation", "pictures"),
     ("run",),

@@ -91,22 +91,55 @@ def _check_supports(case: Case):
 
 
 def _check_numbers(case: Case):
-    positions, dynamics = case.static.positions, case.dynamics
-    if positions <= 2 * dynamics.mesh_harmonics:
+    dynamics, harmonics = case.dynamics, case.mesh_harmonics
+    rigid = case.planar is not None or case.helical is not None
+    # the record of rigid bodies is that of the static positions
+    if rigid and case.static.positions <= 2 * harmonics:
         yield CaseError(
-            f"{positions} positions cannot carry {dynamics.mesh_harmonics} mesh harmonics",
+            f"{case.static.positions} positions cannot carry {harmonics} mesh harmonics",
             code="E-RANGE",
             key="static.positions",
-            value=positions,
-            limit=f"more than 2 x {dynamics.mesh_harmonics}",
+            value=case.static.positions,
+            limit=f"more than 2 x {harmonics}",
         )
-    if case.response_harmonics < 2 * dynamics.mesh_harmonics:
+    if harmonics is not None and case.response_harmonics < 2 * harmonics:
         yield CaseError(
             "the response needs twice the harmonics of the mesh: the product of both reaches that far",
             code="E-RANGE",
             key="dynamics.response_harmonics",
             value=case.response_harmonics,
-            limit=f"{2 * dynamics.mesh_harmonics} or more",
+            limit=f"{2 * harmonics} or more",
+        )
+    if dynamics.up_to is not None and (rigid or dynamics.mesh_harmonics is not None):
+        yield CaseError(
+            "the reach of the excitation is given twice"
+            if dynamics.mesh_harmonics is not None
+            else "rigid bodies are excited by mesh harmonics, not up to a frequency",
+            code="E-RANGE",
+            key="dynamics.up_to",
+            value=f"{dynamics.up_to:g} Hz",
+            limit="one of up_to and mesh_harmonics; rigid bodies have mesh_harmonics alone",
+            remedy="leave dynamics.up_to out" if rigid else "leave out one of the two",
+        )
+    if harmonics is None and dynamics.response_harmonics is not None:
+        yield CaseError(
+            "the harmonics of the response follow from the reach of the excitation",
+            code="E-RANGE",
+            key="dynamics.response_harmonics",
+            value=dynamics.response_harmonics,
+            limit="together with dynamics.mesh_harmonics",
+            remedy="give dynamics.mesh_harmonics too, or leave dynamics.response_harmonics out",
+        )
+    planets = case.set.planets
+    if case.housing.form == "linear" and case.set.planet_angles is None and case.housing.points % planets:
+        yield CaseError(
+            f"{case.housing.points} points break the symmetry of {planets} equally spaced planets: the "
+            "interpolation between them makes carrier orders that cannot exist",
+            code="E-POINTS",
+            key="housing.points",
+            value=case.housing.points,
+            limit=f"a multiple of {planets}",
+            remedy=f"write {planets * round(case.housing.points / planets) or planets}, or leave housing.form out",
         )
 
 

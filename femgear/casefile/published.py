@@ -28,13 +28,14 @@ def check_published(case: Case) -> Iterator[CaseError]:
                 limit=_speeds(case),
                 remedy="add it to operation.speeds, or leave the published lines out",
             )
-        if entry.harmonic > case.response_harmonics:
+        computed = case.response_harmonics
+        if computed is not None and entry.harmonic > computed:
             yield CaseError(
                 "this mesh harmonic is not computed",
                 code=CODE,
                 key=f"{key}.harmonic",
                 value=entry.harmonic,
-                limit=f"1 to {case.response_harmonics}, the harmonics of the response",
+                limit=f"1 to {computed}, the harmonics of the response",
                 remedy="raise dynamics.response_harmonics, or leave the published lines out",
             )
 

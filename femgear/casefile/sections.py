@@ -24,6 +24,7 @@ from femgear.casefile.units import (
     ANGLE,
     DENSITY,
     FOUNDATION,
+    FREQUENCY,
     INERTIA,
     LENGTH,
     MASS,
@@ -214,10 +215,15 @@ class StaticSection(_Section):
 
 
 class DynamicsSection(_Section):
-    """Modal damping, harmonics of the mesh frequency and tolerance of the periodic solution."""
+    """Modal damping, reach of the excitation and tolerance of the periodic solution.
+
+    The excitation of an elastic ring's set ends at the frequency ``up_to``, or after ``mesh_harmonics``; where
+    neither is given it reaches so far that the level of the housing no longer changes.
+    """
 
     damping_ratio: Number(0.0, 1.0, open_high=True) = 0.05
-    mesh_harmonics: Count(1, 200) = 6
+    up_to: Quantity(FREQUENCY, 10.0, 200e3) | None = None
+    mesh_harmonics: Count(1, 512) | None = None
     response_harmonics: Count(1, 1000) | None = None
     tolerance: Number(1e-14, 1e-2) = 1e-6
 
@@ -233,8 +239,13 @@ class PublishedLines(_Section):
 
 
 class HousingSection(_Section):
-    """Points of the carrier-frame ring and the fixed sensor."""
+    """The fixed sensor, and how the ring's field is carried to it.
 
+    ``form = "exact"`` hears every circumferential component at its own order; ``"linear"`` is the
+    interpolation between ``points`` points of the paper on carrier modulation, with its images.
+    """
+
+    form: Literal["exact", "linear"] = "exact"
     points: Count(3, 100_000) = 54
     sensor_angle: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = 0.0
     published: tuple[PublishedLines, ...] = ()
@@ -276,6 +287,13 @@ class Case(_Section, ReadCase):
         return data
 
     @property
-    def response_harmonics(self) -> int:
-        """Harmonics of the response: as given, or three times those of the mesh."""
-        return self.dynamics.response_harmonics or 3 * self.dynamics.mesh_harmonics
+    def mesh_harmonics(self) -> int | None:
+        """Harmonics of the excitation: as given, 6 of rigid bodies, None where a frequency limits them."""
+        rigid = self.helical is not None or self.planar is not None
+        return self.dynamics.mesh_harmonics or (6 if rigid else None)
+
+    @property
+    def response_harmonics(self) -> int | None:
+        """Harmonics of the response: as given, or three times those of the mesh; None as there."""
+        found = self.mesh_harmonics
+        return self.dynamics.response_harmonics or (None if found is None else 3 * found)

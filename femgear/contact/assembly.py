@@ -155,12 +155,11 @@ def mesh_windows(
     bodies: Bodies,
     *,
     share: float,
-    positions: int,
+    positions: int | np.ndarray,
     cells: int,
     nearest: float,
     contact: str,
     periods: int = 1,
-    first: int = 0,
     deviations: SetDeviations | None = None,
     planet_gaps=None,
     both_flanks: bool = False,
@@ -173,8 +172,8 @@ def mesh_windows(
     bodies : Bodies
     share : float
         Mesh force that sizes the windows [N].
-    positions : int
-        Positions in one mesh period.
+    positions : int or (P,) array
+        Number of equidistant positions in one mesh period, or the positions themselves [mesh periods].
     cells : int
         Pressure cells in a window.
     nearest : float
@@ -182,8 +181,6 @@ def mesh_windows(
     contact : {"profile", "line_of_action"}
     periods : int
         Number of mesh periods.
-    first : int
-        Number of the first position, zero being where "sun-planet 1" touches at its pitch point.
     deviations : SetDeviations, optional
     planet_gaps : (N,) array, optional
         Extra separation of the sun-side flanks of each planet [m].
@@ -192,9 +189,9 @@ def mesh_windows(
     """
     pitch = planetary_set.sun.base_pitch
     pairs = mesh_pairs(planetary_set)
-    tau = (first + np.arange(positions * periods)) / positions
+    tau = cycle_positions(positions, periods=periods)
     # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
-    turns = -(-first // positions) + np.arange(positions * periods) // positions
+    turns = (np.ceil(tau) if tau[-1] <= 0.0 else np.floor(tau)).astype(int)
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
     count = int(np.ceil(end - begin)) + 4
@@ -217,6 +214,13 @@ def mesh_windows(
         teeth.append(tooth)
     tooth = tuple(np.concatenate([t[gear] for t in teeth]) for gear in (0, 1))
     return _gather(found, tooth, turns, planetary_set.n_planets, bodies, cells)
+
+
+def cycle_positions(positions, *, periods: int = 1) -> np.ndarray:
+    """Positions in mesh periods, (P,): as given, or equidistant ones from the pitch point on."""
+    if np.ndim(positions):
+        return np.asarray(positions, float)
+    return np.arange(positions * periods) / positions
 
 
 def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells, nearest, contact):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -104,6 +104,23 @@ def make_bodies(
         stiffness, held = stiffness + ring_foundation, None
     compliances.append(flank_compliance(ring.grid, ring.gear, material, stiffness, held=held, depth=depth))
     return Bodies(*compliances, material=material, face_width=sectors.sun.gear.face_width)
+
+
+def ring_on_foundation(bodies: Bodies, sectors: Sectors, ring_foundation, *, depth: float | None) -> Bodies:
+    """The same bodies with the ring on an elastic foundation instead of held at its outer surface.
+
+    Parameters
+    ----------
+    bodies, sectors : Bodies, Sectors
+    ring_foundation : sparse matrix
+        Stiffness of the foundation of one sector [N/m].
+    depth : float, optional
+        As for `make_bodies`.
+    """
+    ring = sectors.ring
+    stiffness = ring.stiffness + ring_foundation
+    found = flank_compliance(ring.grid, ring.gear, bodies.material, stiffness, held=None, depth=depth)
+    return replace(bodies, ring=found)
 
 
 def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> np.ndarray:

@@ -13,12 +13,13 @@ from femgear.contact.assembly import (
     ContactProblem,
     MeshWindows,
     assemble_contact,
+    cycle_positions,
     mesh_windows,
     rotation_approach,
 )
 from femgear.contact.bearings import BearingSprings, bearing_springs, pin_forces, solve_position
 from femgear.contact.record import MeshCycle, cycle_without_load
-from femgear.contact.solve import tangent_stiffness
+from femgear.contact.solve import mesh_tangent_matrix, tangent_stiffness
 from femgear.contact.supports import RIGID, MovingMembers, Supports, moving_members
 from femgear.errors import ContactError
 
@@ -41,7 +42,7 @@ def walk_mesh_cycle(
     bodies: Bodies,
     *,
     sun_torque: float,
-    positions: int = 64,
+    positions: int | np.ndarray = 64,
     contact: str = "profile",
     cells: int = 36,
     deviations: SetDeviations | None = None,
@@ -50,7 +51,7 @@ def walk_mesh_cycle(
     planet_gaps=None,
     both_flanks: bool = False,
     pressures: bool = False,
-    first_position: int = 0,
+    coupling: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> MeshCycle:
     """Static transmission error, load sharing and mesh stiffness over the mesh cycle.
@@ -66,8 +67,8 @@ def walk_mesh_cycle(
         Flank compliances and material.
     sun_torque : float
         Torque on the sun [N m], not negative (mirror the set for the other flanks).
-    positions : int
-        Number of equidistant positions in one mesh period.
+    positions : int or (P,) array
+        Number of equidistant positions in one mesh period, or the positions themselves [mesh periods].
     contact : {"profile", "line_of_action"}
         Candidates on the whole profiles, or only on the theoretical path of contact.
     cells : int
@@ -86,8 +87,8 @@ def walk_mesh_cycle(
         of teeth that are wedged.
     pressures : bool
         Keep the pressure distributions of the drive flanks.
-    first_position : int
-        Number of the first position; negative ones lie before the pitch point of "sun-planet 1".
+    coupling : bool
+        Keep the tangent compliance between all meshes.
     progress : callable, optional
         Called with (positions done, positions).
 
@@ -101,7 +102,7 @@ def walk_mesh_cycle(
         When the contact problem cannot be solved or no window size contains the contact.
     """
     N = planetary_set.n_planets
-    position = (first_position + np.arange(positions * periods)) / positions
+    position = cycle_positions(positions, periods=periods)
     nothing = cycle_without_load(
         N, position, periods=periods, contact=contact, cells=cells, pressures=pressures
     )
@@ -123,13 +124,12 @@ def walk_mesh_cycle(
             nearest=nearest,
             contact=contact,
             periods=periods,
-            first=first_position,
             deviations=deviations,
             planet_gaps=planet_gaps,
             both_flanks=both_flanks,
         )
         found, overflow, missed = _walk(
-            planetary_set, bodies, setup, sun_torque, members, springs, pressures, progress
+            planetary_set, bodies, setup, sun_torque, members, springs, pressures, coupling, progress
         )
         missed = missed if contact == "profile" else 0.0
         if not overflow and missed <= nearest:
@@ -154,7 +154,7 @@ def _enlarged(enlarge: float, share: float, force: float) -> float:
 
 
 def _walk(
-    planetary_set, bodies, setup: MeshWindows, sun_torque, members, springs, pressures, progress
+    planetary_set, bodies, setup: MeshWindows, sun_torque, members, springs, pressures, coupling, progress
 ) -> tuple[dict, bool, float]:
     """All positions with one set of windows, as fields of `MeshCycle`.
 
@@ -163,7 +163,7 @@ def _walk(
     N, P = planetary_set.n_planets, setup.positions
     load = np.zeros(N + 1 + int(members.free.sum()))
     load[N] = sun_torque / planetary_set.sun.base_radius
-    out = _empty_record(setup, members, pressures)
+    out = _empty_record(setup, members, pressures, coupling)
     previous, overflow, missed = None, False, 0.0
     for p in range(P):
         problem = assemble_contact(setup, bodies, p, members)
@@ -185,7 +185,7 @@ def _warm_start(problem: ContactProblem, previous: ContactProblem, active) -> np
     return np.concatenate([problem.warm_start(previous, active[:cells]), active[cells:]])
 
 
-def _empty_record(setup: MeshWindows, members: MovingMembers, pressures: bool) -> dict:
+def _empty_record(setup: MeshWindows, members: MovingMembers, pressures: bool, coupling: bool) -> dict:
     """Arrays that `_collect` fills; those of teeth and cells lead with all meshes, back sides included."""
     N, P, meshes = setup.n_planets, setup.positions, setup.near.shape[0]
     out = {name: np.zeros((2 * N, P)) for name in ("deflection", "force", "back_force", "stiffness")}
@@ -202,6 +202,8 @@ def _empty_record(setup: MeshWindows, members: MovingMembers, pressures: bool) -
     }
     if pressures:
         out["pressure"] = np.zeros((2 * N, setup.pairs, setup.gap.shape[-1], P))
+    if coupling:
+        out["compliance"] = np.zeros((2 * N, 2 * N, P))
     return out
 
 
@@ -262,8 +264,12 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     out["member_motion"][:, p] = motion
     moved = members.approach[: 2 * N] @ motion
     out["deflection"][:, p] = rotation_approach(N) @ state.motions[: N + 1] + moved
-    tangents = tangent_stiffness(problem.H, state.active, problem.mesh, meshes)
+    window = problem.mesh * setup.pairs + problem.pair
+    tangents = tangent_stiffness(problem.H, state, problem.mesh, window, problem.cell, meshes)
     out["stiffness"][:, p] = tangents.reshape(-1, 2 * N).sum(axis=0)
+    if "compliance" in out and (force[: 2 * N] > 0).all():
+        drive = state.active & (problem.mesh < 2 * N)
+        out["compliance"][..., p] = np.linalg.inv(mesh_tangent_matrix(problem.H, drive, problem.mesh, 2 * N))
     np.add.at(out["tooth_load"][:, :, p], (problem.mesh, problem.pair), loads)
     at_edge = problem.at_flank_end(state.active, setup)
     np.logical_or.at(out["edge_contact"][:, p], problem.mesh, at_edge)

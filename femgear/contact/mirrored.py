@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from femgear.contact.assembly import cycle_positions
 from femgear.contact.cycle import MeshCycle, walk_mesh_cycle
 from femgear.contact.mirror_image import mirrored_set
 from femgear.contact.supports import RIGID
@@ -27,6 +28,7 @@ def walk_either_flank(
     planet_gaps=None,
     both_flanks=False,
     pressures=False,
+    coupling=False,
     progress=None,
 ) -> MeshCycle:
     """`walk_mesh_cycle` for a torque of either sign; results keep the order of planets and positions.
@@ -37,12 +39,12 @@ def walk_either_flank(
     hold the same configurations too.
     """
     options = {
-        "positions": positions,
         "contact": contact,
         "supports": supports,
         "periods": periods,
         "both_flanks": both_flanks,
         "pressures": pressures,
+        "coupling": coupling,
         "progress": progress,
     }
     if sun_torque >= 0:
@@ -50,6 +52,7 @@ def walk_either_flank(
             planetary_set,
             bodies,
             sun_torque=sun_torque,
+            positions=positions,
             deviations=deviations,
             planet_gaps=planet_gaps,
             **options,
@@ -64,7 +67,7 @@ def walk_either_flank(
         sun_torque=-sun_torque,
         deviations=deviations,
         planet_gaps=turned,
-        first_position=1 - positions * periods,
+        positions=-cycle_positions(positions, periods=periods)[::-1],
         **options,
     )
     return _seen_from_front(cycle, planetary_set, order)
@@ -86,9 +89,11 @@ def _seen_from_front(cycle: MeshCycle, planetary_set, order) -> MeshCycle:
         found["pressure"] = cycle.pressure[mesh][:, ::-1, ::-1, ::-1]
         found["pressure_offset"] = -cycle.pressure_offset[mesh][:, ::-1]
         found["pressure_centre"] = -cycle.pressure_centre[mesh][:, ::-1, ::-1]
+    if cycle.compliance is not None:
+        found["compliance"] = cycle.compliance[mesh][:, mesh][:, :, ::-1]
     return replace(
         cycle,
-        position=np.abs(cycle.position[::-1]),
+        position=0.0 - cycle.position[::-1],
         open_planets=cycle.open_planets[planet][:, ::-1],
         bearing_force=_reflected(cycle.bearing_force, axis)[planet][:, :, ::-1],
         member_motion=_reflected_motion(cycle, axis, planet)[:, ::-1],

@@ -75,6 +75,9 @@ class MeshCycle:
     pressure_centre : (2N, T, P) array, optional
         Place of the middle of each window from the point on the path [m]: zero but for windows that end at
         the end of a flank or follow modified profiles. To be added to `pressure_offset`.
+    compliance : (2N, 2N, P) array, optional
+        Tangent compliance between the meshes through their common bodies, supports left out [m/N]; zero
+        where a mesh carries nothing.
     """
 
     position: np.ndarray
@@ -104,6 +107,7 @@ class MeshCycle:
     pressure: np.ndarray | None = None
     pressure_offset: np.ndarray | None = None
     pressure_centre: np.ndarray | None = None
+    compliance: np.ndarray | None = None
 
     @property
     def overall_deflection(self) -> np.ndarray:

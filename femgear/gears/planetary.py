@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 
@@ -166,6 +167,33 @@ class PlanetarySet:
         sun_planet = -(psi - psi[0]) * self.sun.teeth / (2.0 * math.pi)
         planet_ring = sun_planet - _planet_lag(self)
         return _fraction(np.concatenate([sun_planet, planet_ring]))
+
+    def equal_positions(self, wanted: int) -> int:
+        """Number of equidistant positions of a mesh period, `wanted` at least, that meet all planets alike.
+
+        A multiple of the common denominator of their phases: every planet then passes the same places of its
+        own mesh period. Where that would be more than four times `wanted`, planets that a rotation maps onto
+        one another alone are met alike.
+        """
+        teeth = self.sun.teeth + self.ring.teeth
+        away = np.asarray(self.planet_angles) - self.planet_angles[0]
+        steps = np.rint(away * teeth / (2.0 * math.pi)).astype(int).tolist()
+        common = math.lcm(*(Fraction(step * self.sun.teeth, teeth).denominator for step in steps))
+        if common > 4 * wanted:
+            symmetry = self.rotations
+            common = symmetry // math.gcd(symmetry, self.sun.teeth)
+        return common * -(-wanted // common)
+
+    @property
+    def rotations(self) -> int:
+        """Number of rotations that map the planets onto one another: N where they are equally spaced."""
+        psi, N = np.asarray(self.planet_angles), self.n_planets
+        for turns in range(N, 1, -1):
+            if N % turns == 0:
+                away = np.roll(psi, -(N // turns)) - psi - 2.0 * math.pi / turns
+                if np.abs(np.mod(away + math.pi, 2.0 * math.pi) - math.pi).max() < 1e-9:
+                    return turns
+        return 1
 
 
 def close_set(

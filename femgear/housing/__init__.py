@@ -20,6 +20,7 @@ from femgear.housing.orders import (
     dominant_lines,
     envelope,
     line_sources,
+    order_level,
     order_spectrum,
     symmetry_leakage,
 )
@@ -44,6 +45,7 @@ __all__ = [
     "heaviside_linear",
     "heaviside_linear_lines",
     "line_sources",
+    "order_level",
     "order_spectrum",
     "passages",
     "phased_harmonics",

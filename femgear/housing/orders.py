@@ -131,6 +131,11 @@ def order_spectrum(signal, *, revolutions: int = 1) -> OrderSpectrum:
     return OrderSpectrum(np.arange(value.shape[-1]) / revolutions, value, int(revolutions))
 
 
+def order_level(lines) -> np.ndarray:
+    """Root mean square of the acceleration of a fixed sensor [m/s^2], shape (...), from its `SensorLines`."""
+    return np.sqrt(0.5 * (np.abs(lines.acceleration[..., 1:]) ** 2).sum(axis=-1))
+
+
 def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum:
     """Spectrum with the orders low..high (both included) alone; a brick wall, exact for periodic signals.
 

@@ -1,14 +1,13 @@
 """Planetary set with an elastic toothed ring: rigid sun, planets and carrier, FE ring on a foundation.
 
 All bodies move in the plane; coordinates are those of the carrier frame, in which the mean motion is
-removed. The gyroscopic and convective terms of that frame are left out, as in the modulation paper
-("Vibratory response of planetary gear sets housing by a spectral iterative approach"): they are of the
-order of the carrier speed over the natural frequencies.
+removed. `elastic_set`, and with it the dynamics, leaves the gyroscopic and convective terms of that frame
+out; `turning_system` adds them, to see what they do to the natural frequencies.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -85,6 +84,7 @@ def elastic_set(
     brake: ShaftData | None,
     sun_torque: float,
     driven: str = "sun",
+    flexibility=None,
 ) -> ElasticSet:
     """Assemble the mechanical system.
 
@@ -101,6 +101,8 @@ def elastic_set(
         Torque on the sun [N m]; its sign tells which flanks carry.
     driven : {"sun", "carrier"}
         Input member.
+    flexibility : (2N, 2N) array, optional
+        Compliance of the bodies between the meshes, see `body_flexibility` [m/N].
     """
     motor_shaft, brake_shaft = ("motor", motor), ("brake", brake)
     names = rigid_dofs(planetary_set.n_planets, motor is not None, brake is not None)
@@ -129,6 +131,7 @@ def elastic_set(
         for m, p in zip(ring_mode, ring_phase)
     )
     system = MechanicalSystem(M=np.diag(M), C=np.zeros((n, n)), K=K, W=W, load=load, dofs=names + ring_names)
+    system = replace(system, flexibility=flexibility)
     return ElasticSet(
         system=system,
         rigid_directions=rigid,
@@ -207,8 +210,30 @@ def _mesh_directions(W, place, planetary_set, side):
         W[place[f"planet {n + 1}: rotation"], N + n] = -side * s.planet.base_radius
 
 
+def highest_mesh_mode(
+    planetary_set: PlanetarySet, stiffness, *, sun: BodyData, carrier: BodyData, planet: BodyData, sun_torque
+) -> float:
+    """Highest natural frequency of the rigid sun and planets on their meshes and a rigid ring [Hz].
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    stiffness : (2N,) array
+        Mean mesh stiffness [N/m].
+    sun, carrier, planet, sun_torque
+        As for `elastic_set`.
+    """
+    names = rigid_dofs(planetary_set.n_planets, False, False)
+    place = {name: i for i, name in enumerate(names)}
+    M, K, W = np.zeros(len(names)), np.zeros((len(names),) * 2), np.zeros((len(names), len(stiffness)))
+    _place_bodies(M, K, place, planetary_set, sun, carrier, planet)
+    _mesh_directions(W, place, planetary_set, 1.0 if sun_torque >= 0 else -1.0)
+    K += (W * stiffness) @ W.T
+    return float(np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(M, M)))[-1]) / (2 * np.pi))
+
+
 def ring_mesh_compliance(harmonic_compliance, nodal_diameters, count, angles) -> np.ndarray:
-    """Static compliance between the ring's mesh points with the outer surface held, shape (N, N) [m/N].
+    """Static compliance of the dynamic ring between its mesh points, shape (N, N) [m/N].
 
     Parameters
     ----------
@@ -228,11 +253,30 @@ def ring_mesh_compliance(harmonic_compliance, nodal_diameters, count, angles) ->
     return np.einsum("n,n,nij->ij", weight, np.asarray(harmonic_compliance), wave.conj()).real
 
 
-def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) -> MeshExcitation:
-    """Mesh springs of the dynamic model: the static meshes less what the ring model keeps elastic.
+def body_flexibility(compliance, ring_compliance) -> np.ndarray:
+    """Compliance between the meshes through their bodies that neither springs nor ring modes hold, (2N, 2N).
+
+    Parameters
+    ----------
+    compliance : (2N, 2N) array
+        Between the static meshes [m/N]; its diagonal belongs to the mesh springs.
+    ring_compliance : (N, N) array
+        That of the dynamic ring, see `ring_mesh_compliance` [m/N].
+    """
+    N = len(ring_compliance)
+    flexibility = 0.5 * (compliance + compliance.T)
+    flexibility[N:, N:] -= ring_compliance
+    np.fill_diagonal(flexibility, 0.0)
+    return flexibility
+
+
+def mesh_excitation(
+    stiffness, deflection, force, ring_compliance, *, flexibility=None, backlash
+) -> MeshExcitation:
+    """Mesh springs of the dynamic model: the static meshes less what the other parts keep elastic.
 
     ``1/k_dyn = 1/k - c_jj`` for the tangent stiffness, and ``delta - C F`` for the deflection, with ``C`` the
-    compliance of the dynamic ring between its mesh points, outer surface held.
+    compliance of the dynamic ring between its mesh points and of the bodies between theirs.
 
     Parameters
     ----------
@@ -240,6 +284,8 @@ def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) 
         Tangent stiffness [N/m], deflection [m] and force [N] of the static meshes.
     ring_compliance : (N, N) array
         See `ring_mesh_compliance` [m/N].
+    flexibility : (2N, 2N) array, optional
+        See `body_flexibility` [m/N].
     backlash : float or (2N,) array
         [m].
 
@@ -248,10 +294,11 @@ def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) 
     CaseError
         Without torque there is no mesh stiffness to linearise.
     ContactError
-        When a mesh opens at some position, or the ring is softer than its mesh.
+        When a mesh opens at some position, or the bodies are softer than their meshes.
     """
     force, stiffness = np.asarray(force), np.asarray(stiffness)
     N = len(force) // 2
+    flexibility = np.zeros((2 * N, 2 * N)) if flexibility is None else flexibility
     if not force.any():
         raise CaseError(
             "without torque no tooth carries load, so there is no mesh stiffness for the dynamic model",
@@ -272,11 +319,12 @@ def mesh_excitation(stiffness, deflection, force, ring_compliance, *, backlash) 
     own = np.zeros((2 * N, 1))
     own[N:, 0] = np.diag(ring_compliance)
     remaining = 1.0 / stiffness - own
-    if remaining.min() <= 0:
+    between = np.diag(remaining.min(axis=1)) + flexibility
+    if remaining.min() <= 0 or np.linalg.eigvalsh(between)[0] <= 0:
         raise ContactError(
             "the compliance of the ring model exceeds that of the loaded mesh", code="E-RING-COMPLIANCE"
         )
-    spring = np.array(deflection)
+    spring = deflection - flexibility @ force
     spring[N:] -= ring_compliance @ force[N:]
     return MeshExcitation(
         stiffness=1.0 / remaining,
@@ -319,3 +367,84 @@ def ring_field(
     mirrored = inside & ~single
     np.add.at(columns, (row[mirrored], max_diameter - n[mirrored]), (half * np.conj(turn * value))[mirrored])
     return np.asarray(coordinates) @ columns
+
+
+def turning_system(model: ElasticSet, *, centre_distance: float, carrier_speed: float) -> MechanicalSystem:
+    """Add the inertia terms of the turning carrier frame to the matrices of the set.
+
+    A body of mass m at rest in that frame has ``m (x'' - 2 Omega y' - Omega^2 x)`` and
+    ``m (y'' + 2 Omega x' - Omega^2 y)`` (J. Lin and R. G. Parker, J. Vib. Acoust. 121, 1999, 316-321). The
+    ring does not turn: its points run backwards through the frame, ``d/dt - Omega d/dphi`` (S. C. Huang and
+    W. Soedel, J. Sound Vib. 115, 1987, 253-274). The pair ``q = c - i s`` of n nodal diameters, displacement
+    ``Re(q U e^{i n phi})``, has the velocity ``q' - i n Omega q``: the terms of a body of mass 1 at the speed
+    ``n Omega``. Alone it has ``f +- n Omega / 2 pi`` in the frame and f on the ring.
+
+    The centrifugal force ``m Omega^2 a`` of a planet pulls its pin outwards; when the carrier turns by theta
+    the pin comes inwards by ``a theta^2 / 2``, which stiffens that rotation by ``m (Omega a)^2`` a planet. It
+    balances the centripetal term of the planets, so that the rotation of the mechanism stays free.
+
+    Parameters
+    ----------
+    model : ElasticSet
+    centre_distance : float
+        Of sun and planets, a [m].
+    carrier_speed : float
+        Mean speed Omega of the carrier [rad/s].
+
+    Returns
+    -------
+    MechanicalSystem
+        ``gyroscopic`` multiplies the carrier speed; K holds the centripetal terms, the load the centrifugal
+        forces of the planets.
+    """
+    system = model.system
+    place, mass = {name: i for i, name in enumerate(system.dofs)}, np.diag(system.M)
+    x = np.array([i for name, i in place.items() if name.endswith(": x")])
+    sine = model.ring_slice.start + np.flatnonzero(model.ring_phase == 1)
+    diameter = model.ring_diameter[sine - model.ring_slice.start]
+    first, second = np.concatenate([x, sine - 1]), np.concatenate([x + 1, sine])
+    waves = np.concatenate([np.ones(len(x)), diameter])
+    gyroscopic, centripetal, load = np.zeros_like(system.K), np.zeros(len(mass)), system.load.copy()
+    gyroscopic[first, second] = -2.0 * waves * mass[first]
+    gyroscopic[second, first] = 2.0 * waves * mass[first]
+    centripetal[first] = centripetal[second] = waves**2 * mass[first]
+    for number, psi in enumerate(model.planet_angles):
+        i = place[f"planet {number + 1}: x"]
+        centripetal[place["carrier: rotation"]] -= mass[i] * centre_distance**2
+        outwards = carrier_speed**2 * mass[i] * centre_distance
+        load[i : i + 2] += outwards * np.array([np.cos(psi), np.sin(psi)])
+    K = system.K - carrier_speed**2 * np.diag(centripetal)
+    return replace(system, K=K, load=load, gyroscopic=gyroscopic)
+
+
+def ring_wave_shares(model: ElasticSet, shape) -> np.ndarray:
+    """Share the kinetic energy of complex modes out among the travelling waves of the ring.
+
+    Parameters
+    ----------
+    model : ElasticSet
+    shape : (n, m) complex array
+        Mode shapes, motion ``Re(shape e^{i omega t})``.
+
+    Returns
+    -------
+    (2 n_max + 1, m) array
+        Row ``n_max + n``: the part of the whole that the waves ``e^{i n phi} e^{i omega t}`` hold, phi in the
+        carrier frame; a point of the ring hears them at ``omega - n Omega``. Standing waves have equal parts
+        of n and -n; the other bodies hold what the sum over n misses.
+    """
+    shape = np.asarray(shape, complex)
+    total = np.einsum("im,ij,jm->m", shape.conj(), model.system.M, shape).real
+    ring, n = shape[model.ring_slice], model.ring_diameter
+    largest = int(n.max(initial=0))
+    shares = np.zeros((2 * largest + 1, shape.shape[1]))
+    single = np.ones(len(n), bool)
+    sine = np.flatnonzero(model.ring_phase == 1)
+    single[sine] = single[sine - 1] = False
+    for sign in (1, -1):
+        wave = np.abs(ring[sine - 1] - sign * 1j * ring[sine]) ** 2 / 2.0
+        np.add.at(shares, largest + sign * n[sine], wave)
+    alone = np.flatnonzero(single)
+    for row in (largest + n[alone], largest - n[alone]):
+        np.add.at(shares, row, 0.5 * np.abs(ring[alone]) ** 2)
+    return shares / total

@@ -33,14 +33,13 @@ class RingModel:
         displacement of the outer surface above a tooth.
     load_angle : float
         Angle from a planet to the centre of the ring tooth that it loads [rad].
-    held_compliance : (n_max + 1,) array
-        Compliance of each nodal diameter at the load [m/N], the outer surface as in the static meshes: held,
-        or on its foundation.
+    compliance : (n_max + 1,) array
+        Static compliance of each nodal diameter at the load, on the foundation [m/N].
     """
 
     modes: CyclicModes
     load_angle: float
-    held_compliance: np.ndarray
+    compliance: np.ndarray
 
 
 def outer_surface_outputs(grid: Grid) -> np.ndarray:
@@ -63,7 +62,6 @@ def ring_model(
     max_diameter: int,
     max_frequency: float,
     side: float = 1.0,
-    static_on_foundation: bool = False,
 ) -> RingModel:
     """Ring modes for nodal diameters 0..max_diameter.
 
@@ -81,8 +79,6 @@ def ring_model(
         Modes beyond are represented by their static part [Hz].
     side : float
         Sign of the sun's torque: which flanks carry.
-    static_on_foundation : bool
-        Whether the static meshes contain the ring on its foundation rather than held at its outer surface.
     """
     from femgear.fe.compliance import condense_sector, cyclic_harmonics
     from femgear.fe.reduction import cyclic_modes, sector_basis
@@ -99,11 +95,12 @@ def ring_model(
         outputs=outer_surface_outputs(grid),
         max_frequency=max_frequency,
     )
-    matrix, boundary = (stiffness + foundation, None) if static_on_foundation else (stiffness, "rim")
-    held = condense_sector(grid, matrix, count=ring.teeth, held=boundary, loads=load, observations=load)
+    condensed = condense_sector(
+        grid, stiffness + foundation, count=ring.teeth, held=None, loads=load, observations=load
+    )
     pitch_radius = ring.base_radius / np.cos(planetary_set.working_pressure_angle_planet_ring)
     return RingModel(
         modes=modes,
         load_angle=-side * float(half_thickness_angle(ring, pitch_radius)),
-        held_compliance=cyclic_harmonics(held, diameters)[:, 0, 0].real,
+        compliance=cyclic_harmonics(condensed, diameters)[:, 0, 0].real,
     )

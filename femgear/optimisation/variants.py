@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear import analysis
-from femgear.analysis_checks import check_dynamic_case, check_motions, check_rim_speed, highest_frequency
+from femgear.analysis_checks import check_dynamic_case, check_motions, check_rim_speed
 from femgear.case import Case, planetary_set, set_deviations, with_value
 from femgear.casefile.units import SPEED
+from femgear.dependencies import static_entries
 from femgear.errors import CaseError
 from femgear.threads import one_blas_thread
 
@@ -183,7 +184,7 @@ def _static(case: Case, shared: Shared) -> StaticResult:
         gears,
         first.bodies,
         sun_torque=sun_torque,
-        positions=case.static.positions,
+        positions=gears.equal_positions(case.static.positions),
         contact=case.static.contact,
         deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
         supports=RIGID if case.static.members == "fixed" else case_supports(case),
@@ -191,49 +192,37 @@ def _static(case: Case, shared: Shared) -> StaticResult:
         both_flanks=case.static.back_flanks,
     )
     check_motions(cycle, gears.sun.module)
-    return replace(first, planetary_set=gears, cycle=cycle, sun_torque=sun_torque, period_message=message)
+    return replace(
+        first,
+        planetary_set=gears,
+        cycle=cycle,
+        sun_torque=sun_torque,
+        entries=static_entries(case),
+        period_message=message,
+    )
 
 
 @one_blas_thread()
 def _modal_basis(case: Case, static: StaticResult, shared: Shared) -> ModesResult:
-    """As `analysis.solve_modes`, with ring and bodies of an earlier variant; modes have no names then."""
-    from femgear.models.elastic import mesh_excitation, ring_mesh_compliance
-    from femgear.solvers.modal import solve_modes as modal_basis
-
+    """As `analysis.solve_modes`, with ring and bodies of an earlier variant."""
     first, new = shared.take(model_key(case), lambda: analysis.solve_modes(case, static))
     if new:
         return first
-    gears, cycle = static.planetary_set, static.cycle
-    check_dynamic_case(case, gears)
-    compliance = ring_mesh_compliance(
-        first.ring.held_compliance, np.arange(first.max_diameter + 1), gears.ring.teeth, gears.planet_angles
+    check_dynamic_case(case, planetary_set(case))
+    state = analysis.state_on_supports(case, first.bodies, static.sun_torque)
+    if analysis.excitation_reach(case, state, static.sun_torque) != first.reach:
+        return analysis.solve_modes(case, static)
+    return analysis.modal_basis(
+        case, first.ring, first.bodies, state, sun_torque=static.sun_torque, reach=first.reach
     )
-    excitation = mesh_excitation(
-        cycle.stiffness, cycle.deflection, cycle.force, compliance, backlash=first.excitation.backlash
-    )
-    modes = modal_basis(
-        first.model.system,
-        excitation.stiffness.mean(axis=1),
-        damping_ratio=case.dynamics.damping_ratio,
-        max_frequency=highest_frequency(case, gears),
-    )
-    return replace(first, excitation=excitation, modes=modes)
 
 
 @one_blas_thread()
 def _response(case: Case, modes: ModesResult) -> Response:
-    """As `analysis.solve_dynamics` without Floquet verdict and fields, which take most of its time."""
-    from femgear.gears import speeds
-    from femgear.solvers.spectral import solve_spectral
-
-    gears = planetary_set(case)
-    found = [speeds(gears, input=case.operation.input, fixed="ring", speed=s) for s in case.operation.speeds]
+    """As `analysis.solve_dynamics` without stability, fields and another look beyond the frequency limit."""
+    found = analysis.turning_speeds(case, planetary_set(case))
     check_rim_speed(modes.ring.modes, [s.carrier for s in found])
-    return solve_spectral(
-        modes.modes,
-        modes.excitation,
-        np.array([s.mesh_frequency for s in found]),
-        excitation_harmonics=case.dynamics.mesh_harmonics,
-        response_harmonics=case.response_harmonics,
-        tolerance=case.dynamics.tolerance,
-    )
+    frequency = np.array([s.mesh_frequency for s in found])
+    return analysis.periodic_response(
+        case, modes, frequency, modes.reach, given=case.dynamics.mesh_harmonics
+    )[1]

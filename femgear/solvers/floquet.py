@@ -145,6 +145,36 @@ def stability(
     return Stability(frequency, multiplier, np.maximum(moving, 0), taken)
 
 
+def decisive_harmonics(modes: Modes, excitation: MeshExcitation, kept: int, *, least: int = 6) -> int:
+    """Highest mesh harmonic of the stiffness that could by itself make the response unstable.
+
+    ``q'' + 2 zeta w q' + w^2 (1 + eps cos 2 w t) q = 0`` is stable below ``eps = 4 zeta`` (Nayfeh and Mook,
+    Nonlinear Oscillations, 1979, section 5.3), and a mode whose strain is all in the mesh has
+    ``eps = |k_h|/k_0``; half of that is taken.
+
+    Parameters
+    ----------
+    modes, excitation
+        As given to `stability`.
+    kept : int
+        Mesh harmonics of the response.
+    least : int
+        Smallest number, as far as there are so many.
+
+    Returns
+    -------
+    int
+        At most 64: the amplitudes fall as one over the harmonic.
+    """
+    most = min(kept, 64)
+    stiffness = np.abs(mesh_harmonics(excitation, most)[0])
+    damped = modes.damping_ratio[modes.frequency > 0.0].min(initial=1.0)
+    large = np.flatnonzero((stiffness[:, 1:] > 2.0 * damped * stiffness[:, :1]).any(axis=0))
+    # lines of a record of several periods
+    highest = 0 if not len(large) else -(-(int(large[-1]) + 1) // excitation.periods)
+    return min(most, max(least, highest))
+
+
 def monodromy(matrices, durations) -> np.ndarray:
     """Transition matrix over one period of ``x' = A x`` with A constant in pieces, by matrix exponentials.
 

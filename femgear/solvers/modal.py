@@ -55,6 +55,10 @@ def solve_modes(
     -----
     Residual flexibility ``W^T K^+ W - sum r r^T / omega^2``, ``r = W^T phi`` (Geradin and Rixen, Mechanical
     Vibrations, 3rd ed., section 2.9); ``K^+`` is the inverse on the motions free of rigid modes.
+
+    With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give ``d = S (W^T q - C g)``
+    and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the directions ``W S^T``, whose
+    total stiffness is ``W (k^-1 + C)^-1 W^T``, and the flexibility ``S C`` beside that of the modes left out.
     """
     stiffness = total_stiffness(system, mesh_stiffness)
     if count is not None and max_frequency is not None:
@@ -63,15 +67,18 @@ def solve_modes(
     rigid = _rigid(values, scale, len(system.M))
     if np.any(rigid):
         shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
-    rows = system.W.T @ shape
+    springs = spring_directions(system, mesh_stiffness)
+    rows = springs.T @ shape
     modal_load = shape.T @ system.load
     _check_rigid(system, shape[:, rigid])
     rows[:, rigid] = 0.0
     modal_load[rigid] = 0.0
     omega = np.sqrt(np.where(rigid, 0.0, values))
-    flexible = pseudo_solve(system.M, stiffness, shape[:, rigid], np.column_stack([system.W, system.load]))
-    static = system.W.T @ flexible
+    flexible = pseudo_solve(system.M, stiffness, shape[:, rigid], np.column_stack([springs, system.load]))
+    static = springs.T @ flexible
     residual = static[:, :-1] - _modal_flexibility(rows, rows, omega)
+    if system.flexibility is not None:
+        residual += _shared(system, mesh_stiffness) @ system.flexibility
     return Modes(
         frequency=omega / (2.0 * np.pi),
         damping_ratio=_damping(system, shape, omega, damping_ratio),
@@ -104,7 +111,8 @@ def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarr
         ``L K^+ W - sum (L phi) r^T / omega^2`` [m/N per unit of L].
     """
     outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
-    static = outputs @ pseudo_solve(*rigid_basis(system, modes), system.W)
+    springs = spring_directions(system, modes.mesh_stiffness)
+    static = outputs @ pseudo_solve(*rigid_basis(system, modes), springs)
     omega = 2.0 * np.pi * modes.frequency
     return static - _modal_flexibility(outputs @ modes.shape, modes.mesh_deflection, omega)
 
@@ -165,7 +173,21 @@ def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
             "real modes cannot carry gyroscopic terms", code="E-GYROSCOPIC", key="gyroscopic",
             remedy="leave them out of the system that is reduced to modes",
         )  # fmt: skip
-    return 0.5 * (system.K + system.K.T) + (system.W * meshes) @ system.W.T
+    carried = np.diag(meshes)
+    if system.flexibility is not None:
+        carried = meshes[:, None] * _shared(system, meshes)
+    return 0.5 * (system.K + system.K.T) + system.W @ carried @ system.W.T
+
+
+def spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+    """Directions (n, n_meshes) whose products with the motions are the deflections of the mesh springs."""
+    return system.W if system.flexibility is None else system.W @ _shared(system, mesh_stiffness).T
+
+
+def _shared(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+    """``(I + C k)^-1``: what the springs take of the mesh deflections, the bodies taking the rest."""
+    flexibility = system.flexibility
+    return np.linalg.inv(np.eye(len(flexibility)) + flexibility * np.asarray(mesh_stiffness, float))
 
 
 def _eigen(mass, stiffness, count, max_frequency):

@@ -26,8 +26,8 @@ def solve_spectral(
     excitation: MeshExcitation,
     mesh_frequency,
     *,
-    excitation_harmonics: int = 6,
-    response_harmonics: int = 12,
+    excitation_harmonics: int | np.ndarray = 6,
+    response_harmonics: int | np.ndarray = 12,
     tolerance: float = 1e-6,
     method: str = "auto",
     max_iterations: int = 100,
@@ -50,8 +50,9 @@ def solve_spectral(
     excitation : MeshExcitation
     mesh_frequency : float or (n_speeds,) array
         [Hz], not negative; zero gives the static response.
-    excitation_harmonics, response_harmonics : int
-        Mesh harmonics kept in the data and in the response; products are formed without aliasing.
+    excitation_harmonics, response_harmonics : int or (n_speeds,) int array
+        Mesh harmonics kept in the data and in the response, of all speeds or one a speed; products are formed
+        without aliasing. The result has as many harmonics as the speed with the most, zeros beyond its own.
     tolerance : float
         Relative change at which the fixed point stops; the full equations of a converged solution then hold
         to ten times that.
@@ -74,21 +75,19 @@ def solve_spectral(
         An undamped resonance, or equations that even the direct solution does not satisfy.
     """
     frequency = _checked(modes, excitation, mesh_frequency, method, tolerance, max_iterations)
-    if response_harmonics < excitation_harmonics:
-        raise CaseError(
-            f"{response_harmonics} response harmonics cannot follow {excitation_harmonics} of the excitation",
-            code="E-HARMONICS", key="response_harmonics", value=response_harmonics,
-            limit=f">= {excitation_harmonics}, better twice as many",
-        )  # fmt: skip
-    count = response_harmonics * excitation.periods
-    data = _Data.build(modes, excitation, excitation_harmonics, count)
+    kept = np.stack(np.broadcast_arrays(frequency, excitation_harmonics, response_harmonics)[1:]).astype(int)
+    _check_harmonics(*kept)
     options = (method, tolerance, max_iterations)
-    parts = [
-        _solve_batch(modes, data, frequency[start : start + _BATCH] / excitation.periods, options)
-        for start in range(0, len(frequency), _BATCH)
-    ]
-    joined = [np.concatenate(part) for part in zip(*parts)]
-    deflection, force, modal, residual, iterations, radius, direct = joined
+    top = int(kept[1].max()) * excitation.periods
+    found: list = [None] * len(frequency)
+    for harmonics, lines in np.unique(kept, axis=1).T:
+        data = _Data.build(modes, excitation, int(harmonics), int(lines) * excitation.periods)
+        chosen = np.flatnonzero((kept.T == (harmonics, lines)).all(axis=1))
+        for part in np.array_split(chosen, -(-len(chosen) // _BATCH)):
+            solved = _solve_batch(modes, data, frequency[part] / excitation.periods, options, top)
+            for i, *values in zip(part, *solved, strict=True):
+                found[i] = values
+    deflection, force, modal, residual, iterations, radius, tail, direct = map(np.array, zip(*found))
     converged = residual <= 10.0 * tolerance
     if method != "fixed point" and not np.all(converged):
         worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
@@ -99,13 +98,24 @@ def solve_spectral(
         )  # fmt: skip
     for array in (deflection, force, modal):
         array[~converged] = np.nan
-    tail = _tail(deflection)
+    tail = np.where(converged, tail, np.nan)
     return Response(
         mesh_frequency=frequency, deflection=deflection, force=force, modal=modal, converged=converged,
         residual=residual, iterations=iterations, spectral_radius=radius, tail=tail,
         method=tuple("direct" if flag else "fixed point" for flag in direct),
         message=_message(frequency, converged, direct, radius, tail, force), periods=excitation.periods,
     )  # fmt: skip
+
+
+def _check_harmonics(excitation_harmonics: np.ndarray, response_harmonics: np.ndarray) -> None:
+    short = response_harmonics < excitation_harmonics
+    if np.any(short):
+        wanted, given = excitation_harmonics[short][0], response_harmonics[short][0]
+        raise CaseError(
+            f"{given} response harmonics cannot follow {wanted} of the excitation",
+            code="E-HARMONICS", key="response_harmonics", value=int(given),
+            limit=f">= {wanted}, better twice as many",
+        )  # fmt: skip
 
 
 def _checked(modes, excitation, mesh_frequency, method, tolerance, max_iterations) -> np.ndarray:
@@ -156,8 +166,11 @@ class _Data:
         return cls(product_matrix(stiffness, count), forcing, twins)
 
 
-def _solve_batch(modes: Modes, data: _Data, fundamental: np.ndarray, options) -> tuple[np.ndarray, ...]:
-    """Deflection, force, modal coordinates, residual, iterations, radius and directness of some speeds."""
+def _solve_batch(modes, data: _Data, fundamental, options, top: int) -> tuple[np.ndarray, ...]:
+    """Deflection, force, modal coordinates, residual, iterations, radius, tail, directness of some speeds.
+
+    Harmonics are filled up with zeros to `top`.
+    """
     method, tolerance, max_iterations = options
     lines = np.arange(data.forcing.shape[-1])
     modal = operator.compliance(modes, 2.0 * np.pi * fundamental[:, None] * lines)
@@ -183,10 +196,9 @@ def _solve_batch(modes: Modes, data: _Data, fundamental: np.ndarray, options) ->
     if modes.modal_load is not None:
         work[..., 0] += modes.modal_load[:, None]
     coordinates = work.transpose(1, 0, 2) * modal.transpose(0, 2, 1)
-    return (
-        deflection.transpose(1, 0, 2), force.transpose(1, 0, 2), coordinates, residual, iterations, radius,
-        direct,
-    )  # fmt: skip
+    deflection, force = deflection.transpose(1, 0, 2), force.transpose(1, 0, 2)
+    lines = (pad(values, top) for values in (deflection, force, coordinates))
+    return (*lines, residual, iterations, radius, _tail(deflection), direct)
 
 
 def _solve(problem: HarmonicProblem, radius, method: str, tolerance: float, max_iterations: int):

@@ -40,7 +40,7 @@ def symmetry() -> tuple[Row, ...]:
     housing = reference_housing()
     rows = []
     for speed, label in enumerate(SPEEDS):
-        for name, lines in (("exact lines", housing.exact), ("linear interpolation", housing.linear)):
+        for name, lines in (("exact lines", housing.exact), ("linear interpolation", housing.lines)):
             leak = float(symmetry_leakage(_spectrum(lines, speed), 3))
             quantity = f"{label}, {name}: largest line off the multiples of 3 over the largest line"
             rows.append(at_most("symmetry", "McFadden and Smith 1985", quantity, 1e-8, leak))
@@ -51,7 +51,7 @@ def first_harmonic() -> tuple[Row, ...]:
     """250 rpm around the mesh frequency: dominating lines, lobes, Hanning model."""
     housing, dynamics = reference_housing(), reference_dynamics()
     rows = []
-    for name, lines in (("exact lines", housing.exact), ("linear interpolation", housing.linear)):
+    for name, lines in (("exact lines", housing.exact), ("linear interpolation", housing.lines)):
         band = _band(lines, SLOW, 1)
         low, high = _strongest(band)
         label = f"250 rpm, 1st mesh harmonic, {name}: "
@@ -124,7 +124,7 @@ def _static_images(housing, dynamics, points: int) -> Row:
         "sinc",
         "largest line there of the vibration [m/s^2]",
         "250 rpm, orders 88 to 128: largest line that the static deflection would make [m/s^2]",
-        float(np.abs(housing.linear.acceleration[SLOW, orders]).max()),
+        float(np.abs(housing.lines.acceleration[SLOW, orders]).max()),
         float(np.abs(images.acceleration[orders]).max()),
         note="108 teeth are twice 54 points, so its images fall on the mesh orders; femgear carries the "
         "static deflection exactly in both forms",

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 PAPER = "modulation paper"
 
-# the entries of cases/planetary_27_40_108.toml, which an installed package does not carry
+# the entries of cases/modulation_paper.toml, which an installed package does not carry
 CASE = """
 format = 1
 title = "Planetary set 27/40/108"
@@ -23,7 +23,7 @@ motor = { inertia = "0.02 kg m^2", coupling_stiffness = "400 N m/rad" }
 brake = { inertia = "0.2 kg m^2", coupling_stiffness = "5000 N m/rad" }
 static = { positions = 64, contact = "profile" }
 dynamics = { damping_ratio = 0.05, mesh_harmonics = 6, response_harmonics = 18, tolerance = 1e-6 }
-housing = { points = 54, sensor_angle = "0 deg" }
+housing = { form = "linear", points = 54, sensor_angle = "0 deg" }
 
 [sun]
 teeth = 27

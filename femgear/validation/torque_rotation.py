@@ -79,7 +79,8 @@ def by_compliance(mesh: int, positions) -> PairStiffness:
         problem = assemble_contact(setup, bodies, position)
         state = solve_contact(problem.H, problem.gap, np.ones((len(problem.gap), 1)), [force])
         secant.append(force / state.motions[0])
-        tangent.append(tangent_stiffness(problem.H, state.active, np.zeros(len(problem.gap), int), 1)[0])
+        one = np.zeros(len(problem.gap), int)
+        tangent += tangent_stiffness(problem.H, state, one, problem.pair, problem.cell, 1).tolist()
     return PairStiffness(
         setup.zeta[mesh, list(positions), 0] / s.sun.base_pitch, np.array(secant), np.array(tangent)
     )

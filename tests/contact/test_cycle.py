@@ -111,9 +111,11 @@ def test_stiffness_is_the_derivative_of_the_force(gears, bodies):
         d_force, d_deflection = (np.subtract(*parts) for parts in zip(*change))
         assert K @ d_deflection == pytest.approx(d_force, rel=1e-6)
         # alone, at constant loads of the others, each mesh is as stiff as the cycle says
-        own = tangent_stiffness(problem.H, state.active, problem.mesh, 6)
+        window = problem.mesh * 1000 + problem.pair
+        own = tangent_stiffness(problem.H, state, problem.mesh, window, problem.cell, 6)
         alone = 1 / np.diag(np.linalg.inv(K))
-        assert own == pytest.approx(alone, rel=2e-3)
+        # a cell that joins the contact changes the slope of the load by a per cent
+        assert own == pytest.approx(alone, rel=1e-2)
 
 
 def test_no_torque_is_a_defined_empty_contact(gears, bodies):

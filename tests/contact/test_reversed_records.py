@@ -99,11 +99,10 @@ def test_reversing_twice_gives_the_original_vectors(gears, bodies, errors, mirro
         gears,
         bodies,
         sun_torque=TORQUE,
-        positions=POSITIONS,
+        positions=np.arange(1 - 3 * POSITIONS, 1) / POSITIONS,
         deviations=errors,
         supports=held,
         periods=3,
-        first_position=1 - 3 * POSITIONS,
     )
     two = reversed_walk(bodies, mirrored, 3, supports=held)
     flip = np.array([1.0, -1.0])[:, None]
@@ -119,10 +118,9 @@ def test_negative_positions_are_those_at_the_end_of_a_closed_record(gears, bodie
         gears,
         bodies,
         sun_torque=TORQUE,
-        positions=POSITIONS,
+        positions=np.arange(-2 * POSITIONS, 0) / POSITIONS,
         deviations=errors,
         periods=2,
-        first_position=-2 * POSITIONS,
     )
     for name in NAMES:
         assert getattr(before, name) == pytest.approx(getattr(closed, name)[:, -2 * POSITIONS :], rel=1e-9)

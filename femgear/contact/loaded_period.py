@@ -1,0 +1,219 @@
+"""The loaded state of a set over one mesh period, resolved where tooth pairs begin and cease to carry.
+
+The mesh stiffness jumps there, and equidistant positions give every harmonic an error of the size of the jump
+over the number of positions, another one for each planet that meets its jump elsewhere between them. Here
+the jumps are enclosed by bisection. Planets that a rotation of their arrangement maps onto one another go
+through the same states at other times, so that a part of the period stands for the whole: its record is
+computed once and the equal planets are equal to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from math import gcd
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.contact.mirrored import walk_either_flank
+from femgear.contact.supports import RIGID, Supports
+
+if TYPE_CHECKING:
+    from femgear.contact.assembly import Bodies
+    from femgear.contact.record import MeshCycle
+    from femgear.gears import PlanetarySet
+    from femgear.gears.deviations import SetDeviations
+
+SHORTEST = 2.0**-13
+"""Mesh periods in which a jump is enclosed."""
+SMOOTHEST = 2.0**-10
+"""Mesh periods below which a smooth change is not resolved further."""
+MISSED = 3e-4
+"""Share of a mesh stiffness that straight lines between the positions may miss where it does not jump."""
+STEEP = 0.02
+"""Change of a mesh stiffness between neighbouring positions above which there are more between them."""
+
+
+@dataclass(frozen=True)
+class LoadedPeriod:
+    """Loads and tangent stiffness of all 2N meshes over one mesh period.
+
+    Parameters
+    ----------
+    position : (P,) array
+        In mesh periods, ascending from 0 and denser near jumps.
+    deflection : (2N, P) array
+        Static transmission error of every mesh, as in `MeshCycle` [m].
+    force : (2N, P) array
+        Force on the drive flanks [N].
+    stiffness : (2N, P) array
+        Tangent stiffness at constant loads of the other meshes [N/m].
+    compliance : (2N, 2N) array
+        Mean over the period of the tangent compliance between the meshes through their common bodies,
+        supports left out [m/N].
+    """
+
+    position: np.ndarray
+    deflection: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+    compliance: np.ndarray
+
+    def resampled(self, name: str, count: int) -> np.ndarray:
+        """Values (2N, count) of `deflection`, `force` or `stiffness` at equidistant positions."""
+        at, values = np.arange(count) / count, getattr(self, name)
+        return np.array([np.interp(at, self.position, row, period=1.0) for row in values])
+
+
+def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | None = None) -> int:
+    """Number of rotations that map the planets, with their errors, onto one another."""
+    symmetry, N = planetary_set.rotations, planetary_set.n_planets
+    if deviations is None:
+        return symmetry
+    runouts = [[r.amplitude, r.phase if r.amplitude else 0.0] for r in deviations.planet_runout]
+    pitches = (deviations.planet_pitch, deviations.planet_ring_side_pitch)
+    columns = (deviations.pin_errors, deviations.planet_thickness, *pitches, np.array(runouts))
+    errors = np.column_stack(columns)
+    same = (n for n in range(symmetry, 0, -1) if symmetry % n == 0)
+    return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
+
+
+def loaded_period(
+    planetary_set: PlanetarySet,
+    bodies: Bodies,
+    *,
+    sun_torque: float,
+    positions: int = 64,
+    contact: str = "profile",
+    deviations: SetDeviations | None = None,
+    supports: Supports = RIGID,
+    progress: Callable[[int, int], None] | None = None,
+) -> LoadedPeriod:
+    """Loaded state over one mesh period for errors that stand still in the frame of the carrier.
+
+    Parameters
+    ----------
+    planetary_set, bodies, contact, deviations, supports
+        As for `walk_mesh_cycle`.
+    sun_torque : float
+        Of either sign [N m].
+    positions : int
+        Positions over the period at least; more come where the stiffness jumps or is steep.
+    progress : callable, optional
+        Called with (positions done, positions).
+
+    Returns
+    -------
+    LoadedPeriod
+
+    Raises
+    ------
+    ContactError
+        As `walk_mesh_cycle`.
+    """
+    symmetry = planet_symmetry(planetary_set, deviations)
+    parts = symmetry // gcd(symmetry, planetary_set.sun.teeth)
+    first = -(-positions // parts)
+
+    def solved(tau) -> _Record:
+        cycle = walk_either_flank(
+            planetary_set,
+            bodies,
+            sun_torque=sun_torque,
+            positions=tau,
+            contact=contact,
+            deviations=deviations,
+            supports=supports,
+            coupling=True,
+            progress=progress,
+        )
+        return _record(cycle, planetary_set.base_pitch)
+
+    # the end of the part is there to see jumps before it, and then left out
+    record = solved(np.arange(first + 1) / (first * parts))
+    while len(gaps := _unresolved(record)):
+        middle = 0.5 * (record.position[gaps] + record.position[gaps + 1])
+        record = _merged(record, solved(middle))
+    return _whole_period(planetary_set, record, symmetry, parts)
+
+
+@dataclass(frozen=True)
+class _Record:
+    """Positions with what is wanted there, and the tooth pairs that carry; arrays end with the positions."""
+
+    position: np.ndarray
+    deflection: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+    compliance: np.ndarray
+    loaded: np.ndarray
+
+
+def _record(cycle: MeshCycle, base_pitch: float) -> _Record:
+    """What is wanted of a walk; a tooth pair is known by its place on the path at position zero."""
+    place = np.rint((cycle.path / base_pitch - cycle.position) * 1e6)
+    loaded = np.empty(len(cycle.position), object)
+    for p in range(len(cycle.position)):
+        mesh, pair = np.nonzero(cycle.tooth_load[..., p] > 0)
+        loaded[p] = frozenset(zip(mesh.tolist(), place[mesh, pair, p].tolist(), strict=True))
+    values = (cycle.deflection, cycle.force, cycle.stiffness, cycle.compliance)
+    return _Record(cycle.position, *values, loaded)
+
+
+def _unresolved(record: _Record) -> np.ndarray:
+    """Numbers of the intervals that need a position in their middle."""
+    k = record.stiffness / record.stiffness.max(axis=1, initial=0.0)[:, None]
+    gap = np.diff(record.position)
+    steep = (np.abs(np.diff(k)) > STEEP).any(axis=0)
+    other = record.loaded[1:] != record.loaded[:-1]
+    # what a straight line misses in the middle of a gap, from the curvature at its ends; none across jumps
+    slope = np.diff(k) / gap
+    bend = np.zeros(k.shape)
+    bend[:, 1:-1] = np.abs(2.0 * np.diff(slope) / (gap[1:] + gap[:-1]))
+    jump = np.flatnonzero(steep | other)
+    bend[:, np.concatenate([jump, jump + 1])] = 0.0
+    missed = (gap**2 / 8.0 * np.maximum(bend[:, 1:], bend[:, :-1])).max(axis=0)
+    return np.flatnonzero(((steep | other) & (gap > SHORTEST)) | ((missed > MISSED) & (gap > SMOOTHEST)))
+
+
+def _merged(one: _Record, two: _Record) -> _Record:
+    order = np.argsort(np.concatenate([one.position, two.position]), kind="stable")
+    parts = {
+        f.name: np.concatenate([getattr(one, f.name), getattr(two, f.name)], axis=-1)[..., order]
+        for f in fields(_Record)
+    }
+    return _Record(**parts)
+
+
+def _whole_period(planetary_set, record: _Record, symmetry: int, parts: int) -> LoadedPeriod:
+    """The period from one of its `parts`: later parts are the first one with the planets moved on.
+
+    A planet that is ahead by the angle psi goes through the same states ``z_sun psi / 2 pi`` mesh periods
+    later (R. G. Parker and J. Lin, J. Mech. Des. 126, 2004, 365-370).
+    """
+    N = planetary_set.n_planets
+    ahead = N // symmetry
+    common = gcd(symmetry, planetary_set.sun.teeth)
+    # planets that are in the same state at all times take that of the first of them
+    first = np.arange(N) % (ahead * parts)
+    step = pow(planetary_set.sun.teeth // common, -1, parts) if parts > 1 else 0
+    shown = record.position < (1.0 - 1e-12) / parts
+    mean_of = _mean_weights(record.position[shown], 1.0 / parts)
+    compliance = record.compliance[..., shown] @ mean_of
+    position, rows, mean = [], [], np.zeros((2 * N, 2 * N))
+    for part in range(parts):
+        planet = first[(np.arange(N) - ahead * (step * part % parts)) % N]
+        mesh = np.concatenate([planet, planet + N])
+        position.append(record.position[shown] + part / parts)
+        rows.append([getattr(record, name)[mesh][:, shown] for name in ("deflection", "force", "stiffness")])
+        moved = np.concatenate([(np.arange(N) - ahead * (step * part % parts)) % N + s for s in (0, N)])
+        mean += compliance[np.ix_(moved, moved)] / parts
+    joined = [np.concatenate(values, axis=1) for values in zip(*rows, strict=True)]
+    return LoadedPeriod(np.concatenate(position), *joined, mean)
+
+
+def _mean_weights(position: np.ndarray, period: float) -> np.ndarray:
+    """Weights of the mean of a periodic function that is linear between the positions."""
+    gap = np.diff(np.append(position, position[0] + period))
+    return (gap + np.roll(gap, 1)) / (2 * period)

@@ -1,0 +1,150 @@
+"""The loaded state over one mesh period: jumps enclosed, equal planets equal, what couples the meshes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.loaded_period import SHORTEST, loaded_period, planet_symmetry
+from femgear.contact.mirrored import walk_either_flank
+from femgear.contact.supports import Supports
+from femgear.fe.elasticity import Material
+from femgear.gears import Gear, PlanetarySet, close_set, equal_planet_angles
+from femgear.gears.deviations import no_deviations
+
+STEEL = Material(206e9, 0.3, 7850.0)
+TORQUE = 150.0
+SUPPORTS = Supports(sun=5e7, carrier=2e8, planet=3e8)
+# opposite pairs at assembly positions, multiples of 360/80 degrees
+PAIRS = tuple(np.deg2rad([0.0, 81.0, 180.0, 261.0]))
+
+
+def small_set(angles) -> PlanetarySet:
+    """21 + 59 teeth: four equally spaced planets are a quarter of a period apart."""
+    common = dict(profile_shift=0.0, module=2e-3, pressure_angle=np.deg2rad(20), face_width=0.02)
+    return close_set(
+        Gear(teeth=21, rim_radius=0.008, **common),
+        Gear(teeth=19, rim_radius=0.009, **common),
+        Gear(teeth=59, rim_radius=0.075, internal=True, **common),
+        planet_angles=tuple(angles),
+        centre_distance=0.0401,
+        find=("sun", "ring"),
+    )
+
+
+@pytest.fixture(scope="module")
+def bodies():
+    sectors = make_sectors(small_set(equal_planet_angles(4)), STEEL, flank_elements=8)
+    return make_bodies(sectors, STEEL)
+
+
+@pytest.fixture(scope="module", params=[equal_planet_angles(4), PAIRS], ids=["four", "two pairs"])
+def solved(request, bodies):
+    gears = small_set(request.param)
+    options = dict(sun_torque=TORQUE, positions=24, supports=SUPPORTS)
+    return gears, loaded_period(gears, bodies, **options)
+
+
+def test_planets_that_a_rotation_maps_onto_one_another_are_equal_to_rounding(solved):
+    gears, found = solved
+    N, symmetry = gears.n_planets, planet_symmetry(gears)
+    assert symmetry == (4 if gears.planet_angles[1] > 1.5 else 2)
+    count = 840
+    phase = gears.mesh_phases
+    for name in ("force", "deflection", "stiffness"):
+        lines = np.fft.rfft(found.resampled(name, count), axis=1) / count
+        own = lines * np.exp(-2j * np.pi * np.outer(phase, np.arange(lines.shape[1])))
+        size = np.abs(lines).max()
+        for n in range(N):
+            other = (n + N // symmetry) % N
+            for offset in (0, N):
+                assert own[offset + n] == pytest.approx(own[offset + other], abs=1e-12 * size)
+
+
+def test_record_is_the_walk_at_its_positions(solved, bodies):
+    """Positions all over the period, of which only the first part was solved."""
+    gears, found = solved
+    some = np.arange(len(found.position))[3::17]
+    walk = walk_either_flank(
+        gears, bodies, sun_torque=TORQUE, positions=found.position[some], supports=SUPPORTS
+    )
+    for name in ("force", "deflection", "stiffness"):
+        expected = getattr(walk, name)
+        assert getattr(found, name)[:, some] == pytest.approx(expected, rel=2e-5)
+
+
+def test_every_jump_of_the_stiffness_is_enclosed(solved):
+    """No interval wider than the shortest holds more than the change that is allowed between neighbours."""
+    _, found = solved
+    k = np.hstack([found.stiffness, found.stiffness[:, :1]])
+    gap = np.diff(np.append(found.position, 1.0))
+    change = np.abs(np.diff(k)) / k.max(axis=1)[:, None]
+    assert change[:, gap > SHORTEST].max() <= 0.02
+    # sixteen jumps: two pairs begin and two cease to carry in each of the eight meshes ... once a period
+    assert (change.max(axis=0) > 0.02).sum() >= 8
+
+
+def test_equilibrium_holds_at_all_positions(solved):
+    gears, found = solved
+    total = TORQUE / gears.sun.base_radius
+    assert found.force[:4].sum(axis=0) == pytest.approx(total, rel=1e-10)
+    assert found.force[4:] == pytest.approx(found.force[:4], rel=1e-10)
+
+
+def test_negative_torque_is_the_mirror_image(bodies):
+    gears = small_set(equal_planet_angles(4))
+    options = dict(positions=24, supports=SUPPORTS)
+    one, two = (loaded_period(gears, bodies, sun_torque=t, **options) for t in (TORQUE, -TORQUE))
+    planet = [0, 3, 2, 1]
+    mesh = [*planet, *(4 + n for n in planet)]
+    for name in ("force", "stiffness"):
+        turned = one.resampled(name, 240)[mesh][:, -np.arange(240) % 240]
+        assert two.resampled(name, 240) == pytest.approx(turned, rel=5e-3)
+    assert two.compliance == pytest.approx(one.compliance[np.ix_(mesh, mesh)], rel=1e-3, abs=1e-13)
+
+
+def test_an_error_of_one_planet_breaks_the_symmetry():
+    gears = small_set(equal_planet_angles(4))
+    none = no_deviations(gears)
+    assert planet_symmetry(gears, none) == 4
+    for pins, expected in (
+        ([[0, 5e-6]] + [[0, 0]] * 3, 1),
+        ([[0, 5e-6], [0, 0]] * 2, 2),
+        ([[0, 5e-6]] * 4, 4),
+    ):
+        assert planet_symmetry(gears, replace(none, pin_errors=np.array(pins, float))) == expected
+
+
+def test_coupling_through_the_sun_is_what_a_changed_load_shows(bodies):
+    """Diagonal and rest of the compliance against central differences of the loaded state."""
+    gears = small_set(equal_planet_angles(4))
+    options = dict(positions=np.array([0.1]), coupling=True)
+    found, less, more = (
+        walk_either_flank(gears, bodies, sun_torque=TORQUE * f, **options) for f in (1.0, 0.98, 1.02)
+    )
+    change = (more.deflection - less.deflection)[:, 0]
+    force = (more.force - less.force)[:, 0]
+    predicted = found.compliance[..., 0] @ force
+    # the active set is frozen in the prediction: a cell more or less is a per cent of the local part
+    assert predicted == pytest.approx(change, rel=0.01)
+    alone = np.diag(found.compliance[..., 0]) * force
+    assert np.abs(alone[:4] / change[:4] - 1).min() > 0.03
+
+
+def test_positions_meet_equal_planets_alike():
+    common = dict(profile_shift=0.0, module=2e-3, pressure_angle=np.deg2rad(20), face_width=0.02)
+    for teeth, N, wanted, expected in (
+        ((27, 40, 108), 3, 64, 64),
+        ((21, 19, 59), 4, 64, 64),
+        ((21, 19, 59), 5, 64, 65),
+        ((28, 41, 110), 3, 64, 66),
+    ):
+        sun, planet, ring = (
+            Gear(teeth=z, rim_radius=0.3 if i == 2 else 0.005, internal=i == 2, **common)
+            for i, z in enumerate(teeth)
+        )
+        gears = PlanetarySet(sun, planet, ring, 1e-3 * (teeth[0] + teeth[1]), equal_planet_angles(N))
+        assert gears.equal_positions(wanted) == expected
+    # pairs: 21 x 18 of 80 pitches apart, fortieths of a period
+    assert small_set(PAIRS).equal_positions(64) == 80
