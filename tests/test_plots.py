@@ -459,3 +459,17 @@ def test_order_spectra_draw_the_highest_of_lines_too_close_to_part():
     assert np.all(maximum_filter1d(drawn_lines, 101) >= amplitude * (amplitude > floor))
     few = _highest(order[:3000], amplitude[:3000], amplitude[:3000] > floor)
     assert few.tolist() == np.flatnonzero(amplitude[:3000] > floor).tolist()
+
+
+def test_order_spectrum_says_what_its_lines_are():
+    """Exact lines are called so and drawn once; how far the excitation reaches stands above."""
+    housing = synthetic.housing()
+    names = [
+        text.get_text() for text in plots.order_spectrum(housing, ring_teeth=TEETH).legends[0].get_texts()
+    ]
+    assert names == ["Heaviside, linear interpolation", "exact circumferential Fourier"]
+    housing["order_amplitude"] = housing["order_amplitude_exact"]
+    housing["excitation_limit"] = ("speed", [1080.0, 2500.0])
+    figure = plots.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["exact circumferential Fourier"]
+    assert not any(ax.get_lines() for ax in figure.axes) and "excited up to 2.5 kHz" in figure.get_suptitle()
