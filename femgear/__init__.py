@@ -9,7 +9,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from femgear.analysis import solve_dynamics, solve_housing, solve_modes, solve_static
     from femgear.analysis_stress import solve_stress
-    from femgear.case import Case, planetary_set, read_case, with_value
+    from femgear.case import Case, planetary_set, read_case, with_value, with_values
     from femgear.errors import FemgearError
     from femgear.storage import open_results
 
@@ -26,6 +26,7 @@ __all__ = [
     "solve_static",
     "solve_stress",
     "with_value",
+    "with_values",
 ]
 
 _HOME = {
@@ -40,6 +41,7 @@ _HOME = {
     "solve_static": "analysis",
     "solve_stress": "analysis_stress",
     "with_value": "case",
+    "with_values": "case",
 }
 
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from femgear.gears import PlanetarySet
 
 
-
 def max_nodal_diameter(case: Case) -> int:
     """Largest nodal diameter of the ring model; beyond half the teeth there are none."""
     from femgear.models.ring import MAX_DIAMETER
@@ -70,7 +69,8 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             key="operation.fixed",
             value=case.operation.fixed,
             limit='"ring"',
-            remedy="run with --only static, or fix the ring",
+            remedy="run with --only static, fix the ring, or write the section [planar]: rigid bodies, for "
+            "which any member may be the fixed one",
         )
     check_floating(case, gears, dynamic=True)
     if case.operation.torque == 0:
@@ -183,6 +183,23 @@ def check_motions(cycle: MeshCycle, module: float) -> None:
             )
 
 
+def _deflection_warning(cycle: MeshCycle, moved: float) -> str:
+    """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(cycle.deflection, 2))
+    if not cycle.member_names:
+        return (
+            f"[W-DEFLECTION] the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: "
+            "small displacements no longer hold"
+        )
+    return (
+        f"[W-DEFLECTION] the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
+        "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
+        "not the deflection of the teeth alone: it contains the motion of the members, up to "
+        f"{moved * 1e6:.0f} um, and between planets and ring that of the ring on its foundation; "
+        'static.members = "fixed" shows the teeth'
+    )
+
+
 def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
     """What is wrong with a static result in an engineer's eyes, in sentences."""
     found = []
@@ -191,12 +208,10 @@ def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
             f"[W-PRESSURE] the contact pressure reaches {cycle.max_pressure.max() * 1e-6:.0f} MPa: no steel "
             "carries that, and the model stays elastic"
         )
+    moved = np.abs(cycle.member_motion).max(initial=0.0)
     if np.abs(cycle.deflection).max(initial=0.0) > 0.05 * module:
-        found.append(
-            f"[W-DEFLECTION] the teeth deflect by {np.abs(cycle.deflection).max() * 1e6:.0f} um, more than "
-            "5 % of the module: small displacements no longer hold"
-        )
-    if (moved := np.abs(cycle.member_motion).max(initial=0.0)) > 0.05 * module:
+        found.append(_deflection_warning(cycle, moved))
+    if moved > 0.05 * module:
         found.append(
             f"[W-MOTION] a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points "
             "and arms are those of the unmoved set"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,12 +20,12 @@ from femgear.casefile import tomlfile
 from femgear.casefile.cross_checks import cross_check
 from femgear.casefile.deviations import CarrierErrors, GearErrors
 from femgear.casefile.drivetrain import DrivetrainCase
-from femgear.casefile.given import added_material, in_terms_of_the_case, notices
+from femgear.casefile.given import added_material, in_terms_of_the_case, notices, rack_at
 from femgear.casefile.origin import text_with_points
 from femgear.casefile.problems import combine, translate
 from femgear.casefile.profiles import embed_profiles
 from femgear.casefile.published import without_uncomputed
-from femgear.casefile.sections import FORMAT, Case, PlanetSection, RingSection, SunSection
+from femgear.casefile.sections import FORMAT, Case, PlanetSection, RackSection, RingSection, SunSection
 from femgear.errors import CaseError, GeometryError
 from femgear.gears import (
     BasicRack,
@@ -54,6 +55,7 @@ __all__ = [
     "set_deviations",
     "to_toml",
     "with_value",
+    "with_values",
 ]
 
 
@@ -91,9 +93,7 @@ def parse_case(text: str, *, name: str = "") -> Case:
 
 
 def with_value(case: Case, key: str, value: object) -> Case:
-    """The case with one entry changed, checked again as a whole.
-
-    Published lines whose speed or harmonic is not computed any more are left out; ``notices`` says so.
+    """The case with one entry changed, checked again as a whole; see `with_values` for several at once.
 
     Parameters
     ----------
@@ -113,35 +113,69 @@ def with_value(case: Case, key: str, value: object) -> Case:
     CaseError
         As `read_case`; unknown keys are refused with the nearest valid one.
     """
+    return with_values(case, {key: value})
+
+
+def with_values(case: Case, values: Mapping[str, object]) -> Case:
+    """The case with several entries changed at once, checked as a whole after all changes.
+
+    Published lines whose speed or harmonic is not computed any more are left out; ``notices`` says so.
+
+    Parameters
+    ----------
+    case : Case
+    values : mapping
+        Keys and values as of `with_value`, as in
+        ``{"operation.input": "carrier", "operation.fixed": "ring"}``.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    CaseError
+        As `with_value`.
+    """
     data = tomlfile.parse(case.source, case.name)
-    parts = re.findall(r"\[\d{1,9}\]|[^.\[\]]+", key) or [key]
-    *tables, last = parts
-    table = data
-    for part, following in zip(tables, parts[1:], strict=True):
-        table = _inside(table, part, key, case.name, wanted=list if following.startswith("[") else dict)
-    if last.startswith("["):
-        raise CaseError("a list is changed as a whole", code="E-KEY", key=key, file=case.name or None)
-    if value is None:
-        table.pop(last, None)
-    else:
-        table[last] = value.tolist() if hasattr(value, "tolist") else value
+    for key, value in values.items():
+        _change(data, key, value, case.name)
     try:
         text = tomlfile.write(data)
     except CaseError as error:
-        error.key, error.file = key, case.name or None
+        error.key, error.file = ", ".join(values), case.name or None
         raise
     said: tuple[str, ...] = ()
     try:
         changed = _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
     except CaseError as error:
-        if key.startswith("housing") or not (notice := without_uncomputed(data, error)):
+        published = any(key.startswith("housing") for key in values)
+        if published or not (notice := without_uncomputed(data, error)):
             raise
         said, text = (notice,), tomlfile.write(data)
         changed = _build(tomlfile.parse(text, case.name), text, case.name, numbered=False)
     changed._notices += said
-    kept = {k: file for k, file in case.profile_files.items() if not (k.startswith(key) or key.startswith(k))}
-    changed._profile_files = kept
+    changed._profile_files = {
+        k: file
+        for k, file in case.profile_files.items()
+        if not any(k.startswith(key) or key.startswith(k) for key in values)
+    }
     return changed
+
+
+def _change(data: dict, key: str, value: object, name: str) -> None:
+    """Change one entry of the tables of a case file; None takes it out."""
+    parts = re.findall(r"\[\d{1,9}\]|[^.\[\]]+", key) or [key]
+    *tables, last = parts
+    table = data
+    for part, following in zip(tables, parts[1:], strict=True):
+        table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
+    if last.startswith("["):
+        raise CaseError("a list is changed as a whole", code="E-KEY", key=key, file=name or None)
+    if value is None:
+        table.pop(last, None)
+    else:
+        table[last] = value.tolist() if hasattr(value, "tolist") else value
 
 
 def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type) -> dict | list:
@@ -190,27 +224,67 @@ def planetary_set(case: Case) -> PlanetarySet:
         without being held (E-MECHANISM), with file and line.
     """
     refuse_drivetrain(case)
+    try:
+        closed = _closed_set(case)
+        check_set(closed)
+        check_floating(case, closed)
+    except GeometryError as error:
+        in_terms_of_the_case(error, case)
+        if error.code == "E-ROOT-RADIUS":
+            _largest_root_radius(error, case)
+        raise
+    return closed
+
+
+def _closed_set(case: Case) -> PlanetarySet:
+    """Gears of a case, closed on their centre distance but not yet checked as a set."""
     ring = case.ring
     cutter = None
     if ring.cutter_teeth is not None:
         shift = ring.cutter_profile_shift * _normal_modules(case)
         cutter = PinionCutter(teeth=ring.cutter_teeth, profile_shift=shift)
     left_open = (("sun", case.sun.profile_shift), ("ring", ring.profile_shift))
-    try:
-        closed = close_set(
-            _gear(case, case.sun, "sun", case.sun.bore_radius),
-            _gear(case, case.planet, "planet", case.planet.bore_radius),
-            _gear(case, ring, "ring", ring.outer_radius, cutter),
-            planet_angles=case.set.planet_angles or equal_planet_angles(case.set.planets),
-            centre_distance=case.set.centre_distance,
-            find=tuple(name for name, shift in left_open if shift is None),
-        )
-        check_set(closed)
-        check_floating(case, closed)
-    except GeometryError as error:
-        in_terms_of_the_case(error, case)
-        raise
-    return closed
+    return close_set(
+        _gear(case, case.sun, "sun", case.sun.bore_radius),
+        _gear(case, case.planet, "planet", case.planet.bore_radius),
+        _gear(case, ring, "ring", ring.outer_radius, cutter),
+        planet_angles=case.set.planet_angles or equal_planet_angles(case.set.planets),
+        centre_distance=case.set.centre_distance,
+        find=tuple(name for name, shift in left_open if shift is None),
+    )
+
+
+def _largest_root_radius(error: GeometryError, case: Case) -> None:
+    """Let the refusal name the largest root radius that no gear of the case refuses.
+
+    The limit of one gear is not that of the others, and that of a gear whose profile shift is found only
+    shows with that shift.
+    """
+    key = error.key
+
+    def fits(steps: int) -> bool:
+        rack = RackSection.model_construct(**(rack_at(case, key).model_dump() | {"root_radius": steps / 1e4}))
+        if key == "rack.root_radius":
+            trial = case.model_copy(update={"rack": rack})
+        else:
+            gear = key.partition(".")[0]
+            section = getattr(case, gear).model_copy(update={"rack": rack})
+            trial = case.model_copy(update={gear: section})
+        try:
+            _closed_set(trial)
+        except GeometryError as other:
+            return other.code != "E-ROOT-RADIUS"
+        return True
+
+    low, high = -1, round(1e4 * rack_at(case, key).root_radius)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    if low >= 0:
+        error.limit = f"<= {low / 1e4:.4f} modules for all gears of this rack"
+        error.remedy = "reduce root_radius"
+    else:
+        error.limit, error.remedy = None, "reduce the dedendum: no root_radius fits"
 
 
 def _gear(

@@ -238,11 +238,23 @@ def _static(data: xr.Dataset) -> Block:
         f"load share of a planet {share.min():.4f} to {share.max():.4f} "
         f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
     ]
+    notes += _stiffness_notes(elastic=data.sizes.get("member", 0) > 0)
     if data.attrs.get("mesh_periods", 1) > 1:
         notes.append(str(data.attrs["period"]))
     if warnings := str(data.attrs.get("warnings", "")):
         notes += [f"[{text.strip()}" for text in warnings.split("[") if text]
     return Block("Static", header, tuple(rows), tuple(notes))
+
+
+def _stiffness_notes(*, elastic: bool) -> list[str]:
+    """What the columns k and STE of the static table contain."""
+    held = "k: tangent stiffness dF/dx of teeth and bodies"
+    if not elastic:
+        return [f"{held}, held at their bores and at the outer surface of the ring"]
+    return [
+        f"{held}; of planet-ring with the ring on its foundation in series, so that it is no",
+        "stiffness of the teeth alone; the STE contains that and the motion of the members",
+    ]
 
 
 def _modes(data: xr.Dataset) -> Block:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from femgear.analysis import max_nodal_diameter, solve_dynamics, solve_housing, solve_modes, solve_static
-from femgear.case import read_case, with_value
+from femgear.case import read_case, with_value, with_values
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, symmetry_leakage
 from femgear.solvers.harmonics import harmonics_of, sample
@@ -98,7 +98,7 @@ def test_modes_need_a_fixed_ring(case):
     static = solve_static(freed)
     with pytest.raises(CaseError, match="fixed ring") as caught:
         solve_modes(freed, static)
-    assert caught.value.code == "E-FIXED-MEMBER"
+    assert caught.value.code == "E-FIXED-MEMBER" and "[planar]" in caught.value.remedy
 
 
 def test_without_torque_static_is_defined_and_modes_are_refused(case):
@@ -158,7 +158,26 @@ def test_overload_is_said(case):
         with_value(with_value(case, "operation.torque", "20000 N m"), "static.positions", 16)
     )
     words = " ".join(overload.warnings)
-    assert "W-PRESSURE" in words and "W-DEFLECTION" in words
+    assert "W-PRESSURE" in words and "W-DEFLECTION] the teeth deflect by" in words
+
+
+def test_motion_of_the_ring_on_its_foundation_is_not_called_deflection_of_teeth(case):
+    """The foundation of 4e9 N/m^3 yields by more than 5 % of the module, the meshes of the sun do not."""
+    soft = with_values(
+        case,
+        {
+            "static.members": "elastic",
+            "static.positions": 16,
+            "ring.foundation_radial": "1e9 N/m^3",
+            "ring.foundation_tangential": "1e9 N/m^3",
+        },
+    )
+    static = solve_static(soft)
+    (words,) = [text for text in static.warnings if "W-DEFLECTION" in text]
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(static.cycle.deflection, 2))
+    assert sun < 20.0 and ring > 75.0
+    assert f"{sun:.0f} um between sun and planets and by {ring:.0f} um between planets and ring" in words
+    assert "teeth deflect" not in words and "ring on its foundation" in words
 
 
 def test_motions_beyond_small_displacements_are_refused(case):

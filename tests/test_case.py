@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from femgear.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value
+from femgear.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value, with_values
 from femgear.casefile import tomlfile
-from femgear.errors import CaseError
+from femgear.errors import CaseError, GeometryError
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -534,3 +534,76 @@ def test_published_lines_that_a_change_leaves_behind_are_dropped_and_said():
     assert [entry.harmonic for entry in case.housing.published] == [1]
     assert any("2 of 3 entries housing.published" in notice for notice in case.notices)
     assert parse_case(to_toml(case)) == case
+
+
+def test_several_entries_change_at_once():
+    """Input and fixed member cannot be swapped one by one: half way one member is both."""
+    case = read_case(CASE)
+    with pytest.raises(CaseError, match="E-MECHANISM"):
+        with_value(case, "operation.fixed", case.operation.input)
+    swapped = {"operation.input": "ring", "operation.fixed": "sun"}
+    changed = with_values(case, swapped)
+    assert (changed.operation.input, changed.operation.fixed) == ("ring", "sun")
+    assert with_values(case, {}).source == with_value(case, "title", case.title).source
+    assert with_values(case, {"operation.torque": "50 N m"}) == with_value(case, "operation.torque", "50 N m")
+    with pytest.raises(CaseError, match="E-KEY-UNKNOWN"):
+        with_values(case, swapped | {"operation.speed": "1 rpm"})
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "advice"),
+    [
+        ("sun.module", 0.0012, '"1.2 mm" if it is in m'),
+        ("sun.module", 1.5, '"1.5 mm"'),
+        ("sun.bore_radius", 0.5, '"0.5 mm", or "500 mm" if it is in m'),
+        ("sun.pressure_angle", 0.35, '"20.0535 deg" if it is in rad'),
+        ("operation.speeds", [100.0], '"100.0 rpm", or "954.93 rpm" if it is in rad/s'),
+        ("sun.mass", 2, '"2 kg"'),
+        ("sun.module", 10**400, 'such as "1 mm"'),
+    ],
+)
+def test_bare_numbers_are_told_how_to_be_written(key, value, advice):
+    """The text that the remedy shows is accepted as it stands, and means the number given in SI units."""
+    case = read_case(CASE)
+    with pytest.raises(CaseError, match="E-UNIT") as caught:
+        with_value(case, key, value)
+    assert caught.value.remedy == f"write it as text with the unit, {advice}"
+
+
+@pytest.mark.parametrize("open_shifts", [("ring",), ("sun",), ("sun", "ring")])
+def test_largest_root_radius_is_accepted_as_printed(open_shifts):
+    """The limit holds for all gears, with the shifts that close the set, and is rounded down."""
+    changes = {"sun.pressure_angle": "25 deg"}
+    changes |= {f"{name}.profile_shift": None for name in open_shifts}
+    case = with_values(read_case(CASE), changes)
+    with pytest.raises(GeometryError, match="E-ROOT-RADIUS") as caught:
+        planetary_set(case)
+    limit = float(re.search(r"<= ([0-9.]+) modules", caught.value.limit)[1])
+    assert _root_radius_code(case, limit) != "E-ROOT-RADIUS"
+    assert _root_radius_code(case, limit + 1e-4) == "E-ROOT-RADIUS"
+
+
+def _root_radius_code(case, value):
+    try:
+        planetary_set(with_value(case, "rack.root_radius", value))
+    except GeometryError as error:
+        return error.code
+    return None
+
+
+def test_refused_root_radius_of_one_gear_names_its_own_rack():
+    case = with_value(read_case(CASE), "planet.rack", {"root_radius": 0.6})
+    with pytest.raises(GeometryError, match="E-ROOT-RADIUS") as caught:
+        planetary_set(case)
+    assert caught.value.key == "planet.rack.root_radius" and caught.value.value == 0.6
+
+
+def test_refusals_show_values_in_the_unit_of_their_entry():
+    case = read_case(CASE)
+    for changes, key, found in (
+        ({"sun.profile_shift": -0.5}, "set.centre_distance", "contact ratio 0.8283"),
+        ({"set.backlash": "6 mm"}, "set.backlash", "6 mm"),
+    ):
+        with pytest.raises(GeometryError) as caught:
+            planetary_set(with_values(case, changes))
+        assert (caught.value.key, caught.value.value) == (key, found)

@@ -247,7 +247,15 @@ def test_refusals_of_the_gears_say_that_they_are_of_the_transverse_section(case)
     assert "in the transverse section" in info.value.message
     with pytest.raises(GeometryError, match=r"0\.931411 times those of the file") as info:
         planetary_set(with_value(case, "rack.root_radius", 0.47))
-    assert info.value.value == pytest.approx(0.47 * math.cos(case.helical.helix_angle))
+    # found and allowed are coefficients of the file
+    assert info.value.value == 0.47
+    limit = float(info.value.limit.split()[1])
+    # the tool has room for it, but its fillet leaves too short an involute
+    with pytest.raises(GeometryError, match="E-FILLET") as info:
+        planetary_set(with_value(case, "rack.root_radius", limit))
+    assert info.value.value == limit
+    with pytest.raises(GeometryError, match="E-ROOT-RADIUS"):
+        planetary_set(with_value(case, "rack.root_radius", limit + 1e-4))
 
 
 def test_check_tells_helix_and_contact_ratios(case):

@@ -48,7 +48,7 @@ def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = 
                 f"{dimension.name} needs its unit",
                 code="E-UNIT",
                 value=value,
-                remedy=f'write it as text with the unit, such as "{value} {dimension.shown}"',
+                remedy=_as_text(value, low, high, dimension),
             )
         if not isinstance(value, str):
             raise refuse(f"{dimension.name} is needed, not {described(value)}", code="E-TYPE", value=value)
@@ -66,6 +66,21 @@ def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = 
 
     schema = {"type": "string", "description": f"{dimension.name} with its unit, {limit}"}
     return Annotated[float, BeforeValidator(convert), WithJsonSchema(schema)]
+
+
+def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
+    """How to write a bare number: in the unit of messages, or that of an SI value, where it is plausible."""
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    readings = []
+    if low <= number * dimension.scale <= high:
+        readings.append(f'"{value} {dimension.shown}"')
+    if dimension.scale != 1.0 and low <= number <= high:
+        readings.append(f'"{dimension.show(number)}" if it is in {dimension.si}')
+    shown = ", or ".join(readings) or f'such as "{dimension.show(dimension.scale)}"'
+    return f"write it as text with the unit, {shown}"
 
 
 def _factor_hint(number: float, low: float, high: float, dimension: Dimension, text: str) -> str | None:

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import math
+import re
 
 from femgear.casefile.helical import helical_notices
 from femgear.casefile.planar import planar_notices
-from femgear.casefile.sections import Case
+from femgear.casefile.sections import Case, RackSection
+from femgear.casefile.units import ANGLE, LENGTH
 from femgear.errors import GeometryError
 
-_LENGTHS = ("centre_distance", "bore_radius", "outer_radius", "tip_diameter", "root_diameter")
+# dimensions of the entries whose values the refusals of gears give as SI numbers
+_DIMENSIONS = {
+    "centre_distance": LENGTH,
+    "bore_radius": LENGTH,
+    "outer_radius": LENGTH,
+    "tip_diameter": LENGTH,
+    "root_diameter": LENGTH,
+    "module": LENGTH,
+    "pressure_angle": ANGLE,
+}
 
 
 def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
@@ -29,11 +40,28 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
         )
     if error.code == "E-ASSEMBLY":
         _assembly(error, case)
+    if error.code == "E-ALLOWANCE":
+        error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
+        error.limit = f"0 mm to {LENGTH.show(2.0 * case.sun.module)}: each gear takes half of it"
+        error.remedy = "reduce the backlash"
+    if error.key == "rack.root_radius":
+        cut = re.match(r"(\w+):|the \w+'s tip runs into the (\w+)'s root fillet", error.message)
+        gear = (cut[1] or cut[2]) if cut else ""
+        if getattr(getattr(case, gear, None), "rack", None) is not None:
+            error.key = f"{gear}.rack.root_radius"
+        error.value = rack_at(case, error.key).root_radius
     _shift_left_out(error, case)
     _in_transverse_section(error, case)
-    if isinstance(error.value, float) and (error.key or "").rpartition(".")[2] in _LENGTHS:
-        error.value = f"{1e3 * error.value:.6g} mm"
+    dimension = _DIMENSIONS.get((error.key or "").rpartition(".")[2])
+    if dimension is not None and isinstance(error.value, float):
+        error.value = dimension.show(error.value)
     error.file = case.location(error.key or "")
+
+
+def rack_at(case: Case, key: str) -> RackSection:
+    """The rack section of a key, that of all gears or of one."""
+    gear = key.partition(".")[0]
+    return case.rack if gear == "rack" else getattr(case, gear).rack
 
 
 def _in_transverse_section(error: GeometryError, case: Case) -> None:

@@ -13,6 +13,7 @@ from femgear.gears.interference import check_interference
 from femgear.gears.limits import GeometryWarning
 
 if TYPE_CHECKING:
+    from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
 
 BACKLASH_TOLERANCE = 1e-4
@@ -202,8 +203,8 @@ def _contact_ratios(s: PlanetarySet):
                 f"{mesh}: contact ratio {value:.4f}, so contact is lost between teeth",
                 code="E-CONTACT-RATIO",
                 key="set.centre_distance",
-                value=value,
-                limit=">= 1",
+                value=f"contact ratio {value:.4f}",
+                limit="contact ratio >= 1",
                 remedy="lengthen the tips, reduce the working pressure angle or avoid undercut",
             )
         if value < 1.2:
@@ -243,7 +244,21 @@ def _single_gears(s: PlanetarySet):
             yield GeometryWarning(
                 "W-RIM",
                 f"{gear.name}.{'outer_radius' if gear.internal else 'bore_radius'}",
-                f"the {gear.name}'s rim is {rim * 1e3:.4f} mm thick under teeth of {height * 1e3:.4f} mm",
+                f"the {gear.name}'s rim is {rim * 1e3:.4f} mm thick under teeth of {height * 1e3:.4f} mm; "
+                + _rim_held(gear),
                 rim,
-                ">= 1.2 tooth heights (ISO 6336-3, rim factor)",
+                ">= 1.2 tooth heights (below, ISO 6336-3 raises the root stress by a rim factor)",
             )
+
+
+def _rim_held(gear: Gear) -> str:
+    """How a thin rim is held, and what that does to its mesh stiffness and root stress."""
+    if gear.internal:
+        return (
+            'with static.members = "fixed" its outer surface is held rigid and the mesh gets stiffer as it '
+            'thins; with "elastic" it bends on its foundation'
+        )
+    return (
+        "its bore is held rigid, so that it cannot bend and the mesh gets stiffer as it thins, where a rim "
+        "on a bearing or hub that yields gets softer and its root stress rises: neither is computed"
+    )

@@ -87,14 +87,30 @@ def fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
     return float(np.max(arc))
 
 
+def _rounded_up(radius: float) -> str:
+    """Diameter in mm of the smallest tip circle [m] that is allowed, to be typed as it stands."""
+    return f"{math.ceil(2e7 * radius) / 1e4:.4f}"
+
+
+def _rounded_down(radius: float) -> str:
+    """The same of the largest one."""
+    return f"{math.floor(2e7 * radius) / 1e4:.4f}"
+
+
+def _tip_limit(partner: Gear, allowed: float) -> str:
+    """Allowed tip diameters in mm: above that of a ring, below that of the others."""
+    return f">= {_rounded_up(allowed)}" if partner.internal else f"<= {_rounded_down(allowed)}"
+
+
 def _involute_interference(gear: Gear, partner: Gear, reach: float):
+    allowed = math.hypot(partner.base_radius, partner.tip_roll - reach)
     raise GeometryError(
         f"involute interference: the {partner.name}'s tip meets the {gear.name} {-reach * 1e3:.4f} mm beyond "
         f"the end of the line of action, inside the {gear.name}'s base circle",
         code="E-INTERFERENCE",
         key=f"{partner.name}.tip_diameter",
         value=2.0 * partner.tip_radius,
-        limit=f"tip diameter >= {2e3 * math.hypot(partner.base_radius, partner.tip_roll - reach):.4f} mm",
+        limit=f"tip diameter >= {_rounded_up(allowed)} mm",
         remedy=f"give that tip_diameter, more teeth to the {gear.name}, or profile shifts",
     )
 
@@ -127,7 +143,7 @@ def _fillet_interference(gear: Gear, partner: Gear, reach: float, overlap: float
         value=round(gear.tool.rounding / gear.module, 9),
         limit=f"active profile {'up' if gear.internal else 'down'} to {gear.form_radius * 1e3:.4f} mm",
         remedy=f"reduce root_radius, or give the {partner.name} a tip_diameter "
-        f"{'>=' if partner.internal else '<='} {2e3 * allowed:.4f} mm",
+        f"{_tip_limit(partner, allowed)} mm",
     )
 
 
@@ -138,7 +154,7 @@ def _fillet_warning(gear: Gear, partner: Gear, reach: float, overlap: float) -> 
         f"{partner.name}.tip_diameter",
         _fillet_message(gear, reach, partner, overlap),
         2.0 * partner.tip_radius,
-        f"{'>=' if partner.internal else '<='} {2e3 * allowed:.4f} mm",
+        f"{_tip_limit(partner, allowed)} mm",
     )
 
 

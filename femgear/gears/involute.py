@@ -153,7 +153,7 @@ def angle_at_centre_distance(
             code="E-CENTRE-DISTANCE",
             key="set.centre_distance",
             value=centre_distance,
-            limit=f">= {base * 1e3:.6g} mm",
+            limit=f">= {math.ceil(base * 1e7) / 1e4:.4f} mm",
             remedy="increase the centre distance or reduce the tooth numbers or the module",
         )
     return pressure_angle_at(centre_distance, base)

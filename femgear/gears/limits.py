@@ -183,10 +183,10 @@ def _check_tool(gear: Gear) -> None:
             gear,
             "rack.root_radius",
             f"a tool tip rounding of {rounding:.4f} modules does not fit between the flanks of the tool"
-            + (f"; the largest is {largest:.4f}" if largest > 0.0 else ", nor does any other"),
+            + ("" if largest > 0.0 else ", nor does any other"),
             code="E-ROOT-RADIUS",
             value=rounding,
-            limit=f"<= {largest:.4f} modules",
+            limit=f"<= {largest:.4f} modules" if largest > 0.0 else None,
             remedy="reduce root_radius" if largest > 0.0 else "reduce the dedendum",
         )
 
@@ -200,12 +200,12 @@ def _room(gear: Gear, rounding: float | None) -> float:
 
 
 def _largest_rounding(gear: Gear) -> float:
-    """Largest tool tip rounding [modules] that fits with the same root circle, by bisection."""
+    """Largest tool tip rounding [modules] that fits with the same root circle, rounded down to 1e-4."""
     low, high = 0.0, 3.0
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _room(gear, middle) >= 0.0 else (low, middle)
-    return low
+    return math.floor(1e4 * low) / 1e4
 
 
 def _check_cutter(gear: Gear) -> None:

@@ -1,5 +1,6 @@
 """Optimisation over entries of the case file: objectives, limits, searches, Pareto fronts, sweeps."""
 
+from femgear.case import with_values
 from femgear.optimisation.names import NAMES, named_quantity, parse_limit, parse_variable
 from femgear.optimisation.objectives import (
     Quantity,
@@ -17,7 +18,7 @@ from femgear.optimisation.search import METHODS, Optimum, minimise
 from femgear.optimisation.sensitivity import Tolerance
 from femgear.optimisation.sweep import Sweep, parse_over, sweep
 from femgear.optimisation.sweep_files import sweep_into
-from femgear.optimisation.variables import Variable, with_values
+from femgear.optimisation.variables import Variable
 
 __all__ = [
     "METHODS",

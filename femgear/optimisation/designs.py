@@ -9,11 +9,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from femgear.case import Case
+from femgear.case import Case, with_values
 from femgear.errors import ContactError, FemgearError, StorageError
 from femgear.optimisation.journal import Journal, open_journal
 from femgear.optimisation.objectives import STAGES, Quantity
-from femgear.optimisation.variables import with_values
 from femgear.optimisation.variants import Shared, Variant
 
 Progress = Callable[[str, float, float], None]

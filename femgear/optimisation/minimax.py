@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case import with_values
 from femgear.errors import ContactError, FemgearError, StorageError
-from femgear.optimisation.variables import Variable, with_values
+from femgear.optimisation.variables import Variable
 
 if TYPE_CHECKING:
     from femgear.case import Case

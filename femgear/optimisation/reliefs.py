@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from femgear.case import Case, planetary_set
+from femgear.case import Case, planetary_set, with_values
 from femgear.casefile.units import LENGTH, to_si
 from femgear.errors import CaseError
-from femgear.optimisation.variables import Variable, with_values
+from femgear.optimisation.variables import Variable
 
 _LATEST_START = 0.93
 """Of the height from the pitch circle to the tip: later ones are chamfers."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.case import Case, with_value
+from femgear.case import Case, with_values
 from femgear.casefile import tomlfile
 from femgear.casefile.units import Dimension, to_si
 from femgear.errors import CaseError
@@ -163,13 +163,6 @@ def split(value: object, key: str) -> tuple[float, str]:
             limit='as in "40 um", or 0.5 for an entry without dimension',
         )
     return number, unit
-
-
-def with_values(case: Case, values: Mapping[str, object]) -> Case:
-    """The case with several entries changed, see `femgear.with_value`."""
-    for key, value in values.items():
-        case = with_value(case, key, value)
-    return case
 
 
 def current(case: Case, variable: Variable) -> float | None:

@@ -12,13 +12,23 @@ from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, factor
 
 # Deviation of a chord from the mean of its tangents [rad], beyond a share of the angle between them.
 _CHORD, _CHORD_SHARE, _CORNER_SHARE = 0.003, 0.15, 0.6
+# Sharpest corner [rad] and distance of the chord from the plane of its sides, over its length.
+_SHARPEST, _ASIDE = 1.2, 0.05
 # Distance from the old point, over that of the prediction from it, after one Newton step on the way back.
 _RETURN = 0.1
 # Middle of a step: distance from the cubic between the ends over the length, and error of Simpson's rule.
 _OFFSET, _TURN = 0.03, 0.1
 
 
-def strain(point: CurvePoint, new: CurvePoint, *, angle: float, contraction: float, corner: bool) -> float:
+def strain(
+    point: CurvePoint,
+    new: CurvePoint,
+    *,
+    angle: float,
+    contraction: float,
+    corner: bool = False,
+    sharp: bool = False,
+) -> float:
     """How far a step was from what is aimed at: 1 on target.
 
     On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
@@ -31,6 +41,8 @@ def strain(point: CurvePoint, new: CurvePoint, *, angle: float, contraction: flo
         Aimed at; see `StepOptions`.
     corner : bool
         The step is so short that the curve may turn in a corner.
+    sharp : bool
+        It is so short that any turn is one of a corner, between whose sides the chord lies.
 
     Raises
     ------
@@ -38,6 +50,9 @@ def strain(point: CurvePoint, new: CurvePoint, *, angle: float, contraction: flo
         The angle is twice what is aimed at, or the chord leaves the tangents.
     """
     turn = np.arccos(float(np.clip(point.tangent @ new.tangent, -1.0, 1.0)))
+    if sharp and 2.0 * angle < turn <= _SHARPEST:
+        _check_sides(point, new)
+        return float(np.sqrt(new.contraction / contraction))
     if turn > 2.0 * angle:
         raise LostError(f"the tangent turns by {turn:.2g} rad")
     chord = new.z - point.z
@@ -48,6 +63,17 @@ def strain(point: CurvePoint, new: CurvePoint, *, angle: float, contraction: flo
     if aside > _CHORD + (_CORNER_SHARE if corner else _CHORD_SHARE) * turn:
         raise LostError(f"the chord leaves the tangents by {aside:.2g} rad: another curve was reached")
     return max(turn / angle, np.sqrt(new.contraction / contraction))
+
+
+def _check_sides(point: CurvePoint, new: CurvePoint) -> None:
+    """A step over a corner between two straight sides goes forward along each of them."""
+    chord = new.z - point.z
+    sides = np.column_stack([point.tangent, new.tangent])
+    ways = np.linalg.lstsq(sides, chord, rcond=None)[0]
+    length = float(np.linalg.norm(chord))
+    aside = np.linalg.norm(chord - sides @ ways) / length
+    if not (aside <= _ASIDE and ways.min() >= -_ASIDE * length):
+        raise LostError(f"a corner that the step does not go around ({aside:.2g} aside): another curve")
 
 
 def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:

@@ -17,9 +17,15 @@ from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, correc
 
 # A loop is closed when it meets its start within this (scaled) distance.
 _CLOSED = 1e-6
+# One that starts in a branch point is closed by the same one within this part of the step.
+_CLOSED_BRANCH = 1e-2
 # Steps below this part of the largest one may turn in a corner of the curve; of a larger one than that of
 # a tenth of the scales they are no shorter than gaps between curves.
 _CORNER, _CORNER_LARGEST = 1e-3, 0.1
+# Steps below this part of those turn in a sharp corner: no smooth curve that the step control follows does.
+_SHARP = 0.02
+# Largest step over its option, a unit of the scaled unknowns, where they are large.
+_RELATIVE = 0.1
 # Largest options: the chord is compared with the mean of two tangents, and Newton's method must contract.
 _MOST_ANGLE, _MOST_CONTRACTION = 0.5, 0.25
 
@@ -31,7 +37,7 @@ class StepOptions:
     Parameters
     ----------
     first, smallest, largest : float
-        Step lengths.
+        Step lengths; where the scaled unknowns exceed ten, the largest is that many tenths longer.
     angle : float
         Angle between successive tangents that is aimed at [rad], up to 0.5; twice as much is refused.
     contraction : float
@@ -97,7 +103,8 @@ def curve_points(
     point, h, count = first, options.first, 1
     while count < options.max_points:
         try:
-            segment, special, h = _step(curve, point, min(h, options.largest), bounds, options)
+            h = max(min(h, _longest(point, options)), options.smallest)
+            segment, special, h = _step(curve, point, h, bounds, options)
         except LostError as lost:
             return Ending(False, False, f"lost after {_where(curve, point)}: {lost}")
         events = [*special, (segment.length, segment.last)]
@@ -111,7 +118,14 @@ def curve_points(
             return Ending(True, True, "closed loop")
         point = segment.last
     where = _where(curve, point)
-    return Ending(False, False, f"stopped at {where} after {count} points: raise max_points")
+    return Ending(
+        False, False, f"stopped at {where} after {count} points: raise max_points, largest or the scale"
+    )
+
+
+def _longest(point: CurvePoint, options: StepOptions) -> float:
+    """Largest step from a point: relative to its unknowns where they have outgrown their scale."""
+    return options.largest * max(1.0, _RELATIVE * float(np.linalg.norm(point.z[:-1])))
 
 
 def _where(curve: ScaledCurve, point: CurvePoint) -> str:
@@ -127,8 +141,10 @@ def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: Step
             new = _landing(curve, point, h, bounds)
             if new is None:
                 new = correct(curve, point.z + h * point.tangent, point.tangent)
-            corner = h <= _CORNER * min(options.largest, _CORNER_LARGEST)
+            shortness = h / (_CORNER * min(options.largest, _CORNER_LARGEST))
+            corner = shortness <= 1.0
             aims = {"angle": options.angle, "contraction": options.contraction, "corner": corner}
+            aims["sharp"] = shortness <= _SHARP
             effort = strain(point, new, **aims)
             if not corner:
                 check_step(curve, point, new)
@@ -208,6 +224,8 @@ def _at_bound(segment: Segment, low, high, bound: float):
 
 def _closing(segment: Segment, first: CurvePoint, events, count: int):
     """Events up to the start of the curve, when the segment meets it again in the same sense."""
+    if first.orientation == 0.0:
+        return _closing_branch(segment, first, events, count)
     offset = first.z - segment.first.z
     h = float(segment.first.tangent @ offset)
     if count < 3 or not 0.0 < h <= segment.length or segment.first.tangent @ first.tangent < 0.5:
@@ -221,3 +239,12 @@ def _closing(segment: Segment, first: CurvePoint, events, count: int):
     if np.linalg.norm(met.z - first.z) > _CLOSED or met.tangent @ first.tangent < 0.9:
         return events, False
     return [e for e in events if e[0] < h - 1e-9] + [(h, replace(first, kind="regular"))], True
+
+
+def _closing_branch(segment: Segment, first: CurvePoint, events, count: int):
+    """The same for a curve that starts in a branch point, where Newton's method would not converge."""
+    for place, point in events if count >= 3 else ():
+        near = np.linalg.norm(point.z - first.z) <= _CLOSED_BRANCH * segment.length
+        if point.kind == "branch point" and near and point.tangent @ first.tangent > 0.9:
+            return [e for e in events if e[0] < place] + [(place, replace(first, kind="regular"))], True
+    return events, False

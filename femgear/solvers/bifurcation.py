@@ -11,12 +11,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from femgear.solvers.corrector import CurvePoint, LostError, ScaledCurve, correct
+from femgear.solvers.corrector import CurvePoint, LostError, RoundingError, ScaledCurve, correct
 
 # A located point this near to the start of a segment, in parts of the segment, is that start.
 _START = 1e-9
 # Half width, in parts of the segment, of the window in which a branch point must lie on one smooth curve.
 _WINDOW = 1e-3
+# The same for the two points whose mean is the branch point.
+_BESIDE = 1e-5
 # Share of the largest second derivative below which the crossing curve has no curvature term.
 _FLAT = 1e-6
 
@@ -108,9 +110,33 @@ def branch_point(segment: Segment) -> tuple[float, CurvePoint] | None:
     low, high = tau(0.0), tau(length)
     if low * high >= 0.0:
         raise LostError("the orientation changes without a branch point: another curve was reached")
-    h = _root(tau, 0.0, length, low, high)
+    h = _singular_place(tau, length, low, high)
     _check_smooth(segment, h)
     return h, _on_both(segment, h)
+
+
+def _singular_place(tau, length: float, at_low: float, at_high: float) -> float:
+    """Zero of tau between 0 and length; where rounding forbids corrections beside it, that of a line.
+
+    Rounding grows with one over tau, so that points very near the zero cannot be corrected to tolerance.
+    """
+    from scipy.optimize import brentq
+
+    known = {0.0: at_low, length: at_high}
+
+    def value(h: float) -> float:
+        if h not in known:
+            known[h] = tau(h)
+        return known[h]
+
+    try:
+        return brentq(value, 0.0, length, xtol=1e-13 * length, rtol=1e-14)
+    except RoundingError:
+        low = max(h for h in known if known[h] * at_low > 0.0)
+        high = min(h for h in known if known[h] * at_high > 0.0)
+        if high < low:
+            raise
+        return low + (high - low) * known[low] / (known[low] - known[high])
 
 
 def _turned(segment: Segment, h: float) -> CurvePoint:
@@ -119,19 +145,32 @@ def _turned(segment: Segment, h: float) -> CurvePoint:
 
 def _check_smooth(segment: Segment, h: float) -> None:
     """A crossing has the same curve on both sides; a jump from curve to curve has a gap."""
-    width = _WINDOW * segment.length
-    low, high = max(h - width, 0.0), min(h + width, segment.length)
-    before, after = segment.at(low), _turned(segment, high)
+    low, high, before, after = _beside(segment, h, _WINDOW)
     gap = np.linalg.norm(after.z - before.z) / (high - low)
     if before.orientation == after.orientation or gap > 3.0 or before.tangent @ after.tangent < 0.9:
         raise LostError("the points before and after a change of orientation lie on different curves")
 
 
+def _beside(segment: Segment, h: float, part: float):
+    """Places and points before and after the place h, as near as asked or as rounding allows.
+
+    The distance starts with a part of the segment.
+    """
+    while True:
+        width = part * segment.length
+        low, high = max(h - width, 0.0), min(h + width, segment.length)
+        try:
+            return low, high, segment.at(low), _turned(segment, high)
+        except RoundingError:
+            part *= 4.0
+            if part > 1.0:
+                raise
+
+
 def _on_both(segment: Segment, h: float) -> CurvePoint:
     """The branch point as the mean of two points beside it, where the equations are not singular."""
-    width = 1e-5 * segment.length
-    before, after = segment.at(max(h - width, 0.0)), segment.at(h + width)
-    share = (h - max(h - width, 0.0)) / (h + width - max(h - width, 0.0))
+    low, high, before, after = _beside(segment, h, _BESIDE)
+    share = (h - low) / (high - low)
     z = before.z + share * (after.z - before.z)
     tangent = before.tangent + share * (after.tangent - before.tangent)
     _, derivative = segment.curve.equations(z)

@@ -23,6 +23,9 @@ from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.routes import FamilyRoute, FrequencyRoute, Route
 from femgear.solvers.verdict import FloquetVerdict
 
+# Share of the upper half of the lines that asks for more of them.
+_LONG_TAIL = 1e-2
+
 
 @dataclass(frozen=True)
 class Branch:
@@ -128,8 +131,9 @@ class Branch:
 
     @property
     def message(self) -> str:
-        """How the branch ended."""
-        return self.curve.message
+        """How the branch ended; where it was lost, what to change."""
+        lost = self.curve.message.startswith("lost")
+        return self.curve.message + (f"; {_advice(self.solutions[-1], self.route)}" if lost else "")
 
 
 def frequency_response_curve(
@@ -325,6 +329,20 @@ def branch_maximum(
     if branch.stability:
         best = (*best[:2], branch.route.judged(best[:1], best[2:], tolerance)[0])
     return best
+
+
+def _advice(last: PeriodicSolution, route: Route) -> str:
+    """What to change where a branch was lost."""
+    balance = route.balance
+    unsmoothed = any(getattr(element, "smoothing", 1.0) == 0.0 for element in balance.problem.elements)
+    found = ["start from the other end of the range"]
+    if last.tail > _LONG_TAIL:
+        found.append(f"take more than {int(np.abs(last.orders).max())} harmonics")
+    if unsmoothed and balance.longest:
+        found.append(f"give the elements a smoothing length, such as {1e-2 * balance.longest:.2g} m")
+    elif not unsmoothed:
+        found.append(f"take more samples than {max(balance.grid.samples)}")
+    return ", or ".join([*found, "lower StepOptions(smallest)"])
 
 
 def _ends(value, key: str, unit: str) -> tuple[float, float]:

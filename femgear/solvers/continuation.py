@@ -159,7 +159,8 @@ def _with_rows(curve: ScaledCurve, z: np.ndarray) -> ScaledCurve:
         size = np.abs(curve.equations(z)[1]).max(axis=1)
     except LostError as error:
         raise ConvergenceError(f"the start cannot be used: {error}", code="E-START") from error
-    return replace(curve, rows=np.where(size > 0.0, size, max(size.max(), np.finfo(float).tiny)))
+    # in a branch point all of one equation may vanish
+    return replace(curve, rows=np.where(size > 0.0, size, size.max() or 1.0))
 
 
 def start_point(curve: ScaledCurve, start, parameter: float, *, limits, direction: int = 1) -> CurvePoint:

@@ -18,6 +18,14 @@ class LostError(Exception):
     """A correction that did not succeed; the reason is its text."""
 
 
+class RoundingError(LostError):
+    """A correction that came near a solution, but whose last steps are rounding: it is nearly singular."""
+
+
+# Residuals over the sizes of the rows, relative to 1 + |z|, that are rounding.
+_ROUNDING = 1e-13
+
+
 def told_value(parameter: float) -> str:
     """A parameter without a name or a unit of its own, in words."""
     return f"parameter = {parameter:.9g}"
@@ -140,11 +148,13 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     from scipy import linalg
 
     z, lengths, contraction, factors = guess.copy(), [], 0.0, None
+    residuals = []
     unit = np.zeros(len(z))
     unit[-1] = 1.0
     for _ in range(curve.max_iterations):
         residual, derivative = curve.equations(z)
         right = np.append(residual, normal @ (z - guess))
+        residuals.append(float(np.abs(residual).max() / (1.0 + np.linalg.norm(z))))
         if len(lengths) == 1:
             # what the next step would be with the first derivative
             again = linalg.lu_solve(factors, right, check_finite=False)
@@ -158,9 +168,10 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
         if lengths[-1] <= curve.tolerance:
             break
         if len(lengths) > 3 and lengths[-1] > 2.0 * max(lengths[-2], lengths[-3]):
-            raise LostError(f"Newton's method diverges (steps {lengths[-2]:.1e}, {lengths[-1]:.1e})")
+            raise _failed(residuals)(f"Newton's method diverges (steps {lengths[-2]:.1e}, {lengths[-1]:.1e})")
     else:
-        raise LostError(f"no convergence in {curve.max_iterations} iterations (last step {lengths[-1]:.1e})")
+        count, last = curve.max_iterations, lengths[-1]
+        raise _failed(residuals)(f"no convergence in {count} iterations (last step {last:.1e})")
     tangent = linalg.lu_solve(factors, unit, check_finite=False)
     tangent /= np.linalg.norm(tangent)
     if along is not None and tangent @ along < 0.0:
@@ -169,3 +180,8 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     if lengths[0] <= 1e2 * curve.tolerance:
         contraction = 0.0  # rounding
     return CurvePoint(z, tangent, derivative, sign, len(lengths), float(contraction), lengths[-1])
+
+
+def _failed(residuals: list[float]) -> type[LostError]:
+    """Kind of a failure: the last steps began where the equations hold to rounding, or not."""
+    return RoundingError if max(residuals[-2:]) <= _ROUNDING else LostError

@@ -20,7 +20,9 @@ _DIFFERENCE = 1e-5
 
 
 class Route(Protocol):
-    """What a branch asks of the equations along its parameter."""
+    """What a branch asks of the equations along its parameter; ``balance`` has them at its start."""
+
+    balance: HarmonicBalance
 
     @property
     def scale(self) -> float: ...

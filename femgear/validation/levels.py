@@ -73,7 +73,13 @@ def _sets() -> dict[str, Case]:
     for key in ("dynamics", "housing"):
         reference = with_value(reference, key, {})
     out_of_phase = _small(
-        teeth=(28, 41, 110), shift=0.2, ring="profile_shift = 0.0", more="", planets=3, bores=(12, 25), outer=130
+        teeth=(28, 41, 110),
+        shift=0.2,
+        ring="profile_shift = 0.0",
+        more="",
+        planets=3,
+        bores=(12, 25),
+        outer=130,
     )
     pairs = _small(more=SMALL["more"] + ', planet_angles = ["0 deg", "81 deg", "180 deg", "261 deg"]')
     return {
@@ -108,7 +114,9 @@ def at_rest() -> tuple[Row, ...]:
             rows.append(at_most("at rest", REST, quantity, 1e-3, error.max()))
             mean = ste[meshes].mean(axis=1), dte[meshes].mean(axis=1)
             error = np.abs(mean[1] / mean[0] - 1).max()
-            rows.append(at_most("at rest", REST, f"{name}, {kind}: largest difference of the means", 1e-3, error))
+            rows.append(
+                at_most("at rest", REST, f"{name}, {kind}: largest difference of the means", 1e-3, error)
+            )
     return tuple(rows)
 
 

@@ -6,17 +6,20 @@ Problems, 2019): ``x'' + 0.05 x' + x + 0.1 x^3 = 0.18 cos(Omega t)``.
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from femgear.solvers.branches import Branch, branch_maximum, frequency_response_curve
 from femgear.solvers.continuation import StepOptions, continue_curve
 from femgear.solvers.elements import PiecewiseSprings, PolynomialSprings
-from femgear.solvers.harmonic_balance import harmonic_balance, solve_harmonic_balance
+from femgear.solvers.harmonic_balance import displacements, harmonic_balance, solve_harmonic_balance
 from femgear.solvers.harmonics import harmonics_of
 from femgear.solvers.hill import floquet_verdict
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, modal_damping
 from femgear.solvers.shooting import ShootingSolution, solve_free_vibration, solve_shooting
 from femgear.system import MechanicalSystem
 from femgear.validation.rows import Row, at_most, counted, printed, within
@@ -221,6 +224,68 @@ def dead_zone() -> tuple[Row, ...]:
         quantity = f"backlash b = 1, A = {amplitude:g}: determinant of the monodromy less one"
         rows.append(at_most("H4", "no damping", quantity, 1e-9, error))
     return tuple(rows)
+
+
+def two_masses() -> NonlinearSystem:
+    """Ground, spring, 1 kg, spring, 1 kg, and a gap of 0.1 mm on both sides of the second mass; 30 N."""
+    stiffness = 1e6 * np.array([[2.0, -1.0], [-1.0, 1.0]])
+    system = MechanicalSystem(
+        np.eye(2), 0.0 * stiffness, stiffness, np.array([[0.0], [1.0]]), np.zeros(2), ("x1", "x2")
+    )
+    system = replace(system, C=modal_damping(system, np.zeros(1), 0.008))
+    stops = PiecewiseSprings([0], [-1e-4, 1e-4], [5e6, 0.0, 5e6], 1e-6)
+    return NonlinearSystem(system, (stops,), (HarmonicForce([30.0, 0.0]),))
+
+
+def stops() -> tuple[Row, ...]:
+    """H4: two masses with stops from 40 to 250 Hz, past two losses of symmetry and two folds."""
+    problem, name = two_masses(), "two masses with stops:"
+    ends = 2.0 * np.pi * np.array([40.0, 250.0])
+    branch = frequency_response_curve(problem, ends, harmonics=25, options=StepOptions(largest=0.2))
+    one, other = branch.branch_points
+    top, bottom = branch.folds
+    legs = np.split(branch.stable, [one, other, top, bottom])
+    # next to the borders the largest multiplier is one to rounding
+    wrong = sum(int(np.sum(leg[2:-2] != stable)) for leg, stable in zip(legs, (True, False) * 3))
+    rows = [
+        counted("H4", "theory", f"{name} branch reaches 250 Hz (1 yes)", 1, branch.complete),
+        counted("H4", "theory", f"{name} verdicts that do not change at branch points and folds", 0, wrong),
+    ]
+    for hertz, part in (
+        (105.0, np.arange(one)),
+        (200.0, np.arange(other, top)),
+        (200.0, np.arange(bottom, len(branch.parameter))),
+    ):
+        i = part[np.argmin(np.abs(branch.parameter[part] - 2.0 * np.pi * hertz))]
+        settled, found = settled_line(problem, branch.solutions[i]), branch.lines[i][0, 1]
+        side = "up to the loss of symmetry" if part[0] == 0 else "upper" if part[-1] < bottom else "lower"
+        quantity = f"{name} {side}, {branch.parameter[i] / 2 / np.pi:.2f} Hz: error of the first harmonic"
+        error = abs(found - settled) / abs(settled)
+        rows.append(at_most("H4", "integration in time by SciPy's DOP853", quantity, 1e-5, error))
+    return tuple(rows)
+
+
+def settled_line(problem: NonlinearSystem, solution, periods: int = 300, samples: int = 128) -> complex:
+    """First harmonic of the first column after many periods, from the motion of a solution 1 % too large."""
+    system, omega = problem.system, float(solution.frequency[0])
+    lines = displacements(problem, solution)
+    velocity = 1j * solution.line_frequency * lines
+    start = 1.01 * np.concatenate([lines.sum(axis=1).real, velocity.sum(axis=1).real])
+    inverse, n = np.linalg.inv(system.M), len(system.M)
+    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ system.K, -inverse @ system.C]])
+    push = np.concatenate([np.zeros(n), inverse @ problem.forces[0].force.real])
+    column = np.concatenate([np.zeros(n), inverse @ system.W[:, 0]])
+    stop = problem.elements[0]
+    gap, stiffness, soft = stop.breaks[1], stop.slopes[0], stop.smoothing
+
+    def rate(t, y):
+        x = float(system.W[:, 0] @ y[:n])
+        over, under = (0.5 * (d + math.sqrt(d * d + soft * soft)) for d in (x - gap, -x - gap))
+        return matrix @ y + math.cos(omega * t) * push - stiffness * (over - under) * column
+
+    times = 2.0 * np.pi / omega * (periods + np.arange(samples) / samples)
+    run = solve_ivp(rate, (0.0, times[-1]), start, method="DOP853", rtol=1e-9, atol=1e-12, t_eval=times)
+    return complex(np.fft.rfft(system.W[:, 0] @ run.y[:n])[1] * 2.0 / samples)
 
 
 def truss() -> tuple[Row, ...]:

@@ -295,6 +295,7 @@ THEMES = (
             nonlinear.limit_points,
             nonlinear.three_motions,
             nonlinear.dead_zone,
+            nonlinear.stops,
             nonlinear.truss,
             nonlinear.manufactured,
             nonlinear_tones.two_tones,

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +13,8 @@ from femgear.solvers.branches import (
     parameter_curve,
 )
 from femgear.solvers.continuation import StepOptions
-from femgear.solvers.elements import GearMeshes, PolynomialSprings, gear_meshes
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, gear_meshes
+from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, modal_damping
 from femgear.solvers.series import FourierSeries
 from femgear.solvers.stability_chart import stability_boundary
@@ -237,6 +238,106 @@ def test_planet_set_keeps_its_equations_and_verdicts(planet_set, planet_excitati
     np.testing.assert_allclose(found.lines[-1], again.deflection, atol=1e-9)
 
 
+def two_masses(smoothing, *, between=False, forced=0):
+    """Ground-spring-mass-spring-mass with 1 kg and 1e6 N/m each, 30 N, and a gap of 0.1 mm on both sides.
+
+    The gap is that of the second mass to the ground, or the one between both masses.
+    """
+    contact, gap = 5e6, 1e-4
+    column = np.array([[-1.0], [1.0]]) if between else np.array([[0.0], [1.0]])
+    stiffness = 1e6 * np.array([[2.0, -1.0], [-1.0, 1.0]])
+    system = MechanicalSystem(np.eye(2), 0 * stiffness, stiffness, column, np.zeros(2), ("x1", "x2"))
+    system = replace(system, C=modal_damping(system, np.zeros(1), 0.008))
+    stops = PiecewiseSprings([0], [-gap, gap], [contact, 0.0, contact], smoothing)
+    return NonlinearSystem(system, (stops,), (HarmonicForce(30.0 * np.eye(2)[forced]),))
+
+
+TWO_HZ = (2 * np.pi * 40.0, 2 * np.pi * 250.0)
+
+
+@pytest.fixture(scope="module")
+def stops():
+    return frequency_response_curve(two_masses(1e-6), TWO_HZ, harmonics=9, options=StepOptions(largest=0.2))
+
+
+def test_two_masses_with_stops_are_followed_over_both_symmetry_losses(stops):
+    """Where the motion loses its symmetry the equations are singular: the branch goes on behind it."""
+    assert stops.complete and stops.parameter[-1] == TWO_HZ[1]
+    assert stops.residual.max() < 1e-10 and stops.converged.all()
+    assert len(stops.folds) == 2 and len(stops.branch_points) == 2
+    # symmetric motions have odd harmonics only; they are stable up to the first branch point or fold
+    assert np.abs(stops.lines[:, 0, ::2]).max() < 1e-12
+    one, other = stops.branch_points
+    top, bottom = stops.folds
+    legs = np.split(stops.stable, [one, other, top, bottom])
+    stable = [set(leg[2:-2].tolist()) for leg in legs]
+    assert stable == [{True}, {False}, {True}, {False}, {True}]
+    # without contact the response is linear: 40 Hz is below the first resonance at 98.4 Hz
+    system, omega = stops.route.balance.problem.system, TWO_HZ[0]
+    dynamic = system.K - omega**2 * system.M + 1j * omega * system.C
+    linear = np.linalg.solve(dynamic, [30.0, 0.0])[1]
+    assert stops.lines[0, 0, 1] == pytest.approx(linear, rel=1e-3)
+
+
+@pytest.mark.parametrize(("hertz", "leg"), [(105.0, "one"), (200.0, "top")])
+def test_two_masses_with_stops_against_integration_in_time(stops, hertz, leg):
+    """SciPy's integrator settles on the motions of the branch from starts that are 1 % off."""
+    problem, (one, other), (top, _) = stops.route.balance.problem, stops.branch_points, stops.folds
+    part = {"one": np.arange(one), "top": np.arange(other, top)}[leg]
+    i = part[np.argmin(np.abs(stops.parameter[part] - 2 * np.pi * hertz))]
+    solution, omega = stops.solutions[i], stops.parameter[i]
+    lines = displacements(problem, solution)
+    start = 1.01 * np.concatenate(
+        [lines.sum(axis=1).real, (1j * solution.line_frequency * lines).sum(1).real]
+    )
+    system, gap, soft = problem.system, 1e-4, 1e-6
+    (k1, k2, k3), (c1, c2, c3) = ((m[0, 0], m[0, 1], m[1, 1]) for m in (system.K, system.C))
+
+    def rate(t, y):
+        x, z, u, v = y
+        over, under = z - gap, -z - gap
+        over, under = (0.5 * (d + math.sqrt(d * d + soft * soft)) for d in (over, under))
+        one = 30.0 * math.cos(omega * t) - k1 * x - k2 * z - c1 * u - c2 * v
+        return [u, v, one, -k2 * x - k3 * z - c2 * u - c3 * v - 5e6 * (over - under)]
+
+    period = 2 * np.pi / omega
+    times = period * (200 + np.arange(128) / 128)
+    run = solve_ivp(rate, (0.0, times[-1]), start, method="DOP853", rtol=1e-8, atol=1e-12, t_eval=times)
+    settled = np.fft.rfft(run.y[1])[1] / 64
+    assert abs(settled - solution.deflection[0, 1]) < 2e-4 * abs(settled)
+    assert np.abs(run.y[1]).max() == pytest.approx(np.abs(solution.at(times)).max(), rel=2e-3)
+
+
+def test_motions_that_lost_their_symmetry_form_a_closed_loop(stops):
+    side, mirrored = crossing_branches(
+        stops, stops.branch_points[0], stability=False, options=StepOptions(largest=0.2)
+    )
+    for loop in (side, mirrored):
+        assert loop.closed and loop.message == "closed loop"
+        ends = stops.parameter[stops.branch_points]
+        np.testing.assert_allclose([loop.parameter.min(), loop.parameter.max()], ends, rtol=1e-5)
+        assert np.abs(loop.lines[:, 0, 0]).max() > 2e-5
+
+
+def test_sharp_corners_of_sampled_contact_are_passed():
+    """Without smoothing the first samples in contact turn the tangent by 0.4 rad at once, at 85.8 Hz."""
+    problem = two_masses(0.0, between=True, forced=1)
+    found = frequency_response_curve(
+        problem, TWO_HZ, harmonics=9, stability=False, options=StepOptions(max_points=150)
+    )
+    assert found.message.startswith("stopped") and found.parameter[-1] > 2 * np.pi * 86.0
+    corrected = np.delete(found.residual, found.branch_points)
+    assert corrected.max() < 1e-10 and found.residual.max() < 1e-7
+
+
+def test_lost_branch_says_what_to_change():
+    options = StepOptions(first=1e-2, smallest=9e-3, max_points=200)
+    found = frequency_response_curve(two_masses(0.0), TWO_HZ, harmonics=3, stability=False, options=options)
+    assert not found.complete and found.message.startswith("lost after frequency")
+    assert "smoothing length, such as 1e-06 m" in found.message
+    assert "StepOptions(smallest)" in found.message
+
+
 def test_refusals():
     with pytest.raises(CaseError, match="E-RANGE"):
         frequency_response_curve(duffing(), (1.0, 1.0), harmonics=3)
@@ -254,7 +355,7 @@ def test_messages_name_the_frequency_and_its_unit(eleven):
     few = frequency_response_curve(duffing(), (0.8, 1.5), harmonics=3, options=StepOptions(max_points=5))
     last = few.parameter[-1]
     where = f"stopped at frequency {last:.6g} rad/s ({last / (2 * np.pi):.6g} Hz) after 5 points"
-    assert few.message == where + ": raise max_points"
+    assert few.message == where + ": raise max_points, largest or the scale"
     bare = parameter_curve(duffing, (0.1, 0.2), 0.9, harmonics=3, stability=False)
     assert bare.message == "end of the range at parameter = 0.2"
     with pytest.raises(CaseError, match="frequency 2 rad/s"):
