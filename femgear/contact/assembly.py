@@ -191,7 +191,6 @@ def mesh_windows(
     pairs = mesh_pairs(planetary_set)
     tau = cycle_positions(positions, periods=periods)
     # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
-    # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
     turns = (np.ceil(tau) if tau[-1] <= 0.0 else np.floor(tau)).astype(int)
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
