@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+# share of the height below the strongest line that a letter above it takes
+_ROOM = 0.068
 # numbers along an axis, and lines of a spectrum that can be told apart, at most
 _TICKS, _STEMS = 20, 4000
 _LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Fourier"
@@ -147,8 +149,10 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     # what stands for the ring between its points is said where it is not the ring itself
     form = _EXACT if np.array_equal(linear, exact) else _LINEAR
     _stems(axes[0], order, linear, floor, text=form)
-    axes[0].set_xlim(0, order[-1] + 1)
-    last = int(order[-1]) // ring_teeth
+    # the record may reach further than the excitation at this speed
+    end = order[np.maximum(linear, exact) > floor].max(initial=ring_teeth)
+    axes[0].set_xlim(0, end + 0.5 * ring_teeth)
+    last = int(end + 0.5 * ring_teeth) // ring_teeth
     # at most twenty numbers, that none covers another
     multiples = np.arange(1, last + 1) if last <= _TICKS else np.arange(0, last + 1, _whole_step(last))[1:]
     top = axes[0].secondary_xaxis("top")
@@ -204,7 +208,7 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
         shown = inside & (exact > floor)
         ax.plot(order[shown], exact[shown], "o", markerfacecolor="none", color=VERMILION, label=_EXACT)
     peak = np.maximum(linear, exact)
-    limit = peak[inside].max(initial=floor)
+    limit, longest = peak[inside].max(initial=floor), 0
     for k in _labelled(order, peak, inside & (peak > floor), spacing=reach / 22):
         offset = round(order[k]) - centre
         text = (
@@ -212,6 +216,7 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
             if offset == 0
             else f"{order[k]:g} = {_multiple(harmonic, ring_teeth)} {offset:+d}"
         )
+        longest = max(longest, len(text))
         ax.annotate(
             text.replace("-", "−"),
             (order[k], peak[k]),
@@ -226,7 +231,7 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     ax.set_yticks(10.0**decades)
     ax.minorticks_off()
     # room above the strongest line for its label on the logarithmic axis
-    ax.set_ylim(floor, limit * (limit / floor) ** 0.85 if limit > floor else 10 * floor)
+    ax.set_ylim(floor, limit * (limit / floor) ** (_ROOM * longest) if limit > floor else 10 * floor)
     ax.set_xlim(centre - reach, centre + reach)
     label(ax, "carrier order [1]", ACCELERATION, f"around mesh harmonic {harmonic} (order {centre})")
 
