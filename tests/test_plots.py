@@ -368,7 +368,7 @@ def test_no_line_is_drawn_where_there_is_none(harmonics):
             np.testing.assert_allclose(np.array(drawn_lines), np.array(expected), rtol=1e-12)
             assert low < min(y for _, y in drawn_lines) and max(y for _, y in drawn_lines) < high
         left, right = ax.get_xlim()
-        assert left < 1 and right > harmonics
+        assert left < 1 and sun[-1][0] < right < sun[-1][0] + 1
     assert len(plots.png_bytes(figure)) < 600_000
 
 
@@ -459,3 +459,17 @@ def test_order_spectra_draw_the_highest_of_lines_too_close_to_part():
     assert np.all(maximum_filter1d(drawn_lines, 101) >= amplitude * (amplitude > floor))
     few = _highest(order[:3000], amplitude[:3000], amplitude[:3000] > floor)
     assert few.tolist() == np.flatnonzero(amplitude[:3000] > floor).tolist()
+
+
+def test_order_spectrum_says_what_its_lines_are():
+    """Exact lines are called so and drawn once; how far the excitation reaches stands above."""
+    housing = synthetic.housing()
+    names = [
+        text.get_text() for text in plots.order_spectrum(housing, ring_teeth=TEETH).legends[0].get_texts()
+    ]
+    assert names == ["Heaviside, linear interpolation", "exact circumferential Fourier"]
+    housing["order_amplitude"] = housing["order_amplitude_exact"]
+    housing["excitation_limit"] = ("speed", [1080.0, 2500.0])
+    figure = plots.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["exact circumferential Fourier"]
+    assert not any(ax.get_lines() for ax in figure.axes) and "excited up to 2.5 kHz" in figure.get_suptitle()

@@ -191,9 +191,7 @@ def mesh_windows(
     pairs = mesh_pairs(planetary_set)
     tau = cycle_positions(positions, periods=periods)
     # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
-    start = np.ceil(tau[0]) if tau[0] < 0 else np.floor(tau[0])
-    begun = tau[0] if tau[0] < 0 else start
-    turns = (start + np.floor(tau - begun + 1e-9)).astype(int)
+    turns = (np.ceil(tau) if tau[-1] <= 0.0 else np.floor(tau)).astype(int)
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
     count = int(np.ceil(end - begin)) + 4

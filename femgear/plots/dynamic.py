@@ -16,6 +16,7 @@ from femgear.plots.style import (
     SKY,
     VERMILION,
     distinct_lines,
+    excited_to,
     family,
     label,
     legend_below,
@@ -173,11 +174,11 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
         if largest > 0.0:
             ax.set_yscale("log")
             ax.set_ylim(floor, 2.0 * largest)
-        ax.set_xlim(0.4, h.max(initial=1) + 0.6)
+        # speeds may reach different harmonics: axes end with the last line
+        last = h[(amplitude[s] > floor).any(axis=0)].max(initial=1)
+        ax.set_xlim(0.4, last + 0.6)
         ax.xaxis.set_major_locator(MaxNLocator(nbins=12, integer=True))
-        title = rpm(dynamics["speed"].values[s])
-        if "excitation_limit" in dynamics:
-            title += f", excited up to {float(dynamics['excitation_limit'].values[s]):.4g} Hz"
+        title = rpm(dynamics["speed"].values[s]) + excited_to(dynamics, s)
         label(ax, "harmonic of the mesh frequency [1]", title=title)
     for ax in axes[::2]:
         label(ax, y="amplitude of the transmission error [µm]")

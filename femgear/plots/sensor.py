@@ -16,6 +16,7 @@ from femgear.plots.style import (
     ORANGE,
     SIZE,
     VERMILION,
+    excited_to,
     label,
     legend_below,
     new_figure,
@@ -26,8 +27,11 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+# share of the height below the strongest line that a letter above it takes
+_ROOM = 0.068
 # numbers along an axis, and lines of a spectrum that can be told apart, at most
 _TICKS, _STEMS = 20, 4000
+_LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Fourier"
 ACCELERATION = "acceleration [m/s²]"
 
 
@@ -77,7 +81,8 @@ def housing_signal(
     signal = housing["acceleration"].values[speed_index]
     text = "largest and smallest within a mesh period"
     around = _extremes(signal, ring_teeth)
-    _draw_signal(axes[0], signal, around, f"{speed}: all orders", text=text, colour=ORANGE)
+    title = f"{speed}{excited_to(housing, speed_index)}: all orders"
+    _draw_signal(axes[0], signal, around, title, text=text, colour=ORANGE)
     for ax, harmonic in zip(axes[1:], harmonics):
         found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
         around = found.envelope, -found.envelope
@@ -141,9 +146,13 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.8 * len(bands))
     largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
     floor = 1e-4 * largest
-    _stems(axes[0], order, linear, floor)
-    axes[0].set_xlim(0, order[-1] + 1)
-    last = int(order[-1]) // ring_teeth
+    # what stands for the ring between its points is said where it is not the ring itself
+    form = _EXACT if np.array_equal(linear, exact) else _LINEAR
+    _stems(axes[0], order, linear, floor, text=form)
+    # the record may reach further than the excitation at this speed
+    end = order[np.maximum(linear, exact) > floor].max(initial=ring_teeth)
+    axes[0].set_xlim(0, end + 0.5 * ring_teeth)
+    last = int(end + 0.5 * ring_teeth) // ring_teeth
     # at most twenty numbers, that none covers another
     multiples = np.arange(1, last + 1) if last <= _TICKS else np.arange(0, last + 1, _whole_step(last))[1:]
     top = axes[0].secondary_xaxis("top")
@@ -153,10 +162,9 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     label(axes[0], "carrier order [1]", ACCELERATION)
     axes[0].set_ylim(floor, 2.5 * largest)
     for ax, harmonic in zip(axes[1:], bands):
-        _draw_band(ax, order, linear, exact, ring_teeth, harmonic)
-    figure.suptitle(
-        f"Order spectrum of the fixed sensor, {rpm(housing['speed'].values[speed_index])}", fontsize=12
-    )
+        _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form)
+    speed = rpm(housing["speed"].values[speed_index]) + excited_to(housing, speed_index)
+    figure.suptitle(f"Order spectrum of the fixed sensor, {speed}", fontsize=12)
     legend_below(figure)
     return figure
 
@@ -169,7 +177,7 @@ def _strongest_bands(order, amplitude, ring_teeth, count):
     return sorted(ranked[:count])
 
 
-def _stems(ax, order, amplitude, floor, *, text="Heaviside, linear interpolation", colour=BLUE, width=1.0):
+def _stems(ax, order, amplitude, floor, *, text, colour=BLUE, width=1.0):
     shown = _highest(order, amplitude, amplitude > floor)
     ax.vlines(order[shown], floor, amplitude[shown], color=colour, linewidth=width, label=text)
     ax.set_yscale("log")
@@ -187,7 +195,7 @@ def _highest(order, amplitude, shown) -> np.ndarray:
     return numbers[ranked[last]]
 
 
-def _draw_band(ax, order, linear, exact, ring_teeth, harmonic):
+def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     centre = harmonic * ring_teeth
     own = np.rint(order / ring_teeth) == harmonic
     largest = max(linear[own].max(initial=0.0), exact[own].max(initial=0.0)) or 1.0
@@ -195,18 +203,12 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic):
     # the images that the interpolation makes far from the centre are left to the upper diagram
     reach = int(np.abs(order[own & (exact > floor)] - centre).max(initial=4.0)) + 2
     inside = np.abs(order - centre) <= reach
-    _stems(ax, order[inside], linear[inside], floor, width=2.5)
-    shown = inside & (exact > floor)
-    ax.plot(
-        order[shown],
-        exact[shown],
-        "o",
-        markerfacecolor="none",
-        color=VERMILION,
-        label="exact circumferential Fourier",
-    )
+    _stems(ax, order[inside], linear[inside], floor, text=form, width=2.5)
+    if form != _EXACT:
+        shown = inside & (exact > floor)
+        ax.plot(order[shown], exact[shown], "o", markerfacecolor="none", color=VERMILION, label=_EXACT)
     peak = np.maximum(linear, exact)
-    limit = peak[inside].max(initial=floor)
+    limit, longest = peak[inside].max(initial=floor), 0
     for k in _labelled(order, peak, inside & (peak > floor), spacing=reach / 22):
         offset = round(order[k]) - centre
         text = (
@@ -214,6 +216,7 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic):
             if offset == 0
             else f"{order[k]:g} = {_multiple(harmonic, ring_teeth)} {offset:+d}"
         )
+        longest = max(longest, len(text))
         ax.annotate(
             text.replace("-", "−"),
             (order[k], peak[k]),
@@ -228,7 +231,7 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic):
     ax.set_yticks(10.0**decades)
     ax.minorticks_off()
     # room above the strongest line for its label on the logarithmic axis
-    ax.set_ylim(floor, limit * (limit / floor) ** 0.85 if limit > floor else 10 * floor)
+    ax.set_ylim(floor, limit * (limit / floor) ** (_ROOM * longest) if limit > floor else 10 * floor)
     ax.set_xlim(centre - reach, centre + reach)
     label(ax, "carrier order [1]", ACCELERATION, f"around mesh harmonic {harmonic} (order {centre})")
 

@@ -163,6 +163,13 @@ def periodic(position, values):
     return np.append(position, length + position[0]), np.concatenate([values, values[..., :1]], axis=-1)
 
 
+def excited_to(data, speed_index: int) -> str:
+    """Highest frequency of the excitation at one speed, for a title; empty where it is not known."""
+    if "excitation_limit" not in data:
+        return ""
+    return f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
+
+
 def rpm(speed: float) -> str:
     """Input speed in a title; speeds in datasets are in rpm."""
     return f"{float(speed):.6g} rpm"
