@@ -219,9 +219,7 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
 
 
 @one_blas_thread()
-def solve_modes(
-    case: Case, static: StaticResult, *, progress: Progress | None = None
-) -> ModesResult:
+def solve_modes(case: Case, static: StaticResult, *, progress: Progress | None = None) -> ModesResult:
     """Modal basis of the set with its elastic ring and mean mesh stiffnesses.
 
     Its loaded state, from which the meshes take stiffness and excitation, is that of the set on its supports
@@ -511,9 +509,7 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     if case.housing.form == "linear":
         static = np.zeros_like(dynamics.ring_radial)
         static[:, 0] = dynamics.ring_radial[:, 0]
-        moving = heaviside_linear_lines(
-            dynamics.ring_radial - static, *arguments, points=case.housing.points
-        )
+        moving = heaviside_linear_lines(dynamics.ring_radial - static, *arguments, points=case.housing.points)
         still = fixed_sensor_lines(static, *arguments)
         lines = replace(moving, displacement=moving.displacement + still.displacement)
     return HousingResult(

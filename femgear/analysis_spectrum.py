@@ -129,7 +129,7 @@ class LoadedTeeth:
 
 def loaded_teeth(cycle: MeshCycle, *, reverse: bool) -> LoadedTeeth:
     """Tooth loads of a cycle; `reverse` says that the torque on the sun is negative."""
-    position = np.arange(len(cycle.position)) * (-1 if reverse else 1)
+    each = len(cycle.position) // cycle.periods
     sense, order = (-1, slice(None, None, -1)) if reverse else (1, slice(None))
     return LoadedTeeth(
         load=cycle.tooth_load[:, order],
@@ -138,7 +138,7 @@ def loaded_teeth(cycle: MeshCycle, *, reverse: bool) -> LoadedTeeth:
         back_load=cycle.back_tooth_load,
         back_path=sense * cycle.back_path,
         back_tooth=sense * cycle.back_tooth,
-        turn=position // (len(position) // cycle.periods),
+        turn=sense * (np.arange(len(cycle.position)) // each),
         periods=cycle.periods,
         reverse=reverse,
     )
@@ -298,7 +298,7 @@ def _by_turn(teeth: LoadedTeeth):
 
 def _one_turn(teeth: LoadedTeeth) -> np.ndarray:
     """Positions of a record of one period in the order of the turning seen in `teeth`."""
-    return np.arange(teeth.each) * (-1 if teeth.reverse else 1) % teeth.each
+    return np.arange(teeth.each)[:: -1 if teeth.reverse else 1]
 
 
 def _largest_tension(field, teeth: LoadedTeeth, target, m, samples) -> tuple[float, int, int]:
@@ -337,7 +337,7 @@ def _history(places: np.ndarray, teeth: LoadedTeeth, start, step: int) -> np.nda
     """Stress of one tooth over a turn from that at all places (z, P), the pitch point after a quarter."""
     mesh, gear = start
     z, positions = places.shape
-    path = teeth.path[mesh, :, 0]
+    path = teeth.path[mesh, :, _one_turn(teeth)[0]]
     slot = int(np.abs(path).argmin())
     turn = places[(teeth.tooth[gear, mesh, slot] + step * np.arange(z)) % z].ravel()
     if len(path) > 1:

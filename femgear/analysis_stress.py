@@ -175,8 +175,7 @@ def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
     done, roots, first = {}, [], []
     for number, one in enumerate(ranges):
         slot, position = one.worst
-        period = (position - 1 if reverse else position) // each
-        start = (period - slot - 2) % cycle.periods
+        start = (position // each - slot - 2) % cycle.periods
         if start not in done:
             part = _excerpt(cycle, start, length)
             done[start] = root_stress_cycle(gears, influences, part, reverse=reverse)

@@ -200,7 +200,12 @@ def dynamics_dataset(result: DynamicsResult) -> xr.Dataset:
         ("ring_tangential", field, result.ring_tangential, "m", "outer tangential displacement of the ring"),
     )
     reach = {
-        "excitation_limit": (("speed",), result.excitation_limit, "Hz", "highest frequency of the excitation"),
+        "excitation_limit": (
+            ("speed",),
+            result.excitation_limit,
+            "Hz",
+            "highest frequency of the excitation",
+        ),
         "level_change": (
             ("speed",),
             result.level_change,

@@ -153,6 +153,7 @@ def transient_dataset(result: TransientResult) -> xr.Dataset:
         "steps": first.steps,
         "every": every,
         "contact": "separating" if first.contact_loss else "linear",
+        "damping_ratio": model.train.damping_ratio,
         "filter": "linear-phase low pass, 0.8 to 1.0 of half the record rate, 80 dB" if every > 1 else "none",
     }
     return dataset(variables, coords, attrs)

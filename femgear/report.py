@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from femgear.files import checksum, storage_errors, write_text
-from femgear.report_captions import SECTIONS, caption_of, comparisons
+from femgear.report_captions import SECTIONS, caption_of, comparisons, doubts
 from femgear.storage import Results, open_results
 from femgear.summary import Block, describe, describe_results
 from femgear.summary_planar import published_modes
@@ -264,7 +264,8 @@ def _pictures(results: Results) -> tuple[list[Picture], list[str]]:
             skipped.append(f"{name} is too large for this page ({len(data) / 1e6:.1f} MB)")
             continue
         rank, section, caption = caption_of(path.stem)
-        caption = " ".join((caption, *comparisons(results.case, path.stem)))
+        added = *comparisons(results.case, path.stem), *doubts(results, path.stem)
+        caption = " ".join((caption, *added))
         found.append((rank, Picture(section, caption, kind, data)))
     found.sort(key=lambda item: item[0])
     return [picture for _, picture in found], skipped

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from femgear.case import Case
     from femgear.casefile.drivetrain import DrivetrainCase
+    from femgear.storage import Results
 
 # stem of a file, its section, its caption; {} stands for what follows the stem
 CAPTIONS = (
@@ -21,8 +22,8 @@ CAPTIONS = (
     (
         "mesh_stiffness",
         "Static",
-        "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (solid) and secant F/δ "
-        "(dotted).",
+        "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (thick) and secant F/δ "
+        "(thin).",
     ),
     (
         "load_sharing",
@@ -118,12 +119,14 @@ CAPTIONS = (
     (
         "dynamic_transmission_error",
         "Dynamics",
-        "Dynamic transmission error over one mesh period, beside the static one; both without their mean.",
+        "Dynamic transmission error over one mesh period (thick) beside the static one, both without their "
+        "mean. The thin static curve has the harmonics of the excitation alone: what rings in both curves "
+        "is the cut series, not vibration. Pale: the whole static curve.",
     ),
     (
         "dynamic_spectrum",
         "Dynamics",
-        "Harmonics of the dynamic transmission error.",
+        "Harmonics of the dynamic transmission error, down to five decades below the largest.",
     ),
     (
         "speed_sweep",
@@ -152,8 +155,9 @@ CAPTIONS = (
     (
         "housing_signal",
         "Housing",
-        "Acceleration at the fixed sensor during one carrier revolution: all orders, and the band around "
-        "a mesh harmonic with its envelope and lobes ({}).",
+        "Acceleration at the fixed sensor during one carrier revolution: all orders with the largest and the "
+        "smallest value within a mesh period, and the band around a mesh harmonic with its envelope and "
+        "lobes ({}).",
     ),
     (
         "order_spectrum",
@@ -182,8 +186,8 @@ CAPTIONS = (
         "drivetrain_mode",
         "Modes",
         "Mode shape of the drivetrain ({}), by the number in the table, where the free spin is the first; "
-        "magnified, at rest in grey. The rays show how far each wheel turns. Shafts of elements are drawn "
-        "through their stations, others as two links with a joint. The drawing is a scheme: bodies without "
+        "magnified, at rest in grey. The rays show how far each wheel turns. Shafts are drawn as bent "
+        "beams between the places that the model knows. The drawing is a scheme: bodies without "
         "gears have a radius that is not theirs.",
     ),
     (
@@ -328,6 +332,28 @@ def comparisons(case: Case | DrivetrainCase, stem: str) -> Iterator[str]:
     for entry in case.planar.published if case.planar is not None else ():
         if entry.figure is not None and (stem == entry.figure or stem.startswith(f"{entry.figure}_")):
             yield f"Beside {entry.source}: {entry.comparison}"
+
+
+_OF_BRANCH = ("weight_response", "carrier_orbit", "planet_bearing_forces", "wedged_teeth", "tooth_contact")
+# figures that show displacements alone, without forces or contact
+_OF_MOTION = ("weight_response", "carrier_orbit", "response_orbit")
+
+
+def doubts(results: Results, stem: str) -> Iterator[str]:
+    """What the results of a planar case say against a picture, for its caption."""
+    from femgear.models.planar_response import TAIL_LIMIT
+
+    stage = "branch" if stem in _OF_BRANCH else "response" if stem.startswith(_OF_RESPONSE) else None
+    if stage is None or results.case.planar is None or stage not in results.stages:
+        return
+    data = results.stage(stage)
+    motion, force = (float(data[name].max()) for name in ("tail", "force_tail"))
+    tail = motion if stem.startswith(_OF_MOTION) else max(motion, force)
+    if tail > TAIL_LIMIT:
+        yield (
+            f"Marked where more than {TAIL_LIMIT:.0%} of the amplitude lies in the upper half of the "
+            f"harmonics (up to {tail:.2g}): shapes and peaks there are not to be trusted (W-TAIL)."
+        )
 
 
 def _contact(case: DrivetrainCase) -> str:

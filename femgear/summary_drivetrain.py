@@ -68,8 +68,23 @@ def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = No
 
     model = model or check_drivetrain(case)
     speeds = case_speeds(case, model)
-    warned = _runaway(case, speeds), _rates(case, model, speeds), _spectra(case, model)
+    warned = (
+        _runaway(case, speeds),
+        _rates(case, model, speeds),
+        _spectra(case, model),
+        _undamped(case),
+    )
     return (*case.notices, *(text for some in warned for text in some))
+
+
+def _undamped(case: DrivetrainCase) -> Iterator[str]:
+    """Runs in which nothing takes energy out of vibration."""
+    if case.simulation.damping_ratio == 0.0:
+        yield (
+            "[W-DAMPING] simulation.damping_ratio: 0, no damping at all: vibration of the start never dies "
+            "away, resonances grow until something else stops them, and teeth seem to part that would not; "
+            "gear trains are commonly computed with 0.02 to 0.05"
+        )
 
 
 def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
@@ -221,8 +236,13 @@ def _operation(case: DrivetrainCase, model: DrivetrainModel) -> Block:
         f"{round(change, 6) + 0.0:.4g} rpm a second; {last:.6g} rpm at the end",
         f"{s.duration:g} s at {s.rate:g} steps a second, {record_rate(case, model):g} records a second; "
         f"{contact}",
+        _damping(s.damping_ratio),
     )
     return Block("Operation", ("torque on", "[N m]"), tuple(rows), notes)
+
+
+def _damping(ratio: float) -> str:
+    return f"damping {100.0 * ratio:g} % of critical in all modes" if ratio else "no damping"
 
 
 def describe_drivetrain_modes(data: xr.Dataset) -> Block:
@@ -246,23 +266,28 @@ def describe_drivetrain_modes(data: xr.Dataset) -> Block:
 
 
 def describe_transient(data: xr.Dataset) -> Block:
-    """Table of transient.nc: mesh forces, speeds, balances."""
-    rows, mean = [], data["mesh_force"].values.mean(axis=1)
+    """Table of transient.nc: mesh forces, those of all steps beside the recorded ones, speeds, balances."""
+    rows, recorded = [], data["mesh_force"].values
+    mean, low, high = (getattr(recorded, name)(axis=1) for name in ("mean", "min", "max"))
     least, largest, pulling = (data[name].values for name in ("least_force", "largest_force", "pulling"))
-    parts = separating(data)
+    parts, thinned = separating(data), int(data.attrs["every"]) > 1
     for v, variant in enumerate(data["variant"].values):
         for m, mesh in enumerate(data["mesh"].values):
-            forces = [f"{1e-3 * values[v, m]:.4f}" for values in (mean, least, largest)]
+            shown = (mean, least, largest, *((low, high) if thinned else ()))
+            forces = [f"{1e-3 * values[v, m]:.4f}" for values in shown]
             shares = [f"{100.0 * pulling[v, m]:.2f}"]
             if parts:
                 shares.insert(0, f"{100.0 * float(data['lost'][v, m]):.2f}")
             rows.append((str(variant), str(mesh), *forces, *shares))
     shares = ("no contact [% of time]", "back flank [% of time]") if parts else ("pulling [% of time]",)
-    header = ("model", "mesh", "mean [kN]", "least [kN]", "largest [kN]", *shares)
+    records = ("least recorded [kN]", "largest recorded [kN]") if thinned else ()
+    header = ("model", "mesh", "mean [kN]", "least [kN]", "largest [kN]", *records, *shares)
     speed, body = data["speed"].values[0], str(data["body"].values[0])
     notes = [
         f"{data.attrs['steps']} steps, at any of which least and largest force may be; {body} from "
         f"{speed[0, 0] / RPM:.4f} to {speed[-1, 0] / RPM:.4f} rpm",
+        *_recorded(data, thinned),
+        *([_damping(float(data.attrs["damping_ratio"]))] if "damping_ratio" in data.attrs else []),
         f"energy balance {float(data['energy_error'].max()):.1e}, angular momentum "
         f"{float(data['momentum_error'].max()):.1e}",
         *_growth_notes(data),
@@ -270,6 +295,15 @@ def describe_transient(data: xr.Dataset) -> Block:
     if pulling.any() and not parts:
         notes.append("these meshes are linear and keep contact: where they pull, real teeth part")
     return Block("Transient", header, tuple(rows), tuple(notes))
+
+
+def _recorded(data: xr.Dataset, thinned: bool) -> Iterator[str]:
+    if thinned:
+        top = 0.5 * PASS_BAND / (float(data.attrs["step"]) * int(data.attrs["every"]))
+        yield (
+            f"recorded: what is left of them in files and pictures, every {data.attrs['every']}th step "
+            f"behind a low pass that ends at {top:.4g} Hz"
+        )
 
 
 def _growth_notes(data: xr.Dataset) -> Iterator[str]:

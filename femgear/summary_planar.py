@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 _MANY = 8
 # distance of a multiplier from 1 at a limit point beyond which harmonics are missing
 _TRUNCATED = 0.2
-# share of the energy in the upper half of the lines beyond which it is said, as in the spectral stage, and
-# share of the amplitude beyond which forces are wrong
-_ENERGY, _WRONG = 1e-6, 0.05
+# share of the energy in the upper half of the lines beyond which it is said, as in the spectral stage
+_ENERGY = 1e-6
 # smoothing over mean compression that is said: the force is then wrong by (0.05 / 2)^2, 0.06 %
 _SMOOTH = 0.05
 _STABLE = {1: "yes", 0: "no", -1: "not known"}
@@ -158,9 +157,11 @@ def tail_warnings(data: xr.Dataset, key: str) -> tuple[str, ...]:
     key : str
         Entry of the case file to raise.
     """
+    from femgear.models.planar_response import TAIL_LIMIT
+
     tail, force = data["tail"].values, data["force_tail"].values
     worst = np.maximum(tail, force)
-    if (wrong := worst > _WRONG).any():
+    if (wrong := worst > TAIL_LIMIT).any():
         return (
             f"[W-TAIL] {_where(data, wrong)}: {worst.max():.2g} of the amplitude lies in the upper half of "
             f"the lines ({tail.max():.2g} of the deflections, {force.max():.2g} of the mesh forces): forces "

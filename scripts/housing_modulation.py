@@ -222,7 +222,9 @@ def _envelope_figure(speed: str, heard: Heard):
             lobes.position, scale * lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False
         )
         title = f"{text}: {len(lobes.position)} lobes (largest value {band.envelope.max():.3g}"
-        label(ax, y="relative to the largest", title=title + (" m/s²)" if name == "exact" else ", no unit)"))
+        label(
+            ax, y="relative to the largest [1]", title=title + (" m/s²)" if name == "exact" else ", no unit)")
+        )
     axes[0].set_xlim(0, 1)
     figure.suptitle(f"{speed}, orders {heard.order[0]} to {heard.order[-1]}", fontsize=12)
     label(axes[1], "carrier revolutions [1]")

@@ -28,8 +28,11 @@ def main(
     damping: float = 0.03,
     lateral: bool = True,
     balance: int = 0,
+    published: bool = False,
 ) -> None:
     """Solve the example train of femgear.models.multistage_example; its numbers are femgear's own.
+
+    With --published: natural frequencies of a published four-stage table, for every reading that it allows.
 
     Parameters
     ----------
@@ -47,6 +50,9 @@ def main(
         The shafts between the stages carry the suns.
     balance
         Speeds at which harmonic balance of the meshes with k(t) stands beside the modal summation, up to 200.
+    published
+        Only the natural frequencies of the table of "Optimized design of dynamic characteristics of planetary
+        gear train", whose units and missing entries allow several readings.
     """
     from femgear.models.multistage_example import SPEED, TORQUE, four_stage_train
     from femgear.models.multistage_modes import multistage_modes
@@ -69,7 +75,10 @@ def main(
             limit=f"0 < lowest < highest, 2 to {MOST_POINTS} speeds, 1 to {MOST_HARMONICS} harmonics, up to "
             f"{MOST_BALANCE} speeds of harmonic balance, 0 < damping < 1",
         )  # fmt: skip
-    folder, train = ready_folder(output), four_stage_train(lateral=lateral)
+    folder = ready_folder(output)
+    if published:
+        return _published(folder)
+    train = four_stage_train(lateral=lateral)
     rpm = np.linspace(lowest, highest, points)
     speed = rpm * math.pi / 30.0
     with Progress() as progress:
@@ -90,6 +99,44 @@ def main(
     _print(train, SPEED, TORQUE)
     names = ["modes.csv", "forces.csv", "stage_energy.png", "mesh_orders.png", "stage_forces.png"]
     say_files(folder, names)
+
+
+def _published(folder: Path) -> None:
+    """Natural frequencies of the published table by stiffness unit, number of planets and support."""
+    from femgear.models.multistage_example import PUBLISHED_FREQUENCIES, published_train
+    from femgear.models.multistage_modes import multistage_modes
+    from femgear.plots import save_figure
+    from femgear.plots.style import BLUE, GREY, label, new_figure
+
+    low, high = PUBLISHED_FREQUENCIES
+    rows, records, ladders = [], [], []
+    for unit, factor in (("N/mm", 1e3), ("N/m", 1.0)):
+        for planets in (3, 4):
+            for held in (False, True):
+                train = published_train(planets=planets, stiffness_unit=factor, held=held)
+                found = multistage_modes(train).modes.frequency
+                elastic, reading = found[found > 0.0], f"{unit}, {planets} planets"
+                end = "last carrier held" if held else "last carrier free"
+                inside = int(np.sum((elastic > low) & (elastic < high)))
+                rows.append(
+                    (reading, end, str(len(found) - len(elastic)), f"{elastic[0]:.1f}", f"{elastic[-1]:.1f}",
+                     f"{inside} of {len(elastic)}")
+                )  # fmt: skip
+                records += [(unit, planets, end, number + 1, float(f)) for number, f in enumerate(found)]
+                ladders.append((f"{reading}\n{end}", elastic))
+    write_csv(folder / "published.csv", ("unit", "planets", "end", "mode", "frequency [Hz]"), records)
+    figure, (ax,) = new_figure(width=8.5, height=4.8)
+    for place, (_, elastic) in enumerate(ladders):
+        ax.hlines(elastic, place - 0.35, place + 0.35, color=BLUE, linewidth=1.2)
+    ax.axhspan(low, high, color=GREY, alpha=0.3, linewidth=0.0)
+    ax.text(-0.35, 1.1 * low, "printed range", va="bottom")
+    ax.set_yscale("log")
+    ax.set_xticks(range(len(ladders)), [name.replace(", ", "\n") for name, _ in ladders], fontsize=8)
+    label(ax, y="natural frequency [Hz]", title="published four-stage table, torsion, rigid shafts")
+    save_figure(figure, folder / "published.png")
+    header = ("reading", "end", "modes at 0 Hz", "lowest [Hz]", "highest [Hz]", f"within {low} to {high} Hz")
+    print_table("Published four-stage table: torsion, rings at rest, rigid shafts", header, rows)
+    say_files(folder, ["published.csv", "published.png"])
 
 
 def _forces(train, speed, torque, harmonics, modes) -> dict[str, np.ndarray]:

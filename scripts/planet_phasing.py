@@ -13,9 +13,9 @@ from script_tools import print_table, ready_folder, run_script, say_files, write
 
 from femgear.errors import CaseError
 
-# four equal planets near the published 30/20/70
 MOST_HARMONICS = 100
-TYPES = {"in-phase": (28, 22, 72), "counter-phased": (30, 20, 70), "sequentially phased": (29, 21, 71)}
+# cases of Table 2 of the paper, four equal planets
+TYPES = {"in-phase": "A", "counter-phased": "C", "sequentially phased": "F"}
 
 
 def main(
@@ -150,38 +150,41 @@ def _types(convention, harmonics):
     """Tables of the three types of four equal planets, and of two pairs that stand unequally."""
     from femgear.gears.phasing import MeshPhasing
     from femgear.gears.phasing_tables import phasing_table
+    from femgear.validation.helical import cases
 
-    sets = {f"{name}: {'/'.join(map(str, z))}": (z, (0, 25, 50, 75)) for name, z in TYPES.items()}
-    sets["unequal pairs: 30/21/72"] = ((30, 21, 72), (0, 21, 51, 72))
-    return {
-        title: phasing_table(MeshPhasing(z[0], z[2], places, convention=convention), range(1, harmonics + 1))
-        for title, (z, places) in sets.items()
-    }
+    found = cases(convention=convention)
+    sets = {_title(name, letter): found[letter] for name, letter in TYPES.items()}
+    sets["unequal pairs: 30/21/72"] = MeshPhasing(30, 72, (0, 21, 51, 72), convention=convention)
+    return {title: phasing_table(one, range(1, harmonics + 1)) for title, one in sets.items()}
+
+
+def _title(name: str, letter: str) -> str:
+    """Phasing, case of Table 2, teeth of sun, planet and ring."""
+    from femgear.validation.helical import TABLE_2
+
+    sun, ring, planet, _ = TABLE_2[letter]
+    return f"{name}: {letter}, {sun}/{planet}/{ring}"
 
 
 def _spectra(points):
     """Forces of two sun meshes of the published helical train, four harmonics of 1 um, 5 % damping."""
-    from femgear.gears.phasing import MeshPhasing, phase_factors, standard_lag
+    from femgear.gears.phasing import phase_factors
     from femgear.models.helical import helical_system
     from femgear.models.helical_modes import helical_modes
     from femgear.models.helical_response import modal_error_response
-    from femgear.validation.helical import kahraman_set
+    from femgear.validation.helical import cases, kahraman_set
 
     data, frequency = kahraman_set(), np.linspace(100.0, 15e3, points)
     system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)
-    last = "sequentially phased"
-    sets = [(f"{name}: {'/'.join(map(str, z))}", z, "rotation") for name, z in TYPES.items()]
-    sets.append((f"{last}: {'/'.join(map(str, TYPES[last]))}, phases as printed", TYPES[last], "printed"))
-    phasings = [
-        MeshPhasing(z[0], z[2], (0, 25, 50, 75), convention=convention, lag=standard_lag(z[1]))
-        for _, z, convention in sets
-    ]
+    last, turning = TYPES["sequentially phased"], cases()
+    sets = {_title(name, letter): turning[letter] for name, letter in TYPES.items()}
+    sets[f"{_title('sequentially phased', last)}, phases as printed"] = cases(convention="printed")[last]
     found = []
     for h in (1, 2, 3, 4):
-        error = 1e-6 * np.array([phase_factors(one, [h]).T for one in phasings])
+        error = 1e-6 * np.array([phase_factors(one, [h]).T for one in sets.values()])
         one = modal_error_response(system, modes, frequency / h, error, harmonics=[h])
         found.append(np.abs(one.force[:, :, 0, :2]))
-    forces = {title: np.array([force[c] for force in found]) for c, (title, *_) in enumerate(sets)}
+    forces = {title: np.array([force[c] for force in found]) for c, title in enumerate(sets)}
     kinds, inside = np.array(modes.kind), (modes.frequency > 0.0) & (modes.frequency < frequency[-1])
     names = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}
     marks = {short: modes.frequency[inside & (kinds == kind)] for short, kind in names.items()}

@@ -36,3 +36,36 @@ def test_range_of_mesh_stiffness_is_that_of_the_example():
     stiffness = [k for stage in four_stage_train().stages for k in stage.data.mesh_stiffness]
     low, high = (float(one) * 1e3 for one in re.findall(r"example have (\S+) to (\S+) N/mm", PAGE)[0])
     assert min(stiffness) == pytest.approx(low, rel=0.1) and max(stiffness) == pytest.approx(high, rel=0.1)
+
+
+def test_table_of_readings_is_what_the_published_data_give():
+    import numpy as np
+
+    from femgear.models.multistage_example import published_train
+    from femgear.models.multistage_modes import multistage_modes
+
+    rows = re.findall(
+        r"^\|[^|]*\| ([34]) \| (free|held) \| (\d) \| (\S+) \| (\S+) \|", PAGE, flags=re.MULTILINE
+    )
+    assert len(rows) == 8
+    for number, (planets, end, rigid, low, high) in enumerate(rows):
+        unit = 1e3 if number < 4 else 1.0
+        train = published_train(planets=int(planets), stiffness_unit=unit, held=end == "held")
+        frequency = multistage_modes(train).modes.frequency
+        assert np.count_nonzero(frequency == 0.0) == int(rigid)
+        elastic = frequency[frequency > 0.0]
+        assert (f"{elastic[0]:.1f}", f"{elastic[-1]:.1f}") == (low, high)
+
+
+def test_page_prints_the_published_table():
+    from femgear.models.multistage_example import PUBLISHED
+
+    table = PAGE[PAGE.index("## A published table") : PAGE.index("`published_train` takes")]
+    for values in PUBLISHED.values():
+        assert len(values) == 4
+    for name in ("sun inertia", "planet inertia", "carrier inertia", "carrier equivalent radius"):
+        row = next(line for line in table.splitlines() if line.startswith(f"| {name}"))
+        assert [float(cell) for cell in row.split("|")[2:6]] == list(PUBLISHED[name])
+    for kind in ("external", "internal"):
+        row = next(line for line in table.splitlines() if line.startswith(f"| {kind} mesh"))
+        assert [float(cell) for cell in row.split("|")[2:6]] == list(PUBLISHED[f"{kind} mesh stiffness"])

@@ -1,6 +1,7 @@
 """Figures: what they draw, that nothing hides anything, and that every axis says its unit."""
 
 import importlib.util
+import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -8,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from scipy.ndimage import maximum_filter1d
 
 from femgear import plots
 from femgear.errors import StorageError
+from femgear.plots.sensor import _highest
 from femgear.plots.style import COLOURS, distinct_lines
 
 _HERE = Path(__file__).parent
@@ -153,7 +156,7 @@ def test_one_tooth_pair_carries_over_the_contact_ratio(figures):
 def test_dynamic_error_over_the_period_is_the_fourier_sum(figures):
     x = synthetic.dynamics()
     dte = (x["dte_real"] + 1j * x["dte_imag"]).values[0, 0]
-    line = line_of(figures["dte"], "dynamic, all sun-planet meshes (identical)")
+    line = line_of(figures["dte"], "all sun-planet meshes (identical)")
     tau = line.get_xdata()[37]
     expected = sum((dte[h] * np.exp(2j * np.pi * h * tau)).real for h in range(1, 13)) * 1e6
     assert line.get_ydata()[37] == pytest.approx(expected, rel=1e-12)
@@ -277,3 +280,182 @@ def test_silent_housing_is_drawn():
         housing[name].values[:] = 0.0
     for draw in (plots.housing_signal, plots.order_spectrum, plots.modulation_polar):
         assert plots.png_bytes(draw(housing, ring_teeth=TEETH)).startswith(b"\x89PNG")
+
+
+def shifted(dataset, names):
+    """The dataset with every mesh its own: rows rolled by different amounts."""
+    found = dataset.copy(deep=True)
+    for name in names:
+        for row in range(found.sizes["mesh"]):
+            found[name].values[row] = np.roll(found[name].values[row], 3 * row + 1, axis=-1) * (
+                1 + 0.01 * row
+            )
+    return found
+
+
+def of_planets(dataset, planets):
+    """The dataset with so many planets, meshes repeated."""
+    rows = np.concatenate([np.zeros(planets, int), np.full(planets, dataset.sizes["mesh"] // 2)])
+    found = dataset.isel(mesh=rows)
+    names = [f"sun-planet {n + 1}" for n in range(planets)] + [f"planet {n + 1}-ring" for n in range(planets)]
+    return found.assign_coords(mesh=names)
+
+
+def looks(lines):
+    """Colour, dash and width of lines that hold something."""
+    return [
+        (one.get_color(), one.get_linestyle(), one.get_linewidth()) for one in lines if len(one.get_xdata())
+    ]
+
+
+@pytest.mark.parametrize("planets", [3, 4, 7])
+def test_meshes_that_differ_have_lines_that_differ(planets):
+    """Colour and dash of all meshes, thick and thin of both kinds of stiffness."""
+    static = shifted(
+        of_planets(synthetic.static(), planets), ("ste", "mesh_stiffness", "mesh_stiffness_secant")
+    )
+    left = plots.static_transmission_error(static).axes[0]
+    assert len(set(looks(left.get_lines()))) == 2 * planets
+    figure = plots.mesh_stiffness(static)
+    assert len(figure.axes) == 2
+    drawn = [look for ax in figure.axes for look in looks(ax.get_lines())]
+    assert len(set(drawn)) == len(drawn) == 4 * planets
+    dynamics = of_planets(synthetic.dynamics(), planets)
+    for row in range(2 * planets):
+        dynamics["dte_real"].values[:, row] *= 1.0 + 0.05 * row
+    figure = plots.transmission_error_period(dynamics, static)
+    for ax in figure.axes:
+        dynamic = [one for one in ax.get_lines() if one.get_linewidth() == 2.0]
+        assert len({look[:2] for look in looks(dynamic)}) == len(looks(dynamic)) == planets
+    renderer = drawn_with_legend(figure)
+    assert all(ax.get_window_extent(renderer).height > 150 for ax in figure.axes)
+
+
+def drawn_with_legend(figure):
+    renderer = drawn(figure)
+    (legend,) = figure.legends
+    box = legend.get_window_extent(renderer)
+    assert not any(box.overlaps(ax.get_window_extent(renderer)) for ax in figure.axes)
+    return renderer
+
+
+@pytest.mark.parametrize("harmonics", [12, 300])
+def test_no_line_is_drawn_where_there_is_none(harmonics):
+    """Lines at rounding are not there: neither bar nor marker, however many harmonics there are."""
+    dynamics = synthetic.dynamics()
+    h = np.arange(harmonics + 1)
+    lines = np.zeros((2, 6, harmonics + 1), complex)
+    lines[..., 1:] = 1e-6 / h[1:]
+    lines[:, :3, h % 3 == 0] = 1e-17
+    lines[:, 3:, h > 6] = 0.0
+    dynamics = dynamics.drop_dims("harmonic").assign_coords(harmonic=h)
+    dynamics["dte_real"] = (("speed", "mesh", "harmonic"), lines.real)
+    dynamics["dte_imag"] = (("speed", "mesh", "harmonic"), lines.imag)
+    figure = plots.transmission_error_spectrum(dynamics)
+    for ax in figure.axes:
+        low, high = ax.get_ylim()
+        shown = {}
+        for container in ax.containers:
+            shown[container.get_label()] = sorted(
+                (round(bar.get_x() + bar.get_width() / 2), bar.get_height()) for bar in container.patches
+            )
+        for line in ax.get_lines():
+            shown[line.get_label()] = list(zip(line.get_xdata(), line.get_ydata()))
+        assert len(shown) == 2
+        sun = [(k, 1.0 / k) for k in h[1:] if k % 3]
+        ring = [(k, 1.0 / k) for k in range(1, 7)]
+        for drawn_lines, expected in zip(shown.values(), (sun, ring)):
+            np.testing.assert_allclose(np.array(drawn_lines), np.array(expected), rtol=1e-12)
+            assert low < min(y for _, y in drawn_lines) and max(y for _, y in drawn_lines) < high
+        left, right = ax.get_xlim()
+        assert left < 1 and right > harmonics
+    assert len(plots.png_bytes(figure)) < 600_000
+
+
+def test_static_curve_has_the_harmonics_of_the_excitation():
+    """Ringing of cut series is in both curves; a static curve with all harmonics is the record itself."""
+    static, dynamics = synthetic.static(), synthetic.dynamics()
+    frequency = dynamics["mesh_frequency"].values
+    ste = static["ste"].values[0] - static["ste"].values[0].mean()
+    lines = np.fft.rfft(ste)[1:6] / len(ste) * 2.0
+    for limit, expected in ((5.5, 5), (1.0, 1)):
+        cut = dynamics.assign(excitation_limit=("speed", limit * frequency))
+        figure = plots.transmission_error_period(cut, static)
+        thin = next(one for one in figure.axes[0].get_lines() if one.get_linewidth() == 0.9)
+        tau = thin.get_xdata()
+        wave = np.exp(2j * np.pi * np.outer(np.arange(1, expected + 1), tau))
+        # the record is linear between its positions: lines h are lower by sinc^2(h / P)
+        size = np.sinc(np.arange(1, expected + 1) / len(ste)) ** 2
+        np.testing.assert_allclose(thin.get_ydata(), 1e6 * ((lines[:expected] * size) @ wave).real, atol=1e-9)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "static, harmonics of the excitation (thin)" in texts and "static, whole (pale)" in texts
+
+
+def test_both_panels_hold_their_tooth_loads():
+    """The panels share one scale: it holds the larger loads, whichever panel has them."""
+    for larger in (0, 3):
+        static = synthetic.static()
+        for name in ("tooth_load", "mesh_force"):
+            static[name].values[larger] *= 3.0
+        for ax in plots.tooth_loads(static).axes:
+            low, high = ax.get_ylim()
+            for line in ax.get_lines():
+                assert low <= np.min(line.get_ydata()) and np.max(line.get_ydata()) < high
+
+
+def test_a_tooth_pair_is_followed_through_several_mesh_periods():
+    """Three periods of a record that grows: a pair carries in the period of its place."""
+    one = synthetic.static()
+    three = one.isel(position=np.tile(np.arange(64), 3)).assign_coords(position=np.arange(192) / 64)
+    three.attrs["mesh_periods"] = 3
+    three["tooth_load"] = three["tooth_load"] * (1.0 + np.arange(192) // 64)
+    for ax, row in zip(plots.tooth_loads(three).axes, (0, 3)):
+        line = ax.get_lines()[0]
+        # positions follow one another by 1/64 and the loads of places are those of their own periods
+        assert np.diff(line.get_xdata()) == pytest.approx(1 / 64)
+        load = one["tooth_load"].values[row] * (1.0 + np.arange(one.sizes["tooth"]) % 3)[:, None]
+        assert np.max(line.get_ydata()) == pytest.approx(load.max())
+    ste = plots.static_transmission_error(three).axes[0].get_lines()[0].get_xdata()
+    assert np.all(np.diff(ste) > 0) and ste[-1] == 3.0
+
+
+def test_the_whole_signal_lies_between_its_extremes():
+    """An unsymmetric signal: its largest values above, its smallest below, no mirror image of either."""
+    housing = synthetic.housing()
+    wave = housing["acceleration"].values
+    wave[:] = np.maximum(wave, 0.2 * wave)
+    signal, high, low, *_ = plots.housing_signal(housing, speed_index=1, ring_teeth=TEETH).axes[0].get_lines()
+    assert np.max(high.get_ydata()) == np.max(wave[1]) and np.min(low.get_ydata()) == np.min(wave[1])
+    assert np.all(high.get_ydata()[:-1] >= signal.get_ydata()) and np.all(
+        low.get_ydata()[:-1] <= signal.get_ydata()
+    )
+
+
+def test_spectra_of_hundreds_of_harmonics_stay_legible():
+    """Numbers of mesh harmonics above the order spectrum keep apart."""
+    housing = synthetic.housing()
+    order = np.arange(220 * TEETH)
+    lines = np.zeros((2, len(order)))
+    lines[:, TEETH * np.arange(1, 220) - 3] = 1.0 / np.arange(1, 220)
+    housing = housing.drop_dims("order").assign_coords(order=order)
+    for name in ("order_amplitude", "order_amplitude_exact"):
+        housing[name] = (("speed", "order"), lines)
+    figure = plots.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    renderer = drawn(figure)
+    (top,) = figure.axes[0].child_axes
+    boxes = [text.get_window_extent(renderer) for text in top.get_xticklabels()]
+    assert 5 < len(boxes) <= 20 and not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
+
+
+def test_order_spectra_draw_the_highest_of_lines_too_close_to_part():
+    order, floor = np.arange(200_000), 1e-4
+    amplitude = 1e-3 * np.random.default_rng(2).random(len(order))
+    amplitude[[7, 123_456]] = 1.0
+    kept = _highest(order, amplitude, amplitude > floor)
+    assert {7, 123_456} <= set(kept.tolist()) and len(kept) <= 4001 and np.all(np.diff(kept) > 0)
+    # nothing that is left out stands above what is drawn beside it
+    drawn_lines = np.zeros(len(order))
+    drawn_lines[kept] = amplitude[kept]
+    assert np.all(maximum_filter1d(drawn_lines, 101) >= amplitude * (amplitude > floor))
+    few = _highest(order[:3000], amplitude[:3000], amplitude[:3000] > floor)
+    assert few.tolist() == np.flatnonzero(amplitude[:3000] > floor).tolist()

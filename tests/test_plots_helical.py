@@ -39,6 +39,21 @@ def test_front_view_shows_where_the_bodies_go():
     assert png_bytes(figure).startswith(b"\x89PNG")
 
 
+def test_bodies_at_rest_touch_and_planets_stay_inside_the_ring():
+    data = kahraman_set()
+    front = helical_mode_shapes(data, helical_modes(data), shown=[1]).axes[0]
+    rest = [line for line in front.get_lines() if line.get_label() == "at rest" and len(line.get_xdata()) > 2]
+    points = [(line.get_xdata(), line.get_ydata()) for line in rest]
+    circles = [(np.mean(x[:-1]), np.mean(y[:-1]), 0.5 * np.ptp(x)) for x, y in points]
+    (_, _, _), (*_, ring), (*_, sun), *planets = circles
+    assert len(planets) == 4
+    for x, y, radius in planets:
+        distance = np.hypot(x, y)
+        assert distance - radius == pytest.approx(sun, rel=1e-3)
+        assert distance + radius == pytest.approx(ring, rel=1e-3)
+        assert distance + radius <= ring * (1.0 + 1e-9)
+
+
 def test_side_view_shows_tilt_and_axial_motion():
     """The sun turns about y by a positive angle: its end at positive x goes down, phi x r = -phi r z."""
     data = kahraman_set()
@@ -46,8 +61,11 @@ def test_side_view_shows_tilt_and_axial_motion():
         figure = helical_mode_shapes(data, with_shape(data, dof, 0.4), shown=[1], scale=0.1)
         lines = [line for line in figure.axes[1].get_lines() if line.get_color() == "#D55E00"]
         (sun,) = lines
-        np.testing.assert_allclose(sun.get_xdata(), [-data.sun_radius, data.sun_radius])
-        np.testing.assert_allclose(sun.get_ydata(), 0.1 * data.ring_radius * np.array(ends), rtol=1e-12)
+        pitch = 1.0 / np.cos(data.pressure_angle_sun_planet)
+        np.testing.assert_allclose(sun.get_xdata(), pitch * data.sun_radius * np.array([-1, 1]), rtol=1e-3)
+        # tilts are arcs on the base circle, drawn out to the pitch circle
+        size = 0.1 * data.ring_radius * (sun.get_xdata()[1] / data.sun_radius if "tilt" in dof else 1.0)
+        np.testing.assert_allclose(sun.get_ydata(), size * np.array(ends), rtol=1e-12)
     assert free_motions(data).shape == (42, 42)
 
 

@@ -33,6 +33,8 @@ from femgear.plots.drivetrain_results import spectrum_figures
 from femgear.run import report_again, run_case
 from femgear.run_stages import stages_of
 from femgear.storage import open_results, run_folder
+from femgear.summary_drivetrain import describe_drivetrain, describe_transient
+from femgear.summary_warnings import case_warnings
 
 ROOT = Path(__file__).parents[1]
 NAMES = ("wind_turbine_drivetrain", "grc_like_drivetrain", "own_chain")
@@ -114,6 +116,33 @@ def test_speeds_forces_and_angles(results, own):
     assert data.attrs["every"] == 4 and data.attrs["steps"] == 4000
     torque = data["torque"].values
     assert np.abs(torque @ ratio).max() < 1e-9
+
+
+def test_tables_show_extremes_of_steps_and_of_records(results, own):
+    """Records are low-passed: both are said, and with what damping they were found."""
+    data = results.transient
+    block = describe_transient(data)
+    row = dict(zip(block.header, block.rows[0], strict=True))
+    force = data["mesh_force"].values[0, :, 0]
+    for text, value in (
+        ("least [kN]", data["least_force"][0, 0]),
+        ("largest [kN]", data["largest_force"][0, 0]),
+        ("least recorded [kN]", force.min()),
+        ("largest recorded [kN]", force.max()),
+    ):
+        assert row[text] == f"{1e-3 * float(value):.4f}"
+    assert row["least [kN]"] != row["least recorded [kN]"]
+    damping = "damping 3 % of critical in all modes"
+    assert damping in block.notes and any("a low pass that ends at" in note for note in block.notes)
+    operation = next(one for one in describe_drivetrain(own) if one.title == "Operation")
+    assert damping in operation.notes
+
+
+def test_every_shipped_chain_has_its_damping_written_down():
+    for path in sorted((ROOT / "cases").glob("*.toml")):
+        if 'model = "drivetrain"' in (text := path.read_text(encoding="utf-8")):
+            assert re.search(r"^damping_ratio = 0\.0[1-9]", text, re.MULTILINE), path.name
+            assert not any("W-DAMPING" in warning for warning in case_warnings(read_case(path)))
 
 
 def test_low_pass_keeps_what_it_should():

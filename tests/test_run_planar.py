@@ -14,11 +14,16 @@ from femgear.analysis_planar import planar_model, solve_branch, solve_planar_mod
 from femgear.case import planetary_set, read_case, to_toml, with_value
 from femgear.errors import CaseError, ConvergenceError
 from femgear.models.planar import PlanarTorque, planar_system
-from femgear.models.planar_response import judged_branch, merged_folds, motion_lines
+from femgear.models.planar_response import TAIL_LIMIT, judged_branch, merged_folds, motion_lines
 from femgear.models.wind_turbine import bearing_problem_a, gravity_problem_b
 from femgear.models.wind_turbine_response import member_rms, resonance, weight_branch
-from femgear.plots.planar_results import response_mesh_forces, weight_response
-from femgear.report_captions import comparisons
+from femgear.plots.planar_results import (
+    branch_figures,
+    contact_over_branch,
+    response_mesh_forces,
+    weight_response,
+)
+from femgear.report_captions import comparisons, doubts
 from femgear.run import run_case
 from femgear.run_stages import stages_of
 from femgear.solvers.hill import floquet_verdicts
@@ -427,6 +432,39 @@ def test_captions_say_what_this_case_shows(pgb):
     assert data["shown_as"].values[-1] == "largest response"
     assert {line.get_linestyle() for line in weight_response(data).axes[0].get_lines()} <= {"-", "None"}
     assert "stability was not computed" in describe_branch(data).notes
+
+
+def test_figures_mark_what_too_few_harmonics_make_doubtful(results):
+    """Contact and forces by the tail of forces, displacements by their own; nothing without a tail."""
+    branch = results.branch.copy(deep=True)
+    count, top = branch.sizes["point"], int(branch["shown_point"].values[-1])
+
+    def marked(figure):
+        texts = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+        texts += [ax.get_title(loc="left") for ax in figure.axes]
+        return any("W-TAIL" in text for text in texts)
+
+    def figures():
+        return {name: marked(figure) for name, figure in branch_figures(branch).items()}
+
+    branch["tail"].values[:] = branch["force_tail"].values[:] = 0.01
+    assert not any(figures().values())
+    branch["force_tail"].values[top:] = 0.3
+    assert figures() == {name: name not in ("weight_response", "carrier_orbit") for name in FIGURES}
+    # along the curve the mark is where the tail is
+    (mark,) = (one for one in contact_over_branch(branch).axes[0].get_lines() if "W-TAIL" in one.get_label())
+    assert np.flatnonzero(np.isfinite(mark.get_ydata())).tolist() == list(range(top, count))
+    branch["tail"].values[:] = 0.3
+    assert all(figures().values())
+
+
+def test_captions_say_that_lines_are_too_few(results):
+    """Three harmonics: more than 5 % of the forces lie in the upper half of the lines."""
+    assert float(results.branch["force_tail"].max()) > TAIL_LIMIT > float(results.branch["tail"].max())
+    for stem in ("tooth_contact", "wedged_teeth", "planet_bearing_forces"):
+        assert "W-TAIL" in " ".join(doubts(results, stem))
+    for stem in ("weight_response", "carrier_orbit", "mode_shapes"):
+        assert not list(doubts(results, stem))
 
 
 def test_a_branch_that_ran_out_of_points_says_which_entry_to_raise(pgb):

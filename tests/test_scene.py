@@ -11,7 +11,9 @@ from matplotlib.path import Path as Polygon
 
 from femgear import scene
 from femgear.errors import CaseError, FemgearError, StorageError
+from femgear.gears.gear import half_thickness_angle
 from femgear.scene import animation, library
+from femgear.validation.planetary import reference_set
 
 _HERE = Path(__file__).parent
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -185,35 +187,58 @@ def test_field_is_the_double_sum():
         assert got[0] == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.fixture(scope="module")
+def gears():
+    return reference_set()
+
+
+def test_drawn_teeth_are_the_exact_ones(gears):
+    """Tip and root circles, and between them involute flanks of the right thickness."""
+    for gear in (gears.sun, gears.planet, gears.ring):
+        outline = animation.gear_outline(gear)
+        radius, angle = np.abs(outline), np.angle(outline)
+        ends = sorted((gear.tip_radius, gear.root_radius))
+        assert [radius.min(), radius.max()] == pytest.approx(ends, rel=1e-9)
+        # half the tooth's angle at every radius of the involute, on the first tooth
+        first = np.abs(angle) < np.pi / gear.teeth * (1.0 - 1e-9)
+        low, high = sorted((gear.tip_radius, gear.form_radius))
+        flank = first & (radius > low * (1 + 1e-9)) & (radius < high * (1 - 1e-9))
+        assert np.count_nonzero(flank) >= 8
+        half = half_thickness_angle(gear, radius[flank])
+        assert np.abs(angle[flank]) == pytest.approx(np.abs(half), abs=1e-9)
+        assert np.all(np.diff(np.unwrap(angle)) > -1e-3 * np.pi / gear.teeth)
+
+
 @pytest.mark.parametrize("carrier", [0.0, 0.123, 2.9])
-def test_drawn_teeth_mesh_and_do_not_cross(carrier):
-    gears = synthetic.planetary_set()
+def test_drawn_teeth_mesh_and_do_not_cross(gears, carrier):
     (sun, sun_turn), *planets = animation._places(gears, carrier)
     ring = animation._ring_corners(gears)[:, 0]
-
-    def outline(gear, centre, turn):
-        return centre + animation.gear_outline(gear.teeth, gear.root_radius, gear.tip_radius) * np.exp(
-            1j * turn
-        )
 
     def inside(points, polygon):
         return Polygon(np.column_stack([polygon.real, polygon.imag])).contains_points(
             np.column_stack([points.real, points.imag]), radius=0.0
         )
 
-    sun = outline(gears.sun, sun, sun_turn)
-    for centre, turn in planets:
-        planet = outline(gears.planet, centre, turn)
-        shrunk = centre + (planet - centre) * 0.992
-        assert not inside(sun, shrunk).any() and not inside(shrunk, sun).any()
-        assert inside(shrunk, ring).all()
+    sun = sun + animation.gear_outline(gears.sun) * np.exp(1j * sun_turn)
+    assert len(planets) == 3
+    for n, (centre, turn) in enumerate(planets):
+        at = gears.planet_angles[n] + carrier
+        assert centre == pytest.approx(gears.centre_distance * np.exp(1j * at), rel=1e-12)
+        planet = centre + animation.gear_outline(gears.planet) * np.exp(1j * turn)
+        # smaller by 10 um, less than a hundredth of a module: chords between points cut into round flanks
+        shrunk = centre + (planet - centre) * (1.0 - 10e-6 / gears.planet.tip_radius)
+        smaller = sun * (1.0 - 10e-6 / gears.sun.tip_radius)
+        assert not inside(smaller, shrunk).any() and not inside(shrunk, smaller).any()
+        assert inside(shrunk, ring * (1.0 + 10e-6 / gears.ring.tip_radius)).all()
+        # teeth reach into each other's gaps
+        assert np.abs(planet).min() < gears.sun.tip_radius and np.abs(planet).max() > gears.ring.tip_radius
 
 
-def test_animation_is_a_small_gif(tmp_path):
+def test_animation_is_a_small_gif(gears, tmp_path):
     field = synthetic.ring_field()[1]
     path = tmp_path / "turning.gif"
     count = scene.animate_operating_deflection(
-        path, synthetic.planetary_set(), radial=field, tangential=0.3j * field, frames=12, size=240, title="x"
+        path, gears, radial=field, tangential=0.3j * field, frames=12, size=240, title="x"
     )
     images = iio.imread(path)
     assert images.shape == (count, 240, 240, 3)
@@ -232,9 +257,8 @@ def test_animation_refuses_what_it_cannot_write(tmp_path):
         scene.animate_operating_deflection(tmp_path / "a.gif", gears, radial=field, tangential=field[:2])
 
 
-def test_animation_of_nothing_stands_still(tmp_path):
+def test_animation_of_nothing_stands_still(gears, tmp_path):
     """Zero displacement is drawn as such, not divided by."""
     path = tmp_path / "rest.gif"
-    gears = synthetic.planetary_set()
     scene.animate_operating_deflection(path, gears, radial=np.zeros((3, 5)), frames=4, size=120)
     assert path.stat().st_size > 0

@@ -20,6 +20,7 @@ SCRIPTS = (
     "pin_error_load_sharing.py",
     "optimise.py",
     "drivetrain.py",
+    "gyroscopic.py",
 )
 # of published sets, without a case file
 SET_SCRIPTS = (
@@ -104,6 +105,8 @@ def test_help(name, tmp_path):
         ("pin_error_load_sharing.py", ["--support", "soft"], 2, "soft"),
         ("campbell.py", ["--speeds", "2"], 2, "5 speeds or more"),
         ("campbell.py", ["--train", "C"], 2, "--train"),
+        ("gyroscopic.py", ["--highest", "50 Hz"], 2, "not a unit of speed"),
+        ("gyroscopic.py", ["--speeds", "2"], 2, "3 speeds or more"),
         ("gravity_wedging.py", ["--backlash", "3"], 2, "needs its unit"),
         ("gravity_wedging.py", ["--lowest", "90", "--highest", "30"], 2, "lowest < highest"),
         ("bearing_clearance.py", ["--clearance=-1 um"], 2, "clearances of 0 or more"),
@@ -320,6 +323,21 @@ def test_campbell(tmp_path):
     assert "30.69" in done.stdout
 
 
+def test_gyroscopic(quick_case, tmp_path):
+    done = run("gyroscopic.py", quick_case, "--speeds", "4", "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert is_png(tmp_path / "gyroscopic.png")
+    assert "14 of 22 modes change by less than 1 %" in done.stdout
+    rows = text_table(tmp_path / "gyroscopic.csv")
+    last = [row for row in rows if float(row["carrier speed [rad/s]"]) == 120.0]
+    change = np.array([abs(float(row["change [1]"])) for row in last])
+    assert len(change) == 22 and 0.017 < change.max() < 0.018
+    # what only turns does not move at all
+    assert max(c for c, row in zip(change, last) if row["kind"] == "rotational") < 1e-3
+    # ring alone, n = 2: 2 times 120 / 2 pi over 1794.8 Hz
+    assert re.search(r"2 +1794\.\d\d +1756\.\d\d +1833\.\d\d +± 2\.12", done.stdout)
+
+
 def test_gravity_wedging(tmp_path):
     arguments = ("--backlash", "482 um", "--harmonics", "3", "--no-stability", "--highest", "70")
     sweep = ("--sweep", "2", "--steps", "200")
@@ -381,6 +399,15 @@ def test_planet_phasing_of_unequal_planets(tmp_path):
         first, second = csv.DictReader(stream)
     assert first["torque, thrust"] == second["lateral force, tilting"] == "0.0000"
     assert float(first["lateral force, tilting"]) > 0.5 and float(second["torque, thrust"]) > 0.01
+
+
+def test_multistage_lists_the_readings_of_the_published_table(tmp_path):
+    done = run("multistage.py", "--published", "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert is_png(tmp_path / "published.png")
+    assert re.search(r"N/m, 3 planets +last carrier free +1 +298\.1 +2771\.9 +7 of 16", done.stdout)
+    rows = text_table(tmp_path / "published.csv")
+    assert len(rows) == 2 * (17 + 16 + 21 + 20)
 
 
 def test_multistage_writes_its_tables_and_figures(tmp_path):

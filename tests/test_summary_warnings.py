@@ -28,6 +28,8 @@ def warned(printed: str) -> list[str]:
         ("nrel_pga", "title", "given stiffness", "static, dynamics.mesh_harmonics"),
         ("helical_30_20_70", "operation.torque", "-10 N m", "[W-TORQUE]"),
         ("own_chain", "simulation.rate", "15 kHz", "[W-RATE]"),
+        ("own_chain", "simulation.damping_ratio", 0.0, "[W-DAMPING]"),
+        ("own_chain", "simulation.damping_ratio", None, "[W-DAMPING]"),
     ],
 )
 def test_warnings_are_those_of_check(name, key, value, words):
@@ -94,7 +96,7 @@ def transient(
             "speed": (("variant", "time", "body"), np.full((1, 3, 1), 10.0)),
         },
         {"variant": ["with bending"], "mesh": ["a-b"], "body": ["a"]},
-        {"steps": 40_000, "step": 5e-5, "contact": contact},
+        {"steps": 40_000, "step": 5e-5, "every": 1, "contact": contact},
     )  # fmt: skip
 
 

@@ -54,7 +54,7 @@ class MeshWindows:
     tooth : tuple of two integer arrays (2N, pairs)
         Tooth numbers on gear 1 and gear 2 during the first mesh period.
     turns : (P,) int array
-        Whole mesh periods passed at each position.
+        Mesh periods passed at each position; one of the record's periods has one number.
     local : (2, cells, cells) array
         Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh.
     cell_area : (2N,) array
@@ -190,16 +190,19 @@ def mesh_windows(
     pitch = planetary_set.sun.base_pitch
     pairs = mesh_pairs(planetary_set)
     tau = cycle_positions(positions, periods=periods)
-    turns = np.floor(tau).astype(int)
+    # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
+    start = np.ceil(tau[0]) if tau[0] < 0 else np.floor(tau[0])
+    begun = tau[0] if tau[0] < 0 else start
+    turns = (start + np.floor(tau - begun + 1e-9)).astype(int)
     begin = min(p.path[0] for p in pairs) / pitch
     end = max(p.path[1] for p in pairs) / pitch
     count = int(np.ceil(end - begin)) + 4
     found, teeth = [], []
     for direction in (DRIVE, BACK) if both_flanks else (DRIVE,):
         side = flank_side(planetary_set, direction)
-        first = np.floor(begin - side.phase - 0.5 * (1.0 + direction)).astype(int) - 1
-        index = first[:, None] + np.arange(count)
         passed = direction * (tau - turns)
+        lowest = np.floor(begin - side.phase - np.ceil(passed.max())).astype(int) - 1
+        index = lowest[:, None] + np.arange(count)
         zeta = pitch * (passed[None, :, None] + side.phase[:, None, None] + index[:, None, :])
         tooth = side_teeth(planetary_set, index, direction)
         shift = pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 
 SHORTEST = 2.0**-13
 """Mesh periods in which a jump is enclosed."""
+SMOOTHEST = 2.0**-10
+"""Mesh periods below which a smooth change is not resolved further."""
+MISSED = 3e-4
+"""Share of a mesh stiffness that straight lines between the positions may miss where it does not jump."""
 STEEP = 0.02
 """Change of a mesh stiffness between neighbouring positions above which there are more between them."""
 
@@ -159,10 +163,18 @@ def _record(cycle: MeshCycle, base_pitch: float) -> _Record:
 
 def _unresolved(record: _Record) -> np.ndarray:
     """Numbers of the intervals that need a position in their middle."""
-    k = record.stiffness
-    steep = (np.abs(np.diff(k)) > STEEP * k.max(axis=1, initial=0.0)[:, None]).any(axis=0)
+    k = record.stiffness / record.stiffness.max(axis=1, initial=0.0)[:, None]
+    gap = np.diff(record.position)
+    steep = (np.abs(np.diff(k)) > STEEP).any(axis=0)
     other = record.loaded[1:] != record.loaded[:-1]
-    return np.flatnonzero((steep | other) & (np.diff(record.position) > SHORTEST))
+    # what a straight line misses in the middle of a gap, from the curvature at its ends; none across jumps
+    slope = np.diff(k) / gap
+    bend = np.zeros(k.shape)
+    bend[:, 1:-1] = np.abs(2.0 * np.diff(slope) / (gap[1:] + gap[:-1]))
+    jump = np.flatnonzero(steep | other)
+    bend[:, np.concatenate([jump, jump + 1])] = 0.0
+    missed = (gap**2 / 8.0 * np.maximum(bend[:, 1:], bend[:, :-1])).max(axis=0)
+    return np.flatnonzero(((steep | other) & (gap > SHORTEST)) | ((missed > MISSED) & (gap > SMOOTHEST)))
 
 
 def _merged(one: _Record, two: _Record) -> _Record:

@@ -27,7 +27,8 @@ class MeshCycle:
     stiffness : (2N, P) array
         Tangent mesh stiffness dF/d delta at constant loads of the other meshes [N/m].
     tooth_load : (2N, T, P) array
-        Load of each simultaneous tooth pair, in the order of the path coordinate [N].
+        Load of each simultaneous tooth pair, in the order of the path coordinate [N]; from one mesh period to
+        the next a pair goes on to the next place, whatever the sign of the torque.
     path : (2N, T, P) array
         Path coordinate of each tooth pair, from the pitch point in the direction of motion [m].
     tooth : (2, 2N, T) int array

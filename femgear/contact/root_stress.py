@@ -99,8 +99,6 @@ class RootCycle:
         See `RootStress`.
     periods : int
         Mesh periods in the P positions.
-    reverse : bool
-        Whether the torque is negative.
     """
 
     kind: str
@@ -112,7 +110,6 @@ class RootCycle:
     arc: np.ndarray
     slope: np.ndarray
     periods: int
-    reverse: bool
 
     @property
     def tension(self) -> np.ndarray:
@@ -326,7 +323,6 @@ def _one_mesh(planetary_set, kind, root: RootStress, cycle, target, loads, rever
         arc=root.arc,
         slope=root.slope,
         periods=cycle.periods,
-        reverse=reverse,
     )
 
 
@@ -344,28 +340,18 @@ def tooth_history(root: RootCycle, *, start: int = 0) -> RootHistory:
     ----------
     root : RootCycle
     start : int
-        Mesh period of the record in which the tooth enters the first slot (with a negative torque, seen from
-        behind: leaves the last one); records of one period serve all teeth.
+        Mesh period of the record in which the tooth enters the first slot; records of one period serve all
+        teeth.
     """
     slots, positions = root.path.shape
     each = positions // root.periods
     slot = np.repeat(np.arange(slots), each)
     position = (start + slot) % root.periods * each + np.tile(np.arange(each), slots)
-    if root.reverse:
-        slot, position = _seen_from_behind(root, slot[::-1], position[::-1])
     return RootHistory(root.path[slot, position], root.load[slot, position], root.stress[slot, position])
-
-
-def _seen_from_behind(root: RootCycle, slot, position):
-    """Slot and position of the mirrored record, in which a negative torque is a positive one."""
-    slots, positions = root.path.shape
-    return slots - 1 - slot, -position % positions
 
 
 def worst_history(root: RootCycle) -> RootHistory:
     """History of the tooth with the largest stress in the root of its loaded flank."""
     slot, position, _ = root.worst
-    if root.reverse:
-        slot, position = _seen_from_behind(root, slot, position)
     period = position * root.periods // root.path.shape[1]
     return tooth_history(root, start=(period - slot) % root.periods)

@@ -13,6 +13,8 @@ from femgear.models.drivetrain_data import Drivetrain
 
 # Radius of bodies that carry no gear, and distance of wheels side by side, over the largest gear radius.
 _PLAIN, _BESIDE = 0.9, 0.45
+# Phi of a shaft that shears and hardly bends: more does not show.
+_SHEAR_ALONE = 1e6
 
 
 @dataclass(frozen=True)
@@ -130,8 +132,8 @@ def shaft_lines(
 ) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
     """Centre lines of the shafts under a motion: places at rest and displacements, (k, 3) each.
 
-    A joint has two straight links, which part where it shears. A beam passes through its stations, between
-    them by the shape functions of its elements.
+    A shaft passes through its stations, between them by the shape functions of its elements; one that is
+    modelled as a joint is drawn as the one element whose static stiffness the joint stands for.
 
     Parameters
     ----------
@@ -153,7 +155,7 @@ def shaft_lines(
     for shaft, inner, ends in zip(model.train.shafts, place.inner, layout.shafts):
         first = np.array([place.body[shaft.first], *inner, place.body[shaft.second]])
         stations = full[first[:, None] + np.arange(5)]
-        share, across = _beam_line(shaft, stations, points) if shaft.elements else _links(shaft, stations)
+        share, across = _beam_line(shaft, stations, points if shaft.elements else 3 * points)
         one, two = layout.centre[list(ends)]
         rest = one + share[:, None] * (two - one)
         found.append((rest, np.column_stack([across, np.zeros(len(share))])))
@@ -167,24 +169,31 @@ def _all_coordinates(model: DrivetrainModel, shape):
     return place, T @ np.asarray(shape, float)
 
 
-def _links(shaft, stations) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the length (4,) and displacements (4, 2) of two rigid links with a joint between."""
-    arm = 0.5 * shaft.length * np.array([stations[0], -stations[1]])
-    middle = stations[:, :2] + np.column_stack([arm[:, 3], -arm[:, 2]])
-    return np.array([0.0, 0.5, 0.5, 1.0]), np.array([stations[0, :2], *middle, stations[1, :2]])
-
-
 def _beam_line(shaft, stations, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Shares of the length (k,) and displacements (k, 2) of a beam through its stations (n + 1, 5)."""
-    count, length = shaft.elements, shaft.length / shaft.elements
+    count = max(shaft.elements, 1)
+    length = shaft.length / count
     share = np.linspace(0.0, 1.0, count * points + 1)
     element = np.minimum(np.arange(len(share)) // points, count - 1)
-    N = beam_shape(share * count - element, length, shaft.section.shear_ratio(length))
+    ratio = shaft.section.shear_ratio(length) if shaft.elements else _joint_shear_ratio(shaft)
+    N = beam_shape(share * count - element, length, ratio)
     # a tilt about y is the slope of x, one about x minus that of y
     ends = np.stack([stations[element], stations[element + 1]], axis=1)
     x = np.einsum("kn,kn->k", N, ends[:, :, [0, 3]].reshape(-1, 4))
     y = np.einsum("kn,kn->k", N, (ends[:, :, [1, 2]] * np.array([1.0, -1.0])).reshape(-1, 4))
     return share, np.column_stack([x, y])
+
+
+def _joint_shear_ratio(shaft) -> float:
+    """Phi of the Timoshenko shaft whose static stiffness is that of a joint's springs.
+
+    Bending ``E I / l`` and shear ``12 E I / ((1 + Phi) l^3)``, `femgear.models.shaft.joint_springs`. Under a
+    spherical joint no force crosses the shaft, which then bends to a parabola whatever Phi is.
+    """
+    springs = shaft.springs
+    if math.isinf(springs.shear):
+        return 0.0
+    return float(np.clip(12.0 * springs.bending / (springs.shear * shaft.length**2) - 1.0, 0.0, _SHEAR_ALONE))
 
 
 def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:

@@ -1,14 +1,18 @@
-"""Example of a four-stage planetary reducer; all its numbers are femgear's own.
+"""Four-stage planetary reducers: an example whose numbers are femgear's own, and a published table.
 
-A drive of 55 kW at 1500 1/min with the ratio 538.6, of the size used at cutter heads and slewing rings.
-Teeth, modules and face widths were chosen for moderate tooth forces, masses are those of steel discs, mesh
-stiffness is ISO 6336-1 method B, shafts are solid round sections. It reproduces no published train.
+The example is a drive of 55 kW at 1500 1/min with the ratio 538.6, of the size used at cutter heads and
+slewing rings. Teeth, modules and face widths were chosen for moderate tooth forces, masses are those of
+steel discs, mesh stiffness is ISO 6336-1 method B, shafts are solid round sections. It reproduces no
+published train.
+
+`PUBLISHED` is Table 2 of "Optimized design of dynamic characteristics of planetary gear train" as printed;
+`published_train` makes a train of it with what the paper leaves out as arguments.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +27,7 @@ from femgear.models.multistage_data import (
 )
 from femgear.models.multistage_motion import train_torques
 from femgear.models.multistage_response import stage_error
-from femgear.models.planar_data import PlanarBody, torsional_of_reduced
+from femgear.models.planar_data import PlanarBody, PlanarSet, torsional_of_reduced, torsional_set
 from femgear.models.planar_problem import phased_series, planar_meshes
 from femgear.solvers.elements import GearMeshes
 from femgear.solvers.harmonics import harmonics_of, sample
@@ -42,6 +46,23 @@ MOTOR_INERTIA = 0.35
 """Of the rotor on the first sun [kg m^2]."""
 LOAD_INERTIA = 60.0
 """Of the driven machine on the last carrier [kg m^2]."""
+
+PUBLISHED = {
+    "sun mass": (0.241, 0.643, 1.753, 2.078),
+    "planet mass": (0.575, 0.851, 3.815, 4.917),
+    "carrier mass": (1.893, 2.462, 14.721, 20.496),
+    "sun base radius": (13.652, 20.173, 31.758, 37.845),
+    "planet base radius": (40.254, 41.654, 45.276, 50.716),
+    "carrier equivalent radius": (60.492, 64.537, 79.625, 85.911),
+    "sun inertia": (19.375, 354.162, 2537.376, 57743.751),
+    "planet inertia": (571.163, 665.256, 5748.275, 94865.198),
+    "carrier inertia": (6082.317, 86354.195, 136547.627, 197653.804),
+    "external mesh stiffness": (9.271e6, 10.867e6, 11.346e7, 15.764e7),
+    "internal mesh stiffness": (1.642e7, 2.754e7, 4.751e8, 6.347e8),
+}
+"""Stages 1 to 4 as printed: kg, mm, kg mm^2, N/mm."""
+PUBLISHED_FREQUENCIES = (204.483, 1321.636)
+"""Lowest and highest natural frequency that the same paper prints [Hz]; it has none at zero."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +118,51 @@ def four_stage_train(*, lateral: bool = True) -> MultistageSet:
         torsional=[shaft["torsional"] for shaft in shafts],
         lateral=[shaft["lateral"] if lateral else 0.0 for shaft in shafts],
     )
+
+
+def published_train(*, planets: int, stiffness_unit: float = 1e3, held: bool = False) -> MultistageSet:
+    """Torsional train of the published table, its four stages joined rigidly.
+
+    The paper prints neither number of planets, pressure angles, supports nor couplings. Torsion asks for the
+    fewest of them: with rings at rest and equal pressure angles it depends on base radii, inertias, planet
+    masses and mesh stiffnesses, and on the circle of the planets' centres, taken as ``(r_s + r_p) / cos 20
+    deg``. The printed carrier radius cannot be that circle: in stage 4 it is less than ``r_s + r_p``.
+
+    Parameters
+    ----------
+    planets : int
+        In every stage, at equal angles.
+    stiffness_unit : float
+        Of the printed mesh stiffnesses [N/m]: 1e3 for the N/mm that stands there.
+    held : bool
+        The last carrier cannot turn, which leaves no mode at zero.
+    """
+    pressure_angle, stages = math.radians(20.0), []
+    for number in range(4):
+        row = {name: values[number] for name, values in PUBLISHED.items()}
+        sun, planet = 1e-3 * row["sun base radius"], 1e-3 * row["planet base radius"]
+        bodies = {
+            name: PlanarBody(row[f"{name} mass"], 1e-6 * row[f"{name} inertia"], 0.0, 0.0)
+            for name in ("sun", "planet", "carrier")
+        }
+        if held and number == 3:
+            bodies["carrier"] = replace(bodies["carrier"], torsional_support=math.inf)
+        data = PlanarSet(
+            **bodies,
+            ring=PlanarBody(1.0, 1.0, math.inf, math.inf),
+            sun_radius=sun,
+            planet_radius=planet,
+            ring_radius=sun + 2.0 * planet,
+            centre_distance=(sun + planet) / math.cos(pressure_angle),
+            planet_angles=2.0 * np.pi * np.arange(planets) / planets,
+            pressure_angle_sun_planet=pressure_angle,
+            pressure_angle_planet_ring=pressure_angle,
+            stiffness_sun_planet=stiffness_unit * row["external mesh stiffness"],
+            stiffness_planet_ring=stiffness_unit * row["internal mesh stiffness"],
+            planet_bearing=math.inf,
+        )
+        stages.append(Stage(data=torsional_set(data)))
+    return in_series(stages)
 
 
 def example_gears(design: StageDesign) -> PlanetarySet:

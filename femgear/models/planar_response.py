@@ -20,6 +20,8 @@ from femgear.solvers.nonlinear import NonlinearSystem, element_forces
 from femgear.solvers.periodic import PeriodicSolution
 from femgear.solvers.receptance import Reduction, reduce_problem
 
+TAIL_LIMIT = 0.05
+"""Share of the amplitude in the upper half of the lines beyond which what they add up to is wrong."""
 # limit points closer than this, relative to the frequency, are one: corners of contact split them
 _SAME_FOLD = 2e-3
 # deflection [m] that counts as much as the whole range of frequencies along a branch

@@ -11,10 +11,12 @@ from femgear.plots.style import (
     BLUE,
     COLOURS,
     GREY,
+    MARKERS,
     SIZE,
     SKY,
     VERMILION,
     distinct_lines,
+    family,
     label,
     legend_below,
     line_style,
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 
     from femgear.gears.planetary import PlanetarySet
 
+# spectra end so far below their largest line, and have bars up to so many
+_DECADES, _MOST_BARS = 1e-5, 60
 _BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
 
 
@@ -45,39 +49,95 @@ def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = 
     dynamics : xarray.Dataset
         With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m]; at most four speeds are drawn.
     static : xarray.Dataset, optional
-        With ``ste`` (mesh, position) [m], drawn for comparison.
+        With ``ste`` (mesh, position) [m], drawn for comparison: thin with the harmonics of the excitation
+        alone, so that their cut does not pass for vibration, and faint as a whole.
 
     Returns
     -------
     Figure
     """
     speeds = _few(dynamics.sizes["speed"])
-    figure, axes = _panels(len(speeds))
     h = dynamics["harmonic"].values
-    position = np.linspace(0.0, 1.0, 257)
+    position = fine_positions(int(h.max()))
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
     names = dynamics["mesh"].values
-    for ax, s in zip(axes, speeds):
-        error = (harmonics_of(dynamics, "dte")[s][:, h > 0] @ wave).real * 1e6
-        for i, (text, row) in enumerate(distinct_lines(names, error)):
-            ax.plot(
-                position, error[row], label=f"dynamic, {text}", linewidth=2.0, color=COLOURS[i % len(COLOURS)]
-            )
-            if static is not None:
-                ste = static["ste"].values[row] * 1e6
-                at, ste = periodic(static["position"], ste - ste.mean())
-                ax.plot(at, ste, ":", color=COLOURS[i % len(COLOURS)], label=f"static, {text}")
-        ax.set_xlim(0, 1)
+    errors = [(harmonics_of(dynamics, "dte")[s][:, h > 0] @ wave).real * 1e6 for s in speeds]
+    drawn = [distinct_lines(names, error) for error in errors]
+    # meshes that differ from planet to planet get axes of their own for each kind
+    split = max(map(len, drawn)) > 2
+    kinds = list(dict.fromkeys(family(str(name)) for name in names)) if split else [""]
+    figure, axes = _panels(len(speeds) * len(kinds))
+    for number, (s, error, lines) in enumerate(zip(speeds, errors, drawn)):
+        cut = excited_harmonics(dynamics, s)
         frequency = float(dynamics["mesh_frequency"].values[s])
-        label(
-            ax,
-            "position in the mesh period [1]",
-            title=f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz",
-        )
+        for i, (text, row) in enumerate(lines):
+            ax = axes[number * len(kinds) + (kinds.index(family(text)) if split else 0)]
+            style = line_style(i)
+            ax.plot(position, error[row], label=text, linewidth=2.0, **style)
+            if static is not None:
+                draw_static(ax, static["position"], static["ste"].values[row], cut, position, style)
+        for k, kind in enumerate(kinds):
+            title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
+            label(
+                axes[number * len(kinds) + k],
+                "position in the mesh period [1]",
+                title=f"{title}\n{kind} meshes" if kind else title,
+            )
+    for ax in axes:
+        ax.set_xlim(0, 1)
     for ax in axes[::2]:
         label(ax, y="transmission error less its mean [µm]")
-    legend_below(figure, columns=2)
+    if static is not None:
+        name_kinds(axes[0], dynamics)
+    legend_below(figure, columns=3)
     return figure
+
+
+def fine_positions(harmonics: int) -> np.ndarray:
+    """Positions of one mesh period, enough for a curve of so many harmonics."""
+    return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
+
+
+def name_kinds(ax, dynamics: xr.Dataset) -> None:
+    """Legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
+    known = "excitation" if "excitation_limit" in dynamics else "response"
+    for text, look in (
+        ("dynamic (thick)", {"linewidth": 2.0}),
+        (f"static, harmonics of the {known} (thin)", {"linewidth": 0.9}),
+        ("static, whole (pale)", {"linewidth": 2.5, "alpha": 0.3}),
+    ):
+        ax.plot([], [], color=BLACK, label=text, **look)
+
+
+def draw_static(ax, at, values, harmonics: int, position, style) -> None:
+    """Static transmission error [m] less its mean: the whole record pale, its first harmonics thin."""
+    at, whole, part = _fluctuation(at, values, harmonics, position)
+    ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
+    ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
+
+
+def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
+    """Highest harmonic of the mesh frequency that excites: by ``excitation_limit`` [Hz] where it is known."""
+    highest = int(dynamics["harmonic"].values.max())
+    if "excitation_limit" not in dynamics:
+        return highest
+    limit = float(dynamics["excitation_limit"].values[speed_index])
+    frequency = float(dynamics["mesh_frequency"].values[speed_index])
+    return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
+
+
+def _fluctuation(at, values, harmonics: int, position):
+    """A record of one period less its mean, closed, and the sum of its first harmonics at `position`.
+
+    The record is linear between its positions, which may be closer where it is steep. Harmonics of such a
+    curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
+    """
+    at, value = periodic(at, values)
+    mean = np.trapezoid(value, at) / (at[-1] - at[0])
+    slope = np.diff(value) / np.diff(at)
+    jump, h = slope - np.roll(slope, 1), np.arange(1, harmonics + 1)
+    line = -2.0 * np.exp(-2j * np.pi * np.outer(h, at[:-1])) @ jump / (2.0 * np.pi * h) ** 2
+    return at, value - mean, (line @ np.exp(2j * np.pi * np.outer(h, position))).real
 
 
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
@@ -92,33 +152,59 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     -------
     Figure
     """
+    from matplotlib.ticker import MaxNLocator
+
     speeds = _few(dynamics.sizes["speed"])
     figure, axes = _panels(len(speeds))
     h = dynamics["harmonic"].values
-    amplitude = np.abs(harmonics_of(dynamics, "dte"))[:, :, h > 0] * 1e6
-    names, floor = dynamics["mesh"].values, max(amplitude.max(initial=0.0), 1e-12) * 1e-7
+    amplitude, h = np.abs(harmonics_of(dynamics, "dte"))[:, :, h > 0] * 1e6, h[h > 0]
+    names, largest = dynamics["mesh"].values, amplitude[speeds].max(initial=0.0)
+    # below are rounding and what the iteration leaves: no line is drawn there
+    floor = _DECADES * largest
     for ax, s in zip(axes, speeds):
         lines = distinct_lines(names, amplitude[s])
-        width = 0.8 / len(lines)
+        few = len(lines) * len(h) <= _MOST_BARS
         for i, (text, row) in enumerate(lines):
-            offset = (i - (len(lines) - 1) / 2) * width
-            ax.bar(
-                h[h > 0] + offset,
-                np.maximum(amplitude[s, row], floor),
-                width,
-                color=COLOURS[i % len(COLOURS)],
-                hatch=("", "///", "...", "xx")[i % 4],
-                edgecolor="white",
-                linewidth=0.5,
-                label=text,
-            )
-        ax.set_yscale("log")
-        ax.set_xticks(h[h > 0][:: max(1, len(h) // 13)])
-        label(ax, "harmonic of the mesh frequency [1]", title=rpm(dynamics["speed"].values[s]))
+            shown = amplitude[s, row] > floor
+            if few:
+                _bars(ax, h[shown], amplitude[s, row][shown], i, len(lines), text)
+            else:
+                _dots(ax, h[shown], amplitude[s, row][shown], floor, i, text)
+        if largest > 0.0:
+            ax.set_yscale("log")
+            ax.set_ylim(floor, 2.0 * largest)
+        ax.set_xlim(0.4, h.max(initial=1) + 0.6)
+        ax.xaxis.set_major_locator(MaxNLocator(nbins=12, integer=True))
+        title = rpm(dynamics["speed"].values[s])
+        if "excitation_limit" in dynamics:
+            title += f", excited up to {float(dynamics['excitation_limit'].values[s]):.4g} Hz"
+        label(ax, "harmonic of the mesh frequency [1]", title=title)
     for ax in axes[::2]:
         label(ax, y="amplitude of the transmission error [µm]")
     legend_below(figure)
     return figure
+
+
+def _bars(ax, h, amplitude, index: int, count: int, text: str) -> None:
+    """Bars of one mesh beside those of the others."""
+    width = 0.8 / count
+    ax.bar(
+        h + (index - (count - 1) / 2) * width,
+        amplitude,
+        width,
+        color=COLOURS[index % len(COLOURS)],
+        hatch=("", "///", "...", "xx")[index % 4],
+        edgecolor="white",
+        linewidth=0.5,
+        label=text,
+    )
+
+
+def _dots(ax, h, amplitude, floor, index: int, text: str) -> None:
+    """Lines of one mesh as markers on thin stems: many bars would merge."""
+    colour = COLOURS[index % len(COLOURS)]
+    ax.vlines(h, floor, amplitude, color=colour, linewidth=0.5, alpha=0.5)
+    ax.plot(h, amplitude, MARKERS[index % len(MARKERS)], color=colour, markersize=3.5, label=text)
 
 
 def speed_sweep(dynamics: xr.Dataset) -> Figure:

@@ -46,9 +46,9 @@ def helical_mode_shapes(
 ) -> Figure:
     """Bodies at rest (grey) and displaced, each mode from the front and below it from the side.
 
-    From the front: circles of base radii, for the carrier the circle of planet centres, with a spoke that
-    turns. From the side, seen along y: every body as the line of its diameter along x, which tilts about y
-    and moves along z, drawn at the scale of the front view times the factor in the title.
+    From the front: pitch circles, for the carrier the circle of planet centres, with a spoke that turns.
+    From the side, seen along y: every body as the line of its diameter along x, which tilts about y and moves
+    along z, drawn at the scale of the front view times the factor in the title.
 
     Parameters
     ----------
@@ -119,22 +119,38 @@ def _motions(data: HelicalSet, shape) -> np.ndarray:
     return np.concatenate([central, turned])
 
 
+def pitch_radii(data: HelicalSet) -> tuple[float, float, float]:
+    """Working pitch radii of ring, sun and planet [m]: their circles touch.
+
+    The centre distance is divided as the base radii are. Where the meshes of a planet have two pitch circles,
+    the smaller one stands for it.
+    """
+    a, ring, sun, planet = data.centre_distance, data.ring_radius, data.sun_radius, data.planet_radius
+    outer, inner = a / (ring - planet), a / (sun + planet)
+    return outer * ring, inner * sun, min(outer, inner) * planet
+
+
 def _bodies(data: HelicalSet):
-    """Legend text, colour, centre and radius of every body, in the order of the coordinates."""
-    radii = (data.centre_distance, data.ring_radius, data.sun_radius)
-    for name, radius in zip(CENTRAL, radii):
-        yield name, _BODIES[name], 0j, radius
+    """Legend text, colour, centre, drawn radius and radius that turns arcs into angles, of every body.
+
+    In the order of the coordinates; rotations and tilts are arcs on base circles.
+    """
+    ring, sun, planet = pitch_radii(data)
+    drawn = (data.centre_distance, ring, sun)
+    bases = (data.centre_distance, data.ring_radius, data.sun_radius)
+    for name, radius, base in zip(CENTRAL, drawn, bases):
+        yield name, _BODIES[name], 0j, radius, base
     for centre in data.centre_distance * np.exp(1j * data.planet_angles):
-        yield "planets", _BODIES["planets"], centre, data.planet_radius
+        yield "planets", _BODIES["planets"], centre, planet, data.planet_radius
 
 
 def _draw_front(ax, data: HelicalSet, moved: np.ndarray) -> None:
-    for (name, colour, centre, radius), (x, y, _, _, _, u) in zip(_bodies(data), moved):
+    for (name, colour, centre, radius, base), (x, y, _, _, _, u) in zip(_bodies(data), moved):
         spoke = radius * np.exp(1j * (np.angle(centre) if centre else 0.0))
         style = {"linestyle": "--"} if name == "carrier" else {}
         for at, turn, look in (
             (centre, 0.0, {"color": "0.82", "linewidth": 1.0, "label": "at rest"}),
-            (centre + x + 1j * y, u / radius, {"color": colour, "linewidth": 1.5, "label": name} | style),
+            (centre + x + 1j * y, u / base, {"color": colour, "linewidth": 1.5, "label": name} | style),
         ):
             ax.plot(*_xy(at + radius * _CIRCLE), **look)
             ax.plot(*_xy(np.array([at, at + spoke * np.exp(1j * turn)])), **look)
@@ -143,18 +159,19 @@ def _draw_front(ax, data: HelicalSet, moved: np.ndarray) -> None:
 
 def _draw_side(ax, data: HelicalSet, moved: np.ndarray) -> None:
     ax.axhline(0.0, color="0.82", linewidth=1.0)
-    for (name, colour, centre, radius), (_, _, z, _, tilt, _) in zip(_bodies(data), moved):
+    for (name, colour, centre, radius, base), (_, _, z, _, tilt, _) in zip(_bodies(data), moved):
         ends = np.array([-radius, radius])
         style = {"linestyle": "--"} if name == "carrier" else {}
         # a turn by phi about y lowers points at positive x
-        height = z - tilt / radius * ends
+        height = z - tilt / base * ends
         ax.plot(centre.real + ends, height, color=colour, linewidth=_WIDTHS[name], **style)
     _limits(ax, data, _SIDE)
 
 
 def _limits(ax, data: HelicalSet, high: float) -> None:
-    ax.set_xlim(-1.25 * data.ring_radius, 1.25 * data.ring_radius)
-    ax.set_ylim(-high * data.ring_radius, high * data.ring_radius)
+    ring = pitch_radii(data)[0]
+    ax.set_xlim(-1.25 * ring, 1.25 * ring)
+    ax.set_ylim(-high * ring, high * ring)
 
 
 def _xy(points):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.plots.dynamic import draw_static, excited_harmonics, fine_positions, name_kinds
 from femgear.plots.helical import draw_mode
 from femgear.plots.style import (
     BLACK,
@@ -154,26 +155,26 @@ def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
     )
     for ax in axes[len(speeds) :]:
         figure.delaxes(ax)
-    h, position = dynamics["harmonic"].values, np.linspace(0.0, 1.0, 257)
+    h = dynamics["harmonic"].values
+    position = fine_positions(int(h.max()))
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
     dte = 1e6 * (dynamics["dte_real"].values + 1j * dynamics["dte_imag"].values)[..., h > 0]
-    ste = 1e6 * (modes["helical_ste"] - modes["helical_ste"].mean("position")).values
-    at, ste = periodic(modes["position"], ste)
+    ste = modes["helical_ste"].values
     # what is one line at one speed need not be one at another: the lines are those of all speeds
-    lines = alike_lines(dynamics["mesh"].values, np.hstack([*(dte[speeds] @ wave).real, ste]))
+    lines = alike_lines(dynamics["mesh"].values, np.hstack([*(dte[speeds] @ wave).real, 1e6 * ste]))
     for ax, s in zip(axes, speeds):
         for i, (text, row) in enumerate(lines):
-            ax.plot(
-                position, (dte[s, row] @ wave).real, linewidth=2.0, label=f"dynamic, {text}", **line_style(i)
-            )
-            ax.plot(at, ste[row], linewidth=0.8, label=f"static (thin), {text}", **line_style(i))
+            style = line_style(i)
+            ax.plot(position, (dte[s, row] @ wave).real, linewidth=2.0, label=text, **style)
+            draw_static(ax, modes["position"], ste[row], excited_harmonics(dynamics, s), position, style)
         ax.set_xlim(0.0, 1.0)
         frequency = float(dynamics["mesh_frequency"].values[s])
         title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
         label(ax, "position in the mesh period [1]", title=title)
     for ax in axes[: len(speeds) : 2]:
         label(ax, y="transmission error less its mean [µm]")
-    legend_below(figure, columns=2)
+    name_kinds(axes[0], dynamics)
+    legend_below(figure, columns=3)
     return figure
 
 

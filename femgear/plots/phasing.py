@@ -124,7 +124,7 @@ def resultant_chart(tables: Mapping[str, PhasingTable]) -> Figure:
         ax.set_yticks(table.harmonics)
         ax.set_xlim(-0.6, 4.6)
         ax.set_ylim(table.harmonics[-1] + 0.6, table.harmonics[0] - 0.6)
-        label(ax, y="harmonic of the mesh frequency", title=title)
+        label(ax, y="harmonic of the mesh frequency [1]", title=title)
     legend_below(figure, columns=4)
     return figure
 

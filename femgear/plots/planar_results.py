@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.models.planar_response import merged_folds
+from femgear.models.planar_response import TAIL_LIMIT, merged_folds
 from femgear.plots.planar import STABILITY, bearing_forces, orbits, pieces
 from femgear.plots.style import (
     BLACK,
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+_DOUBTFUL = "too few harmonics, not to be trusted (W-TAIL)"
+_PALE = "#F6D48F"
 _AXIS = "frequency of the weight in the carrier frame [Hz]"
 _PHASES = 721
 _LABELS = 4
@@ -60,6 +62,7 @@ def weight_response(branch: xr.Dataset) -> Figure:
     )  # fmt: skip
     for ax, colour, member in zip(axes, COLOURS, branch["member"].values):
         size = 1e6 * branch["rms"].sel(member=member).values[:, 0]
+        _mark_tails(ax, hertz, size, branch["tail"].values)
         for dash, text, part in _parts(branch):
             ax.plot(hertz[part], size[part], color=colour, linestyle=dash, label=text)
         ax.plot(
@@ -81,6 +84,25 @@ def weight_response(branch: xr.Dataset) -> Figure:
     return figure
 
 
+def _mark_tails(ax, x, values, tail) -> None:
+    """Broad band under what too few lines make doubtful, W-TAIL."""
+    doubtful = tail > TAIL_LIMIT
+    if np.any(doubtful):
+        # a point alone has no length to be drawn along
+        ax.plot(x, np.where(doubtful, values, np.nan), "o-", color=_PALE, linewidth=9.0, markersize=8.0,
+                zorder=1.5, label=_DOUBTFUL)  # fmt: skip
+
+
+def _tails(data: xr.Dataset) -> np.ndarray:
+    """Share of forces or deflections in the upper half of the lines, the larger, of every point or speed."""
+    return np.maximum(data["tail"].values, data["force_tail"].values)
+
+
+def _doubt(tail) -> str:
+    """What a title adds to forces and contact that too few lines make."""
+    return f"\n{_DOUBTFUL}" if tail > TAIL_LIMIT else ""
+
+
 def _parts(branch: xr.Dataset) -> list[tuple]:
     """(dash, words, slice) of the parts of a branch by their stability; one part where nothing was asked."""
     if branch.attrs["stability"] == "not computed":
@@ -96,6 +118,7 @@ def weight_orbits(branch: xr.Dataset) -> Figure:
     for point, words in zip(branch["shown_point"].values, branch["shown_as"].values):
         path = _wave(branch) @ np.swapaxes(lines[point, 0], 0, 1)
         note = "flanks wedge" if branch["back_contact"].values[point].max() > 0.0 else "drive flanks only"
+        note += _doubt(branch["tail"].values[point])
         curves.append((f"{branch['weight_frequency'].values[point]:.1f} Hz, {words!s}: {note}", path.real.T))
     return orbits(curves)
 
@@ -109,9 +132,10 @@ def weight_bearing_forces(branch: xr.Dataset, point: int) -> Figure:
 
 
 def _top(branch: xr.Dataset) -> str:
-    """The last shown point in words."""
+    """The last shown point in words, for figures of forces."""
     point = int(branch["shown_point"].values[-1])
-    return f"{branch['weight_frequency'].values[point]:.1f} Hz, {branch['shown_as'].values[-1]!s}"
+    words = f"{branch['weight_frequency'].values[point]:.1f} Hz, {branch['shown_as'].values[-1]!s}"
+    return words + _doubt(_tails(branch)[point])
 
 
 def mesh_forces(branch: xr.Dataset) -> Figure:
@@ -125,7 +149,9 @@ def mesh_forces(branch: xr.Dataset) -> Figure:
         label(ax, y="force [kN]", title=words)
     axes[-1].set_xlim(0.0, 360.0)
     axes[-1].set_xticks(np.arange(0.0, 361.0, 60.0))
-    label(axes[0], title=f"{_top(branch)}: drive flanks")
+    # what is doubted stands on a line of its own, below
+    words, *doubt = _top(branch).split("\n")
+    label(axes[0], title="\n".join([f"{words}: drive flanks", *doubt]))
     label(axes[-1], "phase of the weight [°]")
     legend_below(figure, axes[0])
     return figure
@@ -173,6 +199,8 @@ def response_orbit(response: xr.Dataset, speed: int) -> Figure:
         ax.plot([x.mean()], [y.mean()], "+", color=GREY)
         ax.set_aspect("equal", adjustable="datalim")
         label(ax, "x [µm]", "y [µm]", f"{name}, {float(response['speed'][speed]):.6g} rpm")
+    if response["tail"].values[speed] > TAIL_LIMIT:
+        figure.suptitle(_DOUBTFUL, fontsize=SIZE)
     return figure
 
 
@@ -185,7 +213,8 @@ def response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
         force = np.hypot(*(one @ wave.T).real)
         ax.plot(360.0 * turn, 1e-3 * force, linewidth=1.0, label=f"planet {number + 1}", **line_style(number))
     ax.set_xlim(0.0, 360.0 * turn[-1])
-    label(ax, "carrier angle [°]", "force [kN]", f"{float(response['speed'][speed]):.6g} rpm")
+    title = f"{float(response['speed'][speed]):.6g} rpm" + _doubt(_tails(response)[speed])
+    label(ax, "carrier angle [°]", "force [kN]", title)
     legend_below(figure)
     return figure
 
@@ -210,10 +239,10 @@ def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
     for number, (text, force) in enumerate(curves):
         for ax, (part, _) in zip(axes, panels):
             ax.plot(360.0 * turn[part], force[part], linewidth=0.8, label=text, **line_style(number))
-    title = f"{float(response['speed'][speed]):.6g} rpm: "
+    title, doubt = f"{float(response['speed'][speed]):.6g} rpm: ", _doubt(_tails(response)[speed])
     for ax, (_, words) in zip(axes, panels):
-        label(ax, "carrier angle [°]", "mesh force [kN]", title + words)
-        title = ""
+        label(ax, "carrier angle [°]", "mesh force [kN]", title + words + doubt)
+        title = doubt = ""
     legend_below(figure, axes[0])
     return figure
 
@@ -240,7 +269,7 @@ def response_spectrum(response: xr.Dataset, speed: int) -> Figure:
             ax.set_ylim(bottom=floor)
         label(ax, y=text)
     label(axes[-1], "frequency in the carrier frame [Hz]")
-    label(axes[0], title=f"{float(response['speed'][speed]):.6g} rpm")
+    label(axes[0], title=f"{float(response['speed'][speed]):.6g} rpm" + _doubt(_tails(response)[speed]))
     legend_below(figure)
     return figure
 
@@ -252,6 +281,7 @@ def _contact(data: xr.Dataset, x: np.ndarray, words: str, parts) -> Figure:
     figure, axes = new_figure(rows=4, width=8.0, height=6.4, sharex=True)
     for number, (ax, (side, mesh)) in enumerate(zip(axes, panels)):
         share, colour = data[f"{side}_contact"].values[:, mesh], COLOURS[number]
+        _mark_tails(ax, x, share, _tails(data))
         if parts is None:
             ax.plot(x, share, "o-", color=colour, markersize=3)
         else:
@@ -261,7 +291,8 @@ def _contact(data: xr.Dataset, x: np.ndarray, words: str, parts) -> Figure:
         ax.set_yticks([0.0, 0.5, 1.0])
         label(ax, title=f"{data['mesh'].values[mesh]!s}, {side} flanks")
     label(axes[-1], words)
-    figure.supylabel("share of the time in contact: 1 in contact, 0 not", fontsize=SIZE)
+    figure.supylabel("share of the time in contact [1]", fontsize=SIZE)
+    legend_below(figure)
     return figure
 
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+# numbers along an axis, and lines of a spectrum that can be told apart, at most
+_TICKS, _STEMS = 20, 4000
 ACCELERATION = "acceleration [m/s²]"
 
 
@@ -73,12 +75,13 @@ def housing_signal(
         rows=1 + len(harmonics), width=9.5, height=1.0 + 2.5 * (1 + len(harmonics)), sharex=True
     )
     signal = housing["acceleration"].values[speed_index]
-    peaks = _peaks(signal, ring_teeth)
-    text = "largest within a mesh period"
-    _draw_signal(axes[0], signal, peaks, f"{speed}: all orders", text=text, colour=ORANGE)
+    text = "largest and smallest within a mesh period"
+    around = _extremes(signal, ring_teeth)
+    _draw_signal(axes[0], signal, around, f"{speed}: all orders", text=text, colour=ORANGE)
     for ax, harmonic in zip(axes[1:], harmonics):
         found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
-        _draw_signal(ax, found.signal, found.envelope, _band_title(speed, found))
+        around = found.envelope, -found.envelope
+        _draw_signal(ax, found.signal, around, _band_title(speed, found))
         lobes = found.lobes
         ax.plot(lobes.position, lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False)
     axes[-1].set_xlim(0, 1)
@@ -90,17 +93,18 @@ def housing_signal(
 def _draw_signal(ax, signal, around, title, *, text="envelope", colour=VERMILION):
     at = np.arange(len(signal)) / len(signal)
     ax.plot(at, signal, color=BLUE, linewidth=0.5, label="acceleration of the fixed point")
-    at = np.append(np.arange(len(around)) / len(around), 1.0)
-    for sign in (1, -1):
-        ax.plot(at, sign * np.append(around, around[0]), color=colour, linewidth=1.3, label=text)
+    for side in around:
+        at = np.append(np.arange(len(side)) / len(side), 1.0)
+        ax.plot(at, np.append(side, side[0]), color=colour, linewidth=1.3, label=text)
     label(ax, y=ACCELERATION, title=title)
 
 
-def _peaks(signal, ring_teeth):
-    """Largest absolute value within one mesh period around every sample."""
-    from scipy.ndimage import maximum_filter1d
+def _extremes(signal, ring_teeth):
+    """Largest and smallest value within one mesh period around every sample: signals may lack symmetry."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    return maximum_filter1d(np.abs(signal), max(len(signal) // ring_teeth, 1), mode="wrap")
+    size = max(len(signal) // ring_teeth, 1)
+    return maximum_filter1d(signal, size, mode="wrap"), minimum_filter1d(signal, size, mode="wrap")
 
 
 def _band_title(speed: str, found: BandAnalysis) -> str:
@@ -139,7 +143,9 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     floor = 1e-4 * largest
     _stems(axes[0], order, linear, floor)
     axes[0].set_xlim(0, order[-1] + 1)
-    multiples = np.arange(1, int(order[-1]) // ring_teeth + 1)
+    last = int(order[-1]) // ring_teeth
+    # at most twenty numbers, that none covers another
+    multiples = np.arange(1, last + 1) if last <= _TICKS else np.arange(0, last + 1, _whole_step(last))[1:]
     top = axes[0].secondary_xaxis("top")
     top.set_xticks(multiples * ring_teeth, [str(h) for h in multiples])
     top.tick_params(labelsize=SIZE - 2)
@@ -164,9 +170,21 @@ def _strongest_bands(order, amplitude, ring_teeth, count):
 
 
 def _stems(ax, order, amplitude, floor, *, text="Heaviside, linear interpolation", colour=BLUE, width=1.0):
-    shown = amplitude > floor
+    shown = _highest(order, amplitude, amplitude > floor)
     ax.vlines(order[shown], floor, amplitude[shown], color=colour, linewidth=width, label=text)
     ax.set_yscale("log")
+
+
+def _highest(order, amplitude, shown) -> np.ndarray:
+    """Numbers of the lines to draw: of more than there are pixels, the highest one of every column."""
+    numbers = np.flatnonzero(shown)
+    if len(numbers) <= _STEMS:
+        return numbers
+    column = ((order[numbers] - order[0]) * (_STEMS / np.ptp(order))).astype(int)
+    # the last of a column in ascending order is its highest
+    ranked = np.lexsort((amplitude[numbers], column))
+    last = np.append(np.diff(column[ranked]) > 0, True)
+    return numbers[ranked[last]]
 
 
 def _draw_band(ax, order, linear, exact, ring_teeth, harmonic):
@@ -257,7 +275,8 @@ def modulation_polar(
         lobes, angle = found.lobes, np.linspace(0.0, 2 * np.pi, len(found.envelope) + 1)
         value = np.append(found.envelope, found.envelope[0])
         ax.plot(angle, value, color=COLOURS[i % len(COLOURS)], linewidth=2.0)
-        ax.fill(angle, value, color=COLOURS[i % len(COLOURS)], alpha=0.15, linewidth=0)
+        # a polygon would search the extremes of every one of its sides
+        ax.fill_between(angle, 0.0, value, color=COLOURS[i % len(COLOURS)], alpha=0.15, linewidth=0)
         ax.plot(2 * np.pi * lobes.position, lobes.height, "v", color=BLACK, markersize=6, label="lobe")
         ax.set_yticks(np.arange(1, 5) * _round_step(value.max(initial=0.0) / 4))
         ax.set_ylim(0, 1.12 * value.max(initial=0.0) or 1.0)
@@ -280,6 +299,11 @@ def _around(values):
     from scipy.ndimage import uniform_filter1d
 
     return uniform_filter1d(values, max(len(values) // 15, 1), mode="wrap")
+
+
+def _whole_step(last: int) -> int:
+    """Whole step of at most `_TICKS` ticks up to `last`."""
+    return max(round(_round_step(last / _TICKS)), 1)
 
 
 def _round_step(step: float) -> float:

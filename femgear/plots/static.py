@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.plots.style import (
+    BLACK,
     COLOURS,
     distinct_lines,
     family,
@@ -50,7 +51,7 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     for i, (text, row) in enumerate(rows):
         right.plot(position, overall[row], label=text, **line_style(i + len(drawn)))
     label(right, POSITION, "sum of both meshes [µm]", "sun to ring")
-    right.set_xlim(0, 1)
+    right.set_xlim(0, position[-1])
     legend_below(figure, columns=2)
     return figure
 
@@ -69,24 +70,29 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
     -------
     Figure
     """
-    figure, (ax,) = new_figure(height=4.8)
-    names = static["mesh"].values
-    lines = distinct_lines(names, static["mesh_stiffness"])
+    lines = distinct_lines(static["mesh"].values, static["mesh_stiffness"])
+    # two families of curves that differ from planet to planet would cover one another
+    kinds = list(dict.fromkeys(family(text) for text, _ in lines)) if len(lines) > 2 else [""]
+    figure, axes = new_figure(rows=len(kinds), height=1.6 + 3.2 * len(kinds), sharex=True)
     for i, (text, row) in enumerate(lines):
-        for name, dash, width in (("mesh_stiffness", "-", 2.0), ("mesh_stiffness_secant", ":", 1.4)):
+        ax = axes[kinds.index(family(text)) if len(kinds) > 1 else 0]
+        for name, width, kind in (("mesh_stiffness", 2.2, ""), ("mesh_stiffness_secant", 0.9, "secant")):
             position, value = periodic(static["position"], static[name][row] * 1e-6)
-            kind = "tangent" if name == "mesh_stiffness" else "secant"
-            colour = COLOURS[i % len(COLOURS)]
-            ax.plot(position, value, dash, color=colour, linewidth=width, label=f"{text}, {kind}")
-    ax.set_xlim(0, 1)
-    label(ax, POSITION, "mesh stiffness [N/µm]")
-    if face_width:
-        # N/m over m of width is 1e-9 N/(mm µm)
-        factor = 1e-3 / face_width
-        second = ax.secondary_yaxis("right", functions=(lambda k: k * factor, lambda c: c / factor))
-        second.set_ylabel("per face width [N/(mm µm)]", fontsize=11)
-        second.tick_params(labelsize=10)
-    legend_below(figure, ax, columns=2)
+            # the legend tells meshes by colour and dash, the two kinds of stiffness by width
+            ax.plot(position, value, linewidth=width, label="_" * bool(kind) + text, **line_style(i))
+    for kind, width in (("tangent (thick)", 2.2), ("secant (thin)", 0.9)):
+        axes[-1].plot([], [], color=BLACK, linewidth=width, label=kind)
+    axes[-1].set_xlim(0, position[-1])
+    label(axes[-1], POSITION)
+    # N/m over m of width is 1e-9 N/(mm µm)
+    factor = 1e-3 / face_width if face_width else 0.0
+    for ax, kind in zip(axes, kinds):
+        label(ax, y="mesh stiffness [N/µm]", title=f"{kind} meshes" if kind else "")
+        if factor:
+            second = ax.secondary_yaxis("right", functions=(lambda k: k * factor, lambda c: c / factor))
+            second.set_ylabel("per face width [N/(mm µm)]", fontsize=11)
+            second.tick_params(labelsize=10)
+    legend_below(figure, columns=2 if len(lines) < 4 else 4)
     return figure
 
 
@@ -113,7 +119,7 @@ def load_sharing(static: xr.Dataset) -> Figure:
     spread = np.abs(share - equal).max()
     if spread < 0.05 * equal:
         ax.set_ylim(0.94 * equal, 1.06 * equal)
-    ax.set_xlim(0, 1)
+    ax.set_xlim(0, position[-1])
     title = f"largest departure from equal shares: {spread:.3g} %" if spread > 1e-6 else "equal shares"
     label(ax, POSITION, "share of the torque [%]", title)
     legend_below(figure, columns=4)
@@ -123,9 +129,9 @@ def load_sharing(static: xr.Dataset) -> Figure:
 def tooth_loads(static: xr.Dataset) -> Figure:
     """Load of one tooth pair from its first to its last contact, in a sun-planet and a planet-ring mesh.
 
-    The simultaneous pairs of the dataset are one base pitch apart on the path of contact, so that
-    position plus pair number, in base pitches, strings them into the history of one pair. The meshes
-    are those of the first planet.
+    The simultaneous pairs of the dataset are one base pitch apart on the path of contact, and a pair goes on
+    to the next place with every mesh period: from period to period and place to place the loads are the
+    history of one pair. The meshes are those of the first planet.
 
     Parameters
     ----------
@@ -138,23 +144,23 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     """
     figure, axes = new_figure(columns=2, width=9.5, sharey=True)
     names = [str(name) for name in static["mesh"].values]
-    position = static["position"].values
+    position, largest = static["position"].values, 0.0
+    periods = int(static.attrs.get("mesh_periods", 1))
     for ax, kind in zip(axes, ("sun-planet", "planet-ring")):
         row = next(i for i, name in enumerate(names) if family(name) == kind)
         load, force = static["tooth_load"].values[row], static["mesh_force"].values[row]
-        path = (np.arange(len(load))[:, None] + position).ravel()
-        carried = np.flatnonzero(load.ravel() > 1e-9 * force.max(initial=0.0))
+        place = np.arange(len(load))[:, None]
+        each = np.arange(len(position)).reshape(periods, -1)[place.ravel() % periods]
+        path, load = (place + position[each] % 1.0).ravel(), load[place, each].ravel()
+        carried = np.flatnonzero(load > 1e-9 * force.max(initial=0.0))
         first, last = (carried[0], carried[-1]) if len(carried) else (0, load.size - 1)
         shown = slice(max(first - 1, 0), last + 2)
-        ax.plot(
-            path[shown] - path[first],
-            load.ravel()[shown],
-            label="one tooth pair",
-            color=COLOURS[0],
-        )
+        ax.plot(path[shown] - path[first], load[shown], label="one tooth pair", color=COLOURS[0])
+        largest = max(largest, load.max(initial=0.0), force.mean())
         ax.axhline(force.mean(), color="0.45", linewidth=1.0, linestyle=(0, (1, 2)), label="whole mesh, mean")
         label(ax, "path since the first contact [base pitches]", title=names[row])
-        ax.set_ylim(bottom=0)
+    # the axes share one scale, which holds what both of them show
+    axes[0].set_ylim(0, 1.05 * largest or 1.0)
     label(axes[0], y="load along the line of action [N]")
     legend_below(figure, columns=3)
     return figure

@@ -15,8 +15,11 @@ BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#000000", "#808080"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", "--", "-.", ":")
+MARKERS = "osD^vPX*<>"
 SIZE = 11
 DPI = 120
+# height of a row of the legend [in]
+_LEGEND_ROW = 0.21
 
 
 def new_figure(
@@ -67,12 +70,17 @@ def label(ax, x: str = "", y: str = "", title: str = "") -> None:
 
 
 def legend_below(figure: Figure, ax=None, *, columns: int = 3) -> None:
-    """One legend under the figure, where it hides nothing; entries of equal text appear once."""
+    """One legend under the figure, where it hides nothing; entries of equal text appear once.
+
+    The figure grows by the rows beyond the third, so that many entries leave the axes their size.
+    """
     entries = {}
     for one in figure.axes if ax is None else [ax]:
         for handle, text in zip(*one.get_legend_handles_labels()):
             entries.setdefault(text, handle)
     if entries:
+        rows = -(-len(entries) // columns)
+        figure.set_figheight(figure.get_figheight() + _LEGEND_ROW * max(rows - 3, 0))
         figure.legend(
             entries.values(),
             entries.keys(),
@@ -84,7 +92,7 @@ def legend_below(figure: Figure, ax=None, *, columns: int = 3) -> None:
 
 
 def line_style(index: int) -> dict[str, str]:
-    """Colour and dash of the line number `index`: neighbours differ in both."""
+    """Colour and dash of the line number `index`: neighbours differ in both, 28 lines in one of them."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
 
 
@@ -149,9 +157,10 @@ def distinct_lines(names, values, *, tolerance: float = 1e-6):
 
 
 def periodic(position, values):
-    """Append the first sample at the end of the period, so that the curve closes."""
+    """Append the first sample at the end of a record of whole periods, so that the curve closes."""
     position, values = np.asarray(position), np.asarray(values)
-    return np.append(position, 1.0 + position[0]), np.concatenate([values, values[..., :1]], axis=-1)
+    length = np.floor(position[-1] - position[0]) + 1.0
+    return np.append(position, length + position[0]), np.concatenate([values, values[..., :1]], axis=-1)
 
 
 def rpm(speed: float) -> str:

@@ -11,12 +11,17 @@ import numpy as np
 
 from femgear.errors import CaseError, FemgearError
 from femgear.files import replace_file
+from femgear.gears.motion import orientations
+from femgear.gears.tooth import half_sector
 from femgear.scene.drawing import add_coloured, add_text, look_down, rounded
 from femgear.scene.library import load_pyvista
 
 if TYPE_CHECKING:
+    from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
 
+# elements of a flank before the factor that divides all spacing: outlines of some twenty points a tooth
+_FLANK, _COARSE = 10, 0.4
 _SUN, _PLANET, _MARK, _SENSOR = "#D55E00", "#E69F00", "#000000", "#009E73"
 
 
@@ -188,56 +193,47 @@ def _draw(planetary_set, field, carrier, sensor_angle, scale, title, size):
     return images
 
 
-def gear_outline(teeth: int, root: float, tip: float) -> np.ndarray:
-    """Trapezoidal teeth around a circle, the first centred on angle 0, as complex points; for drawing only.
+def gear_outline(gear: Gear) -> np.ndarray:
+    """Points of the exact outline of all teeth, the first centred on angle 0.
 
     Parameters
     ----------
-    teeth : int
-    root, tip : float
-        Radii [m]; for an internal gear the tip radius is the smaller one.
+    gear : Gear
 
     Returns
     -------
-    (4 teeth,) complex array
+    (n,) complex array
+        [m], counter-clockwise: involutes with their generated fillets, tip and root circles.
     """
-    pitch = 2 * np.pi / teeth
-    part = np.array([-0.36, -0.14, 0.14, 0.36]) * pitch
-    angle = np.arange(teeth)[:, None] * pitch + part
-    return (np.array([root, tip, tip, root]) * np.exp(1j * angle)).ravel()
+    half = half_sector(gear, flank_elements=_FLANK, refine=_COARSE)
+    parts = [half.curve(name) for name, _ in half.curves if name in ("tip", "flank", "fillet", "root")]
+    # curves of a sector run round it: those of an internal gear come towards its tooth
+    points = np.concatenate(parts)[:: -1 if gear.internal else 1]
+    points = points[:, 0] + 1j * points[:, 1]
+    points = points[np.append(True, np.abs(np.diff(points)) > 1e-9 * gear.module)]
+    # without the middles of tooth and gap, which belong to both halves
+    tooth = np.concatenate([points[:0:-1].conj(), points[:-1]])
+    return np.concatenate([tooth * np.exp(2j * np.pi * k / gear.teeth) for k in range(gear.teeth)])
 
 
 def _ring_corners(planetary_set):
     """Points of the ring (around, across) from the teeth to the outer circle, complex."""
     ring = planetary_set.ring
-    teeth = gear_outline(ring.teeth, ring.root_radius, ring.tip_radius)
-    inner = teeth * np.exp(1j * _ring_turn(planetary_set))
-    # the flanks of the drawn teeth are not radial, so each inner point has its outer one at its own angle
+    inner = gear_outline(ring) * np.exp(1j * orientations(planetary_set).ring)
+    # flanks are not radial, so each inner point has its outer one at its own angle
     outer = ring.rim_radius * np.exp(1j * np.angle(inner))
     across = np.linspace(0.0, 1.0, 3)
     return inner[:, None] * (1 - across) + outer[:, None] * across
 
 
-def _ring_turn(planetary_set) -> float:
-    """Angle of a ring tooth that stands in a gap of the first planet when the carrier is at angle 0."""
-    s, psi = planetary_set, float(planetary_set.planet_angles[0])
-    planet = _places(s, 0.0)[1][1]
-    phase = (psi - planet) * s.planet.teeth / (2 * np.pi)
-    return psi - (phase - 0.5) * 2 * np.pi / s.ring.teeth
-
-
 def _places(planetary_set, carrier_angle):
     """Centre and rotation of the sun and of every planet when the carrier has turned, ring held."""
     s = planetary_set
-    sun = carrier_angle * (1 + s.ring.teeth / s.sun.teeth)
-    places = [(0j, sun)]
-    for psi in s.planet_angles:
-        at = float(psi) + carrier_angle
-        # a gap of the planet stands where a tooth of the sun passes
-        phase = (at - sun) * s.sun.teeth / (2 * np.pi)
-        turn = at + np.pi + (phase + 0.5) * 2 * np.pi / s.planet.teeth
-        places.append((s.centre_distance * np.exp(1j * at), turn))
-    return places
+    # against the carrier the ring turns back by a tooth in every mesh period
+    at = orientations(s, s.ring.teeth * carrier_angle / (2.0 * np.pi))
+    centres = s.centre_distance * np.exp(1j * (np.asarray(s.planet_angles, float) + carrier_angle))
+    turns = (carrier_angle + angle for angle in at.planets)
+    return [(0j, at.sun + carrier_angle), *zip(centres, turns)]
 
 
 def _discs(pv, plotter, planetary_set):
@@ -245,7 +241,7 @@ def _discs(pv, plotter, planetary_set):
     discs = []
     sun, planet = planetary_set.sun, planetary_set.planet
     for gear, colour in ((sun, _SUN), *((planet, _PLANET) for _ in planetary_set.planet_angles)):
-        edge = gear_outline(gear.teeth, gear.root_radius, gear.tip_radius)
+        edge = gear_outline(gear)
         mark = gear.root_radius * 0.8 + 0.07 * gear.root_radius * np.exp(2j * np.pi * np.arange(12) / 12)
         discs.append([])
         for outline, tint in ((edge, colour), (mark, _MARK)):

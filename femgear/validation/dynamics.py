@@ -1,4 +1,4 @@
-"""Dynamic response of the reference set: quasi-static limit, time integration, truncation, stability."""
+"""Dynamic response of the reference set: time integration, truncation, stability."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from femgear.validation.rows import Row, at_most, counted, information, within
 
 MESHES = (("sun-planet", 0), ("planet-ring", 3))
 HARMONICS = 6
-STATIC = "static solution of the same case"
 SHOOTING = "DOP853 over one period, periodic by linear shooting"
 
 
@@ -27,38 +26,6 @@ def _changed(**entries):
     for key, value in entries.items():
         case = with_value(case, key.replace("__", "."), value)
     return case
-
-
-def quasi_static() -> tuple[Row, ...]:
-    """At 1 rpm the dynamic transmission error is the static one."""
-    from femgear.analysis import solve_dynamics, solve_modes
-
-    static = reference_static()
-    ste = static.cycle.deflection
-    harmonics = (ste.shape[1] - 1) // 2
-    rows = []
-    for foundation in ("1e10 N/m^3", "1e17 N/m^3"):
-        case = _changed(
-            operation__speeds=["1 rpm"],
-            dynamics__response_harmonics=2 * harmonics,
-            dynamics__mesh_harmonics=harmonics,
-            ring__foundation_radial=foundation,
-            ring__foundation_tangential=foundation,
-        )
-        dte = sample(solve_dynamics(case, static, solve_modes(case, static)).dte[0], 2 * ste.shape[1])[:, ::2]
-        for name, mesh in MESHES:
-            moving, still = (x[mesh] - x[mesh].mean() for x in (dte, ste))
-            label = f"1 rpm, foundation {foundation}, {name}: "
-            quantity = label + "largest difference of the fluctuations over peak to peak"
-            error = np.abs(moving - still).max() / np.ptp(still)
-            rows.append(at_most("quasi-static", STATIC, quantity, 1e-3, error))
-            mean = 1e6 * ste[mesh].mean(), 1e6 * dte[mesh].mean()
-            if foundation == "1e17 N/m^3" or mesh == 0:
-                rows.append(within("quasi-static", STATIC, label + "mean [um]", *mean, 1e-3))
-            else:
-                note = "the difference is what the ring moves on its foundation"
-                rows.append(information("quasi-static", STATIC, label + "mean [um]", *mean, note=note))
-    return tuple(rows)
 
 
 def shooting(

@@ -11,7 +11,14 @@ import numpy as np
 
 from femgear.models.multistage import mean_mesh_stiffness, mesh_columns, multistage_system
 from femgear.models.multistage_data import Member, MultistageSet, Stage, StageCoupling
-from femgear.models.multistage_example import SPEED, TORQUE, example_errors, four_stage_train
+from femgear.models.multistage_example import (
+    PUBLISHED_FREQUENCIES,
+    SPEED,
+    TORQUE,
+    example_errors,
+    four_stage_train,
+    published_train,
+)
 from femgear.models.multistage_modes import multistage_modes
 from femgear.models.multistage_motion import speed_ratio, train_speeds, train_torques
 from femgear.models.multistage_response import error_response
@@ -19,7 +26,7 @@ from femgear.models.planar_data import torsional_set
 from femgear.models.planar_modes import planar_modes
 from femgear.solvers.frequency_response import mesh_error_response
 from femgear.validation.planar import lin_parker_set
-from femgear.validation.rows import Row, at_most, counted, within
+from femgear.validation.rows import Row, at_most, counted, information, within
 
 STRUCTURE = "Kiracofe and Parker, J. Vib. Acoust. 129, 2007: structure of the modes"
 
@@ -130,4 +137,21 @@ def response() -> tuple[Row, ...]:
         error = np.abs(found[number].force - soft[number].force).max() / size
         source = "no harmonic in the class of translations"
         rows.append(at_most("MS", source, name + "without lateral couplings, difference", 1e-9, error))
+    return tuple(rows)
+
+
+def published() -> tuple[Row, ...]:
+    """Published four-stage table in torsion, free at both ends: stiffnesses as printed and a thousandth."""
+    rows, source = [], "Optimized design of dynamic characteristics of planetary gear train"
+    note = "number of planets, supports and shafts are not printed; docs/multistage.md has all readings"
+    for unit, factor in (("N/mm as printed", 1e3), ("N/m", 1.0)):
+        for planets in (3, 4):
+            train = published_train(planets=planets, stiffness_unit=factor)
+            elastic = multistage_modes(train).modes.frequency[1:]
+            name = f"published table, {unit}, {planets} planets, rigid shafts: "
+            for text, reference, value in zip(
+                ("lowest", "highest"), PUBLISHED_FREQUENCIES, (elastic[0], elastic[-1]), strict=True
+            ):
+                words = f"{name}{text} elastic mode [Hz]"
+                rows.append(information("MS", source, words, reference, value, note=note))
     return tuple(rows)

@@ -108,8 +108,16 @@ def test_reversed_pressures_are_mirrored(reference):
     options = {"positions": 4, "pressures": True}
     one = walk_either_flank(gears, bodies, sun_torque=100.0, deviations=errors, **options)
     two = walk_either_flank(gears, bodies, sun_torque=-100.0, deviations=mirrored, **options)
-    order, back = [0, 2, 1, 3, 5, 4], -np.arange(4) % 4
-    turned = two.pressure[order][:, ::-1, ::-1][..., back]
-    assert turned == pytest.approx(one.pressure, rel=1e-6, abs=1e-6 * one.pressure.max())
-    centre = -two.pressure_centre[order][:, ::-1][..., back]
-    assert centre == pytest.approx(one.pressure_centre, abs=1e-12)
+    pitch, largest = gears.sun.base_pitch, one.pressure.max()
+    for mesh, other in enumerate([0, 2, 1, 3, 5, 4]):
+        for p, q in enumerate(-np.arange(4) % 4):
+            for slot in np.flatnonzero(one.tooth_load[mesh, :, p]):
+                # the pair that stands at the opposite path coordinate
+                apart = np.abs(two.path[other, :, q] + one.path[mesh, slot, p])
+                image = int(apart.argmin())
+                assert apart[image] < 1e-9 * pitch
+                turned = two.pressure[other, image, ::-1, q]
+                assert turned == pytest.approx(one.pressure[mesh, slot, :, p], rel=1e-6, abs=1e-6 * largest)
+                centre = -two.pressure_centre[other, image, q]
+                assert centre == pytest.approx(one.pressure_centre[mesh, slot, p], abs=1e-12)
+    assert two.tooth_load.sum() == pytest.approx(one.tooth_load.sum(), rel=1e-9)

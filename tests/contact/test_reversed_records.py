@@ -17,6 +17,7 @@ from femgear.validation.planetary import reference_set
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
 POSITIONS = 2
+N = 3
 ORDER = [0, 2, 1, 3, 5, 4]
 NAMES = ("deflection", "force", "stiffness", "max_pressure")
 
@@ -123,3 +124,55 @@ def test_negative_positions_are_those_at_the_end_of_a_closed_record(gears, bodie
     )
     for name in NAMES:
         assert getattr(before, name) == pytest.approx(getattr(closed, name)[:, -2 * POSITIONS :], rel=1e-9)
+
+
+@pytest.mark.parametrize("periods", [1, 2])
+def test_teeth_are_followed_through_reversed_records(gears, bodies, periods):
+    """A tooth pair goes on by 1 / P of a base pitch from position to position and into the next slot.
+
+    Its load at every place is that of the mirrored set under the positive torque at the mirrored place.
+    """
+    P, pitch = 4, gears.sun.base_pitch
+    image, order = mirrored_set(gears)
+    options = {"positions": P, "periods": periods, "both_flanks": True, "pressures": True}
+    # pins pushed inwards wedge the teeth of all planets
+    pins = np.array([[-5e-6, 0.0], [-4e-6, 2e-6], [-6e-6, 1e-6]])
+    errors = replace(no_deviations(gears), pin_errors=pins)
+    seen = mirrored_deviations(errors, gears, image, order)
+    found = walk_either_flank(gears, bodies, sun_torque=-TORQUE, deviations=errors, **options)
+    behind = walk_mesh_cycle(image, bodies, sun_torque=TORQUE, deviations=seen, **options)
+    assert found.wedged.any()
+    count = periods * P
+    for side, sign in (("", 1), ("back_", -1)):
+        load, path, tooth = (getattr(found, f"{side}{name}") for name in ("tooth_load", "path", "tooth"))
+        there, place, number = (getattr(behind, f"{side}{name}") for name in ("tooth_load", "path", "tooth"))
+        slots = load.shape[1]
+        # within a slot and from its end into the next slot: 1 / P of a base pitch, no jump
+        assert np.diff(path.reshape(2 * N, slots, periods, P)) == pytest.approx(sign * pitch / P, rel=1e-9)
+        ends, begins = (path[:, :, P - 1], path[:, :, 0])
+        ends, begins = (ends[:, :-1], begins[:, 1:]) if sign > 0 else (ends[:, 1:], begins[:, :-1])
+        assert begins - ends == pytest.approx(sign * pitch / P, rel=1e-9)
+        # neighbouring slots hold neighbouring teeth
+        assert np.abs(np.diff(tooth, axis=2)) == pytest.approx(1)
+        for mesh in range(2 * N):
+            other = int(np.flatnonzero(order == mesh % N)[0]) + (mesh // N) * N
+            for p in range(count):
+                q = -p % count  # position -p of the mirror image
+                met = np.flatnonzero(load[mesh, :, p])
+                assert len(met) == np.count_nonzero(there[other, :, q])
+                for slot in met:
+                    apart = np.abs(place[other, :, q] + path[mesh, slot, p])
+                    twin = int(apart.argmin())
+                    assert apart[twin] < 1e-9 * pitch
+                    assert load[mesh, slot, p] == pytest.approx(there[other, twin, q], rel=1e-7, abs=1e-6)
+                    # the same tooth: it moves on by one with every period, on planets and ring the other way
+                    for gear, step in ((0, 1 if mesh < N else -1), (1, -1)):
+                        here = tooth[gear, mesh, slot] - step * (p // P)
+                        seen_there = number[gear, other, twin] - step * ((q - count * (p > 0)) // P)
+                        assert here == -seen_there, (side, mesh, gear, p)
+                    if not side:
+                        ours, theirs = (
+                            found.pressure[mesh, slot, ::-1, p],
+                            behind.pressure[other, twin, :, q],
+                        )
+                        assert ours == pytest.approx(theirs, rel=1e-6, abs=1e-6 * theirs.max())

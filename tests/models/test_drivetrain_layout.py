@@ -107,9 +107,41 @@ def test_beams_bend_through_their_stations():
     assert x == pytest.approx(0.2 + 3.0 * z)
 
 
-def test_joints_have_two_links():
-    model, layout = shaft_of(section=SECTION)
-    z, x = moved(model, layout, lambda z: 0.5 * z**2, lambda z: z)
-    assert z == pytest.approx([0.0, 0.3, 0.3, 0.6])
-    # the second link stands along its body's tilt, the first does not move: they meet
-    assert x == pytest.approx([0.0, 0.0, 0.5 * 0.36 - 0.3 * 0.6, 0.18], abs=1e-15)
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"section": SECTION},
+        {"bending": 2e5, "torsion": 1e5, "shear_ratio": 0.7},
+        {"bending": 2e5, "torsion": 1e5, "shear": np.inf},
+        {"bending": 2e5, "torsion": 1e5, "shear": 1e4},
+        {"bending": np.inf, "torsion": 1e5, "shear": 1e8},
+    ],
+)
+def test_joints_are_drawn_as_the_beams_that_they_stand_for(options):
+    """Pure bending is a parabola, a rigid motion a straight line, and no shaft has a kink."""
+    model, layout = shaft_of(**options)
+    if np.inf not in options.values():  # rigid springs leave the second end fewer coordinates
+        z, x = moved(model, layout, lambda z: 0.5 * z**2, lambda z: z)
+        assert x == pytest.approx(0.5 * z**2, abs=1e-14)
+        z, x = moved(model, layout, lambda z: 0.2 + 3.0 * z, lambda z: 3.0)
+        assert len(z) > 8 and x == pytest.approx(0.2 + 3.0 * z)
+    # any motion of the ends: slopes along the shaft change little by little
+    shape = np.random.default_rng(5).standard_normal(len(model.rigid))
+    ((rest, across),) = shaft_lines(model, layout, shape, points=64)
+    slope = np.diff(across[:, :2], axis=0) / np.diff(rest[:, 2])[:, None]
+    assert np.isfinite(slope).all()
+    assert np.abs(np.diff(slope, axis=0)).max() < 0.1 * np.abs(slope).max()
+
+
+def test_joint_with_shear_follows_the_loaded_cantilever():
+    """Tip force on a joint of this Phi: the drawn line is the Timoshenko cantilever, not two links."""
+    l, phi = LENGTH, 0.7
+    model, layout = shaft_of(bending=2e5, torsion=1e5, shear_ratio=phi)
+    EI = 2e5 * l
+    shear = 12.0 * EI / (phi * l**2)
+
+    def deflection(z):
+        return z**2 * (3.0 * l - z) / (6.0 * EI) + z / shear
+
+    z, x = moved(model, layout, deflection, lambda z: z * (2.0 * l - z) / (2.0 * EI))
+    assert x == pytest.approx(deflection(z), rel=1e-9, abs=1e-18)

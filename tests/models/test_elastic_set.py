@@ -12,6 +12,7 @@ from femgear.contact.candidates import separation
 from femgear.errors import CaseError, ContactError
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import copy_nodes, rotated_copies
+from femgear.fe.reduction import CyclicModes
 from femgear.gears import Gear, PlanetarySet, equal_planet_angles
 from femgear.gears.checks import feasible_angles
 from femgear.models.elastic import (
@@ -22,8 +23,12 @@ from femgear.models.elastic import (
     ring_displacement,
     ring_field,
     ring_mesh_compliance,
+    ring_wave_shares,
+    turning_system,
 )
-from femgear.models.ring import RADIAL, TANGENTIAL, ring_model
+from femgear.models.planar import PlanarBody, planar_from_set, planar_system
+from femgear.models.ring import RADIAL, TANGENTIAL, RingModel, ring_model
+from femgear.solvers.complex_modes import complex_modes
 from femgear.solvers.modal import solve_modes
 
 STEEL = Material(206e9, 0.3, 7850.0)
@@ -355,3 +360,210 @@ def test_motor_and_brake_follow_the_driven_member():
     assert system.K[brake, place["sun: rotation"]] == -5000.0
     assert system.load[motor] == pytest.approx(100.0)
     assert system.load[brake] == pytest.approx(-20.0)
+
+
+SPRING = np.repeat([5e8, 7e8], 3)
+
+
+def turning(model, speed):
+    return turning_system(model, centre_distance=0.051, carrier_speed=speed)
+
+
+def test_bare_ring_splits_by_its_nodal_diameters_in_the_turning_frame(ring):
+    """In its own frame the ring keeps f: seen from the carrier its waves have f +- n Omega / 2 pi."""
+    model, speed = make(gear_set(), ring), 300.0
+    system = turning(model, speed)
+    assert np.array_equal(system.gyroscopic, -system.gyroscopic.T)
+    own = np.arange(model.ring_slice.start, model.ring_slice.stop)
+    K, G = system.K[np.ix_(own, own)], system.gyroscopic[np.ix_(own, own)]
+    zero, one = np.zeros_like(K), np.eye(len(K))
+    found = np.linalg.eigvals(np.block([[zero, one], [-K, -speed * G]]))
+    n = ring.modes.nodal_diameter[model.ring_mode]
+    sign = np.where(model.ring_phase == 1, -1.0, 1.0) * (n > 0)
+    expected = 2 * np.pi * ring.modes.frequency[model.ring_mode] + sign * n * speed
+    positive = np.sort(found.imag)[len(own) :]
+    assert np.abs(found.real).max() < 1e-9 * expected.max()
+    assert positive == pytest.approx(np.sort(expected), rel=1e-9)
+
+
+def kinetic_energy(model, ring, sector, q, v, speed):
+    """Of all teeth of the ring and all bodies, from positions in the housing a moment apart."""
+    modes, density = ring.modes, mass(sector.grid, STEEL, gear_set().ring.face_width)
+    names, M = model.system.dofs, np.diag(model.system.M)
+    pairs = [i for i, name in enumerate(names) if name.endswith(": x")]
+    alone = [i for i, name in enumerate(names) if name.endswith("rotation")]
+
+    def positions(t):
+        x, now = q + t * v, speed * t
+        c, s = np.cos(now), np.sin(now)
+        flat = [np.array([c * x[i] - s * x[i + 1], s * x[i] + c * x[i + 1]]) for i in pairs]
+        wave = np.zeros((len(modes.frequency), 108), complex)
+        for value, m, sine in zip(x[model.ring_slice], model.ring_mode, model.ring_phase):
+            wave[m] += value * (-1j if sine else 1.0)
+        # the ring stands still: a tooth that was at phi is at phi - Omega t in the frame of the carrier
+        tooth = 2 * np.pi * np.arange(108) / 108 - now
+        wave = modes.norm[:, None] * wave * np.exp(1j * modes.nodal_diameter[:, None] * tooth)
+        return np.array(flat), x[alone], (modes.shape @ wave).real
+
+    step = 1e-7
+    flat, turn, teeth = ((a - b) / (2 * step) for a, b in zip(positions(step), positions(-step)))
+    bodies = M[pairs] @ (flat**2).sum(axis=1) + M[alone] @ turn**2
+    return 0.5 * (bodies + np.einsum("ik,ik->", teeth, density @ teeth))
+
+
+def test_turning_terms_are_those_of_the_kinetic_energy(sector, ring):
+    """Lagrange: T = v M v / 2 + Omega v B q + Omega^2 q C q / 2 gives G = B - B^T and -Omega^2 C."""
+    model, speed = make(gear_set(), ring), 700.0
+    system = turning(model, speed)
+    rng = np.random.default_rng(8)
+    shown = np.ones(len(system.M))
+    # high modes would hide the terms of the low ones
+    shown[model.ring_slice] = ring.modes.frequency[model.ring_mode] < 12e3
+
+    def energy(q, v):
+        return kinetic_energy(model, ring, sector, q, v, speed)
+
+    def cross(q, v):
+        return 0.5 * (energy(q, v) - energy(q, -v)) / speed
+
+    for _ in range(3):
+        a, b = shown * rng.normal(size=(2, len(shown)))
+        still = b @ system.M @ b / 2
+        assert energy(0 * b, b) == pytest.approx(still, rel=1e-7)
+        assert cross(b, a) - cross(a, b) == pytest.approx(
+            a @ system.gyroscopic @ b, rel=1e-6, abs=1e-7 * still
+        )
+        planets = 3 * 0.355 * 0.051**2 * speed**2 * b[place(model, "carrier: rotation")] ** 2
+        centripetal = b @ (model.system.K - system.K) @ b + planets
+        assert 2 * energy(b, 0 * b) == pytest.approx(centripetal, rel=1e-6)
+
+
+def test_centrifugal_preload_of_the_pins_is_that_of_their_potential(ring):
+    """Bearing and centrifugal potential with pins on their circle, differentiated numerically."""
+    gears, speed, k, m, a = gear_set(), 200.0, PLANET.stiffness, PLANET.mass, 0.051
+    model = make(gears, ring)
+    system = turning(model, speed)
+    names = ["carrier: rotation", *(f"planet {n}: {axis}" for n in (1, 2, 3) for axis in "xy")]
+    rows = [place(model, name) for name in names]
+    psi = np.asarray(gears.planet_angles)
+
+    def potential(q):
+        total = 0.0
+        for n, angle in enumerate(psi):
+            rest, pin = a * np.exp(1j * angle), a * np.exp(1j * (angle + q[0]))
+            planet = rest + q[1 + 2 * n] + 1j * q[2 + 2 * n]
+            total += 0.5 * k * abs(planet - pin) ** 2 - 0.5 * m * speed**2 * abs(planet) ** 2
+        return total
+
+    # planets sit where the bearing carries the centrifugal force
+    out = m * speed**2 * a / (k - m * speed**2)
+    still = np.concatenate([[0.0], *([out * np.cos(p), out * np.sin(p)] for p in psi)])
+    load = np.zeros(7)
+    load[1:] = system.load[rows[1:]]
+    assert load[1:].reshape(3, 2) == pytest.approx((k - m * speed**2) * still[1:].reshape(3, 2), rel=1e-12)
+    size = np.array([1e-3, *[1e-4] * 6])
+
+    def second(i, j):
+        e, f = np.eye(7)[i] * size, np.eye(7)[j] * size
+        corners = [potential(still + s * e + t * f) * s * t for s in (1, -1) for t in (1, -1)]
+        return sum(corners) / (4 * size[i] * size[j])
+
+    found = np.array([[second(i, j) for j in range(7)] for i in range(7)])
+    # without the brake's shaft and with the planets' own motion alone
+    expected = system.K[np.ix_(rows, rows)] - np.diag([BRAKE.stiffness, *[0.0] * 6])
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert found / scale == pytest.approx(expected / scale, abs=3e-5)
+    # the rotation of all together meets nothing
+    turned = np.concatenate([[1.0], *([-a * np.sin(p), a * np.cos(p)] for p in psi)])
+    assert abs(turned @ expected @ turned) < 1e-9 * 3 * m * (speed * a) ** 2
+
+
+def test_turning_modes_fulfil_the_equations_of_the_housing(ring):
+    """Modes of the carrier frame, seen from the housing: planets on their way round a ring at rest."""
+    gears, speed = gear_set(), 1500.0
+    model = make(gears, ring)
+    modes = complex_modes(turning(model, speed), SPRING, speed=speed)
+    names = model.system.dofs
+    x = [i for i, name in enumerate(names) if name.endswith(": x")]
+    sine = model.ring_slice.start + np.flatnonzero(model.ring_phase == 1)
+    pairs = [(i, i + 1, 1) for i in x]
+    pairs += [(i - 1, i, model.ring_diameter[i - model.ring_slice.start]) for i in sine]
+    chosen = np.flatnonzero((modes.frequency > 100.0) & (modes.frequency < 4000.0))
+    assert len(chosen) > 8
+
+    def seen(t, mode):
+        q = (modes.right[:, mode] * np.exp(modes.eigenvalue[mode] * t)).copy()
+        for i, j, n in pairs:
+            c, s = np.cos(n * speed * t), np.sin(n * speed * t)
+            q[i], q[j] = c * q[i] - s * q[j], s * q[i] + c * q[j]
+        return q
+
+    for t in (0.0, 2e-4, 1.3e-3):
+        moved = replace(gears, planet_angles=np.asarray(gears.planet_angles) + speed * t)
+        system = make(moved, ring).system
+        K = system.K + (system.W * SPRING) @ system.W.T
+        i = place(model, "carrier: rotation")
+        K[i, i] += 3 * PLANET.mass * (0.051 * speed) ** 2
+        for mode in chosen:
+            h = 0.01 / np.abs(modes.eigenvalue[mode])
+            five = [seen(t + s * h, mode) for s in (-2, -1, 0, 1, 2)]
+            rate = np.array([-1, 16, -30, 16, -1]) @ five / (12 * h**2)
+            rest = system.M @ rate + K @ five[2]
+            assert np.abs(rest).max() < 1e-6 * np.abs(system.M @ rate).max()
+
+
+def test_turning_set_with_a_rigid_ring_is_the_planar_set():
+    gears, speed = gear_set(), 900.0
+    # one mode that no mesh moves, above all others
+    rigid = CyclicModes(
+        count=108, nodal_diameter=np.zeros(1, int), frequency=np.array([1e5]), load=np.zeros((1, 1)),
+        output=np.zeros((1, 2)), reduced=np.zeros((1, 1)), recovery=np.zeros((2, 1)),
+    )  # fmt: skip
+    model = make(gears, RingModel(rigid, 0.0, np.zeros(1)), motor=None, brake=None)
+    system = turning(model, speed)
+    K = np.array(system.K)
+    # the preload of the pins, which the published model leaves out
+    i = place(model, "carrier: rotation")
+    K[i, i] -= 3 * PLANET.mass * (0.051 * speed) ** 2
+    ours = complex_modes(replace(system, K=K), SPRING, speed=speed)
+    planar = planar_system(
+        planar_from_set(
+            gears,
+            sun=PlanarBody(SUN.mass, SUN.inertia, SUN.stiffness),
+            carrier=PlanarBody(CARRIER.mass, CARRIER.inertia, CARRIER.stiffness),
+            planet=PlanarBody(PLANET.mass, PLANET.inertia),
+            ring=PlanarBody(1.0, 1.0, np.inf, np.inf),
+            stiffness_sun_planet=5e8,
+            stiffness_planet_ring=7e8,
+            planet_bearing=PLANET.stiffness,
+        ),
+        carrier_speed=speed,
+    )
+    reference = complex_modes(planar, SPRING, speed=speed)
+    assert ours.eigenvalue[:-1] == pytest.approx(reference.eigenvalue, rel=1e-9, abs=1e-5)
+    still = complex_modes(replace(planar, gyroscopic=None), SPRING)
+    assert not np.allclose(still.frequency[-10:], reference.frequency[-10:], rtol=1e-3)
+
+
+def test_rotation_of_the_mechanism_stays_free_in_the_turning_frame(ring):
+    model = make(gear_set(), ring)
+    modes = complex_modes(turning(model, 120.0), SPRING, speed=120.0)
+    assert np.count_nonzero(modes.rigid) == 1
+    assert np.abs(modes.eigenvalue.real).max() < 1e-6 * np.abs(modes.eigenvalue).max()
+
+
+def test_wave_shares_tell_standing_from_travelling_waves(ring):
+    model = make(gear_set(), ring)
+    shape = np.zeros((len(model.system.dofs), 4), complex)
+    first = model.ring_slice.start + int(np.flatnonzero(model.ring_diameter == 2)[0])
+    # cos(2 phi) cos(wt) + sin(2 phi) sin(wt) = cos(2 phi - wt): the wave n = -2
+    shape[first, 0], shape[first + 1, 0] = 1.0, -1j
+    shape[first, 1], shape[first + 1, 1] = 1.0, 1j
+    shape[first, 2] = 1.0
+    shape[model.ring_slice.start, 3] = shape[place(model, "sun: x"), 3] = 1.0
+    shares = ring_wave_shares(model, shape)
+    assert shares.shape == (53, 4)
+    assert shares[26 - 2, 0] == shares[26 + 2, 1] == pytest.approx(1.0)
+    assert shares[[24, 28], 2] == pytest.approx([0.5, 0.5])
+    assert shares[26, 3] == pytest.approx(1.0 / 1.22)
+    assert shares.sum(axis=0) == pytest.approx([1.0, 1.0, 1.0, 1.0 / 1.22])

@@ -26,7 +26,7 @@ from femgear.models.multistage_data import (
     in_series,
     shaft_stiffness,
 )
-from femgear.models.multistage_example import four_stage_train
+from femgear.models.multistage_example import PUBLISHED, four_stage_train, published_train
 from femgear.models.multistage_modes import multistage_modes
 from femgear.models.multistage_motion import speed_ratio, train_speeds, train_torques
 from femgear.models.multistage_response import (
@@ -406,3 +406,35 @@ def test_a_locked_loop_has_neither_ratio_nor_modes():
 def test_trains_that_are_none_are_refused(make):
     with pytest.raises(CaseError):
         make()
+
+
+@pytest.mark.parametrize(("planets", "held"), [(3, False), (3, True), (4, False)])
+def test_published_train_is_the_chain_of_its_torques_and_inertias(planets, held):
+    """Rotations of sun 1, the three joints, the last carrier and all planets, written out by hand."""
+    unit, cosine = 1.0, np.cos(np.deg2rad(20.0))
+    shafts, count = 5, 5 + 4 * planets
+    M, K = np.zeros((count, count)), np.zeros((count, count))
+    for n in range(4):
+        row = {name: values[n] for name, values in PUBLISHED.items()}
+        sun, planet = 1e-3 * row["sun base radius"], 1e-3 * row["planet base radius"]
+        M[n, n] += 1e-6 * row["sun inertia"]
+        M[n + 1, n + 1] += 1e-6 * row["carrier inertia"] + planets * row["planet mass"] * (
+            ((sun + planet) / cosine) ** 2
+        )
+        for p in range(planets):
+            i = shafts + n * planets + p
+            M[i, i] = 1e-6 * row["planet inertia"]
+            for stiffness, arms in (
+                ("external mesh stiffness", ((n, sun), (i, planet), (n + 1, -sun - planet))),
+                ("internal mesh stiffness", ((i, -planet), (n + 1, -sun - planet))),
+            ):
+                column = np.zeros(count)
+                for place, arm in arms:
+                    column[place] += arm
+                K += unit * row[stiffness] * np.outer(column, column)
+    if held:
+        M, K = np.delete(np.delete(M, 4, 0), 4, 1), np.delete(np.delete(K, 4, 0), 4, 1)
+    expected = np.sqrt(np.abs(eigh(K, M, eigvals_only=True))) / (2 * np.pi)
+    found = multistage_modes(published_train(planets=planets, stiffness_unit=unit, held=held)).modes.frequency
+    assert len(found) == len(expected)
+    assert found == pytest.approx(expected, rel=1e-8, abs=1e-3)

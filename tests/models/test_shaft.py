@@ -179,3 +179,46 @@ def test_joint_does_not_see_rigid_motions():
 def test_shafts_that_cannot_be_are_refused(make):
     with pytest.raises(CaseError, match="E-SHAFT"):
         make()
+
+
+def test_joint_of_two_halves_stores_the_energy_of_the_beam_under_an_end_load():
+    """2 (F L / 2)^2 / (2 k) with k = (3 E I / 2 L) / (1 + Phi / 4), against 24 elements."""
+    system = shaft(supports=(Support(0, math.inf, math.inf),))
+    plane = [i for i, name in enumerate(system.dofs) if name.endswith((": x", ": tilt y"))]
+    force = np.array([float(system.dofs[i] == f"station {COUNT + 1}: x") for i in plane])
+    energy = 0.5 * force @ np.linalg.solve(system.K[np.ix_(plane, plane)], force)
+    s, bending = SECTION, SECTION.young * SECTION.second_moment
+    phi = 12.0 * bending / (s.shear_coefficient * s.shear_modulus * s.area * LENGTH**2)
+    spring = 1.5 * bending / LENGTH / (1.0 + phi / 4.0)
+    assert 2.0 * (LENGTH / 2.0) ** 2 / (2.0 * spring) == pytest.approx(energy, rel=1e-9)
+
+
+def test_shafts_of_the_printed_springs_are_those_of_the_page():
+    """docs/drivetrain.md: diameter over length by reading of Eqs. 10 and 11, sizes of the first one."""
+    import re
+    from pathlib import Path
+
+    from femgear.models.wind_turbine_drivetrain import PRINTED
+
+    page = (Path(__file__).parents[2] / "docs" / "drivetrain.md").read_text(encoding="utf-8")
+    springs = (PRINTED.low_speed, PRINTED.intermediate, PRINTED.high_speed)
+    round_shaft = ShaftSection(0.1)
+    shear = 12.0 * 2.6 / 16.0 / round_shaft.shear_coefficient
+    assert shear == pytest.approx(2.20, abs=5e-3)
+    readings = {"energy for each half": (1.5, 4), "beams of half": (6.0, 1), "joint in the middle": (3.0, 1)}
+    for name, (factor, part) in readings.items():
+        row = next(line for line in page.splitlines() if re.match(rf"\| \**{name}", line))
+        cells = [float(cell) for cell in row.strip("|").split("|")[2:]]
+        assert cells[0] == pytest.approx(1.3 * factor)
+        for (bending, torsion), shown in zip(springs, cells[1:], strict=True):
+            slender = math.sqrt(part * (1.3 * factor * torsion / bending - 1.0) / shear)
+            assert f"{slender:.2f}" == f"{shown:.2f}"
+    assert all(0.75 * 1.3 < bending / torsion for bending, torsion in springs)
+    sizes = []
+    for bending, torsion in springs:
+        slender = math.sqrt(4.0 * (1.95 * torsion / bending - 1.0) / shear)
+        cubed = torsion / round_shaft.shear_modulus * 32.0 / math.pi / slender
+        sizes.append((cubed ** (1 / 3), cubed ** (1 / 3) / slender))
+    words = "{}, {} and {} mm diameter and {}, {} and {} m length"
+    found = [f"{1e3 * d:.0f}" for d, _ in sizes] + [f"{length:.2f}" for _, length in sizes]
+    assert words.format(*found) in page

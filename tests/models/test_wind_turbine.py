@@ -1,5 +1,7 @@
 """The published wind turbine sets: frequencies, weight, wedging, clearance, weight with mesh stiffness."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -38,7 +40,7 @@ def solved(problem, hertz, harmonics=9, **options):
 def test_quick_validation_rows_pass():
     rows = (*nrel.frequencies(), *nrel.linear_peak())
     assert [row for row in rows if row.verdict not in ("passes", "information")] == []
-    assert sum(row.verdict == "passes" for row in rows) == 10
+    assert sum(row.verdict == "passes" for row in rows) == 8
 
 
 def test_set_b_is_the_one_of_the_mode_table():
@@ -135,3 +137,24 @@ def test_weight_and_mesh_stiffness_together_agree_with_integration():
     # what is left is the integration's, of second order; three mesh harmonics cannot show load over k(t)
     assert fine[0] < 0.3 * coarse[0] and fine[0] < 0.012 < 0.03 < fine[1]
     assert len(seconds) == 3
+
+
+def test_small_plays_fold_below_the_resonance_too_and_keep_the_drive_flanks_closed():
+    branch = weight_branch(problem := gravity_problem_b(backlash=161e-6, driven=False), (20.0, 95.0))
+    folds = np.sort(branch.parameter[branch.folds]) / (2 * np.pi)
+    assert folds == pytest.approx([37.06, 37.93, 40.75, 42.0, 52.19, 76.2], abs=0.1)
+    shares = np.array([contact_shares(problem, one) for one in branch.solutions[::5]])
+    assert shares[:, :6].min() == 1.0 and shares[:, 6:].max() > 0.2
+
+
+def test_supported_suns_do_not_wedge_where_a_floating_one_does():
+    """The sun's support takes the weight over, and the ring moves less than the play allows."""
+    data, moved, touching = wind_turbine_a(), [], []
+    for support in (100.0, 1e8):
+        held = replace(data, sun=replace(data.sun, support=support))
+        problem = bearing_problem_a(200e-6, backlash=150e-6, data=held)
+        found = solved(problem, 0.37, harmonics=20, samples=1024, stability=False)
+        moved.append(np.sqrt(2) * member_rms(problem, [found], "ring")[0, 0])
+        touching.append(contact_shares(problem, found)[6:12].max())
+    assert moved == pytest.approx([205e-6, 131e-6], rel=0.01)
+    assert touching[0] == pytest.approx(0.09, abs=0.01) and touching[1] == 0.0

@@ -162,3 +162,33 @@ def test_free_bodies_have_three_rigid_motions():
     corners = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
     ours = frequencies(mesh_outline(polygon(corners, (4, 2, 2, 2, 2, 4))), NAFEMS, 6)
     assert np.all(ours[:3] < 1e-6 * ours[3]) and ours[3] > 100
+
+
+def test_changes_with_the_carrier_speed_are_those_of_the_page():
+    """Table of docs/theory.md from the rows: bold where a change exceeds the 1 % that the paper states."""
+    import re
+    from pathlib import Path
+
+    from femgear.validation.ring import turning_carrier
+
+    page = (Path(__file__).parents[2] / "docs" / "theory.md").read_text(encoding="utf-8")
+    rows = {row.quantity: row for row in turning_carrier()}
+    assert not [row for row in rows.values() if row.verdict == "FAILS"]
+    frame = {int(q.split()[1].rstrip(",")): r for q, r in rows.items() if q.endswith("frame: largest change")}
+    heard = {int(q.split()[1].rstrip(",")): r for q, r in rows.items() if "as heard" in q}
+    shown = {
+        "| 1227, 1416 Hz": ((3, 6), heard), "| 1739 Hz": ((8,), heard), "| 6249 Hz": ((18,), heard),
+        "| 3138, 3650 Hz": ((10, 13), {}), "| 9146 Hz": ((21,), {}),
+    }  # fmt: skip
+    for start, (numbers, on_ring) in shown.items():
+        line = next(line for line in page.splitlines() if line.startswith(start))
+        cells = line.strip("|").split("|")
+        expected = [100 * frame[n].ours for n in numbers]
+        found = [float(x) for x in re.findall(r"\d+\.\d+", cells[1])]
+        assert found == pytest.approx(expected, abs=0.006)
+        assert ("**" in cells[1]) == all(frame[n].verdict == "differs" for n in numbers)
+        if on_ring:
+            found = [float(x) for x in re.findall(r"\d+\.\d+", cells[2])]
+            assert found == pytest.approx([100 * on_ring[n].ours for n in numbers], abs=0.006)
+    count = next(row for q, row in rows.items() if q.startswith("modes below 10 kHz"))
+    assert f"for {count.ours:.0f} of {count.reference:.0f} modes" in page

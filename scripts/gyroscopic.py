@@ -1,0 +1,241 @@
+#!/usr/bin/env python3
+"""Natural frequencies of a set with an elastic ring over the carrier speed, inertia of its frame included."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
+
+from femgear.errors import CaseError
+
+CLAIM = 0.01
+
+
+def main(
+    case: Path = REFERENCE_CASE,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/gyroscopic"),
+    highest: str = "120 rad/s",
+    speeds: int = 13,
+    below: str = "10 kHz",
+) -> None:
+    """Follow the modes over the carrier speed, with gyroscopic and convective terms: tables, a picture, CSV.
+
+    Frequencies are those of the carrier frame, in which the model does not change with time. The ring stands
+    still in the housing: a wave of n nodal diameters that the carrier frame has at f is heard on the ring at
+    f - n Omega / 2 pi.
+
+    Parameters
+    ----------
+    case
+        TOML case file; the reference set when left out.
+    output
+        Folder of the results.
+    highest
+        Largest carrier speed with its unit.
+    speeds
+        Number of speeds from zero, 3 or more.
+    below
+        Frequency with its unit; modes that are lower at rest are followed.
+    """
+    from femgear import planetary_set, read_case, solve_modes, solve_static
+    from femgear.analysis_checks import check_rim_speed
+    from femgear.casefile.units import FREQUENCY, SPEED, to_si
+    from femgear.plots import save_figure
+
+    top, limit = to_si(highest, SPEED), to_si(below, FREQUENCY)
+    if not top > 0.0 or speeds < 3 or not limit > 0.0:
+        raise CaseError(
+            f"{speeds} speeds up to {highest}, modes below {below}", code="E-RANGE",
+            limit="3 speeds or more, above 0, modes above 0 Hz",
+        )  # fmt: skip
+    data = read_case(case)
+    planetary_set(data)  # refuse before the folder is touched
+    folder = ready_folder(output)
+    with Progress() as progress:
+        progress("modes", 0, 1)
+        static = solve_static(data, progress=progress)
+        result, distance = solve_modes(data, static), static.planetary_set.centre_distance
+        check_rim_speed(result.ring.modes, [top])
+        branches = followed(result, distance, np.linspace(0.0, top, speeds), limit)
+        progress("modes", 1, 1)
+    ring = bare_ring(result.ring.modes, limit)
+    _write(folder, branches)
+    save_figure(_figure(branches, ring, top), folder / "gyroscopic.png")
+    _print(branches, ring, top, highest)
+    say_files(folder, ["gyroscopic.csv", "gyroscopic.png"])
+
+
+@dataclass(frozen=True)
+class Branches:
+    """Modes over the speed: frequencies (p, m) [Hz] in the carrier frame, names, and what the ring hears.
+
+    At the largest speed: ``share`` (m,) of the ring in the kinetic energy, ``wave`` (m,) its strongest nodal
+    diameter with the sense in which the wave travels, and ``part`` (m,) of that wave in the ring's energy.
+    """
+
+    speed: np.ndarray
+    frequency: np.ndarray
+    kind: tuple[str, ...]
+    share: np.ndarray
+    wave: np.ndarray
+    part: np.ndarray
+
+    @property
+    def change(self) -> np.ndarray:
+        """Relative to the frequency at rest, (p, m)."""
+        return self.frequency / self.frequency[0] - 1.0
+
+    @property
+    def heard(self) -> np.ndarray:
+        """Frequency of the strongest wave on the ring at the largest speed, (m,) [Hz]."""
+        return self.frequency[-1] - self.wave * self.speed[-1] / (2.0 * np.pi)
+
+    @property
+    def standing(self) -> np.ndarray:
+        """Whether the sense against that of the strongest wave holds a tenth of the two or more, (m,)."""
+        return (self.wave != 0) & (self.part < 0.9)
+
+
+def followed(result, centre_distance: float, speeds, below: float) -> Branches:
+    """Branches of all elastic modes that are below a frequency [Hz] at rest."""
+    from femgear.models.elastic import ring_wave_shares, turning_system
+    from femgear.solvers.campbell import campbell_data
+
+    modes, model = result.modes, result.model
+    elastic = np.flatnonzero(modes.frequency > 0.0)
+    count = int(np.count_nonzero(modes.frequency[elastic] < below))
+    if not count:
+        raise CaseError(f"no modes below {below:g} Hz", code="E-RANGE", limit="a higher frequency")
+    found = campbell_data(
+        lambda speed: turning_system(model, centre_distance=centre_distance, carrier_speed=speed),
+        speeds,
+        modes.mesh_stiffness,
+        count=count,
+    )
+    asked = found.tracked.given
+    shares = ring_wave_shares(model, found.tracked.shape[-1])
+    largest = len(shares) // 2
+    wave = np.argmax(shares, axis=0) - largest
+    columns, whole = np.arange(count), shares.sum(axis=0)
+    both = shares[largest + wave, columns] + (wave != 0) * shares[largest - wave, columns]
+    return Branches(
+        speed=found.speed[asked],
+        frequency=found.frequency[asked],
+        kind=tuple(modes.kind[i] for i in elastic[:count]),
+        share=whole,
+        wave=wave,
+        part=shares[largest + wave, columns] / np.where(both > 0.0, both, 1.0),
+    )
+
+
+def bare_ring(modes, below: float) -> list[tuple[int, float]]:
+    """Nodal diameters, from 1, and lowest frequencies [Hz] of the ring alone on its foundation."""
+    found = []
+    for n in range(1, int(modes.nodal_diameter.max()) + 1):
+        frequency = float(modes.frequency[modes.nodal_diameter == n].min())
+        if frequency < below:
+            found.append((n, frequency))
+    return found
+
+
+def _wave(branches: Branches, i: int) -> str:
+    n = int(branches.wave[i])
+    return f"±{abs(n)}" if branches.standing[i] else f"{n:+d}" if n else "0"
+
+
+def _print(branches: Branches, ring, top: float, highest: str) -> None:
+    change, heard = branches.change[-1], branches.heard
+    rows = []
+    for i, kind in enumerate(branches.kind):
+        still = branches.frequency[0, i]
+        on_ring = (f"{heard[i]:.2f}", f"{100.0 * (heard[i] / still - 1.0):+.3f}")
+        if branches.standing[i]:
+            apart = abs(branches.wave[i]) * top / (2.0 * np.pi)
+            on_ring = (f"{branches.frequency[-1, i]:.2f} ± {apart:.2f}", f"± {100.0 * apart / still:.3f}")
+        rows.append(
+            (f"{still:.2f}", kind, f"{branches.frequency[-1, i]:.2f}", f"{100.0 * change[i]:+.3f}",
+             f"{branches.share[i]:.2f}", _wave(branches, i), *on_ring)
+        )  # fmt: skip
+    header = (
+        "at rest [Hz]", "kind", "carrier frame [Hz]", "change [%]", "ring's share", "wave",
+        "on the ring [Hz]", "change [%]",
+    )  # fmt: skip
+    print_table(f"Natural frequencies at {highest} of the carrier", header, rows)
+    inside = int(np.sum(np.abs(change) < CLAIM))
+    print(f"{inside} of {len(change)} modes change by less than 1 % in the carrier frame")
+    lines = [
+        (str(n), f"{f:.2f}", f"{f - n * top / (2 * np.pi):.2f}", f"{f + n * top / (2 * np.pi):.2f}",
+         f"± {100.0 * n * top / (2 * np.pi * f):.3f}")
+        for n, f in ring
+    ]  # fmt: skip
+    title = "Ring alone on its foundation: f on the ring, f -+ n Omega / 2 pi in the carrier frame"
+    print_table(
+        title, ("nodal diameters", "on the ring [Hz]", "backward [Hz]", "forward [Hz]", "change [%]"), lines
+    )
+
+
+def _write(folder: Path, branches: Branches) -> None:
+    header = ("carrier speed [rad/s]", "mode", "kind", "frequency [Hz]", "change [1]")
+    records = (
+        (float(speed), i + 1, branches.kind[i], float(branches.frequency[p, i]), float(branches.change[p, i]))
+        for p, speed in enumerate(branches.speed)
+        for i in range(len(branches.kind))
+    )
+    write_csv(folder / "gyroscopic.csv", header, records)
+
+
+def _figure(branches: Branches, ring, top: float):
+    from femgear.plots.style import BLACK, BLUE, GREY, VERMILION, label, legend_below, line_style, new_figure
+
+    figure, (left, right) = new_figure(columns=2, width=11.0, height=5.2)
+    still = branches.frequency[0]
+    # pairs of equal frequency share a line style; those that hardly move are grey
+    group = np.concatenate([[0], np.cumsum(np.diff(still) > 1e-6 * still[1:])])
+    moving = [g for g in np.unique(group) if np.abs(branches.change[:, group == g]).max() > 0.5 * CLAIM]
+    for g in np.unique(group):
+        members = np.flatnonzero(group == g)
+        if g in moving:
+            n = abs(int(branches.wave[members[0]]))
+            style = line_style(moving.index(g)) | {"label": f"{still[members[0]]:.0f} Hz, waves of n = {n}"}
+        else:
+            style = {"color": GREY, "linewidth": 0.8, "label": "all other modes"}
+        left.plot(branches.speed, 100.0 * branches.change[:, members], **style)
+    left.set_xlim(0.0, top)
+    label(left, "carrier speed [rad/s]", "change of frequency [%]", "in the carrier frame")
+    for ax in (left, right):
+        for level in (-1.0, 1.0):
+            ax.axhline(level, color=BLACK, linewidth=0.8, linestyle=(0, (6, 3)))
+    split = np.array([(f, 100.0 * n * top / (2.0 * np.pi * f)) for n, f in ring])
+    for sign in (1, -1):
+        right.plot(split[:, 0], sign * split[:, 1], "x", color=BLACK, label="ring alone, carrier frame")
+    right.plot(
+        still,
+        100.0 * branches.change[-1],
+        "o",
+        color=BLUE,
+        markerfacecolor="none",
+        label="set, carrier frame",
+    )
+    # standing waves are heard as two lines, one a sense
+    much, apart = branches.share > 0.25, branches.wave * top / (2.0 * np.pi)
+    heard = [(branches.heard, much), (branches.frequency[-1] + apart, much & branches.standing)]
+    for line, shown in heard:
+        right.plot(
+            still[shown], 100.0 * (line / still - 1.0)[shown], "s", color=VERMILION, markersize=4,
+            label="set, as heard on the ring (ring holds over a quarter of the energy)",
+        )  # fmt: skip
+    label(right, "frequency at rest [Hz]", "change of frequency [%]", f"at {top:g} rad/s")
+    legend_below(figure, columns=3)
+    return figure
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(main))

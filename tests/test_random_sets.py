@@ -1,0 +1,244 @@
+"""What must hold for any valid set: random ones, from their teeth to the signal of the housing.
+
+``pytest tests/test_random_sets.py -m "" -k seed117`` repeats one set, the case of ``random_set(117)``.
+"""
+
+import math
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from random_sets import RandomSet, equal_planets, random_set, symmetry
+
+from femgear.analysis import (
+    DynamicsResult,
+    HousingResult,
+    ModesResult,
+    StaticResult,
+    solve_dynamics,
+    solve_housing,
+    solve_modes,
+    solve_static,
+)
+from femgear.case import with_value
+from femgear.gears import torques
+from femgear.housing import OrderSpectrum, symmetry_leakage
+from femgear.solvers.harmonics import harmonics_of, sample
+
+QUICK = range(20)
+SLOW = range(20, 320)
+# harmonics of a record that are compared between planets
+LINES = 24
+
+
+@dataclass(frozen=True)
+class Solved:
+    """One random set through the whole pipeline."""
+
+    drawn: RandomSet
+    static: StaticResult
+    modes: ModesResult
+    dynamics: DynamicsResult
+    housing: HousingResult
+    cache: object
+
+    @property
+    def case(self):
+        return self.drawn.case
+
+    @property
+    def teeth_sum(self):
+        return self.case.sun.teeth + self.case.ring.teeth
+
+    @property
+    def angles(self):
+        return self.static.planetary_set.planet_angles
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("grids")
+
+
+@pytest.fixture(scope="module")
+def solved(request, cache):
+    """The set of a seed, solved without a warning of the libraries."""
+    drawn = random_set(request.param)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        static = solve_static(drawn.case, cache=cache)
+        modes = solve_modes(drawn.case, static)
+        dynamics = solve_dynamics(drawn.case, static, modes)
+        housing = solve_housing(drawn.case, dynamics)
+    return Solved(drawn, static, modes, dynamics, housing, cache)
+
+
+every_set = pytest.mark.parametrize(
+    "solved",
+    [*QUICK, *(pytest.param(seed, marks=pytest.mark.slow) for seed in SLOW)],
+    indirect=True,
+    ids="seed{:03d}".format,
+    scope="module",
+)
+
+
+def ste_on_supports(solved: Solved) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (P,) [mesh periods] and static transmission errors (2N, P) [m] of the set on its supports."""
+    if solved.case.static.members == "elastic":
+        cycle = solved.static.cycle
+    else:
+        cycle = solve_static(with_value(solved.case, "static.members", "elastic"), cache=solved.cache).cycle
+    return cycle.position, cycle.deflection
+
+
+def lines(position: np.ndarray, record: np.ndarray, count: int) -> np.ndarray:
+    """Harmonics 0 to `count` (..., count + 1) of a record over one mesh period.
+
+    Of equidistant positions the discrete transform, of others the Fourier integral of the straight lines
+    between them.
+    """
+    order = np.argsort(position % 1.0)
+    tau, values = (position % 1.0)[order], np.asarray(record)[..., order]
+    if np.ptp(np.diff(tau)) < 1e-9:
+        found = harmonics_of(values, count)
+        return found * np.exp(-2j * math.pi * tau[0] * np.arange(count + 1))
+    tau = np.append(tau, tau[0] + 1.0)
+    values = np.concatenate([values, values[..., :1]], axis=-1)
+    omega = 2 * math.pi * np.arange(1, count + 1)
+    slope = np.diff(values) / np.diff(tau)
+    # integration by parts: x(t) e^(-i w t) over one period is that of the slope over i w
+    edge = np.diff(np.exp(-1j * omega[:, None] * tau), axis=-1)
+    mean = (0.5 * (values[..., 1:] + values[..., :-1]) * np.diff(tau)).sum(axis=-1)
+    return np.concatenate([mean[..., None] + 0j, 2 * (slope @ edge.T) / omega**2], axis=-1)
+
+
+def unequal_lines(amplitudes: np.ndarray, solved: Solved) -> float:
+    """Largest difference between planets that should be equal, turned back by their mesh phases.
+
+    Amplitudes (..., 2N, H + 1); the record of planet n is that of planet 1 with its mesh phase in it,
+    ``x_n(tau) = x_1(tau + phi_n - phi_1)``. Relative to the largest amplitude of the planets.
+    """
+    N = len(solved.angles)
+    phase = np.tile(solved.static.planetary_set.mesh_phases[:N], 2)
+    turned = amplitudes * np.exp(-2j * math.pi * np.outer(phase, np.arange(amplitudes.shape[-1])))
+    worst = 0.0
+    for group in equal_planets(solved.angles, solved.teeth_sum):
+        for meshes in (np.array(group), N + np.array(group)):
+            found, size = turned[..., meshes, :], np.abs(amplitudes[..., meshes, :]).max()
+            worst = max(worst, np.abs(found - found[..., :1, :]).max() / size)
+    return worst
+
+
+def unequal_peaks(values: np.ndarray, solved: Solved) -> float:
+    """Largest difference of values (2N,) between planets that should be equal, relative to the largest."""
+    N, worst = len(solved.angles), 0.0
+    for group in equal_planets(solved.angles, solved.teeth_sum):
+        for meshes in (np.array(group), N + np.array(group)):
+            worst = max(worst, np.ptp(values[meshes]) / max(np.abs(values[meshes]).max(), 1e-300))
+    return worst
+
+
+def test_most_draws_are_valid_sets():
+    refused = [len(random_set(seed).refused) for seed in range(36)]
+    assert len(refused) / (len(refused) + sum(refused)) > 0.3
+
+
+def test_rotations_tell_which_planets_are_equal():
+    def places(*turns):
+        return 2 * math.pi * np.array(turns) / 12 - 1.3
+
+    cases = (
+        (places(0, 4, 8), 3, [[0, 1, 2]]),
+        (places(0, 2, 6, 8), 2, [[0, 2], [1, 3]]),
+        (places(0, 1, 4, 5, 8, 9), 3, [[0, 2, 4], [1, 3, 5]]),
+        (places(0, 3, 7), 1, [[0], [1], [2]]),
+    )
+    for angles, g, groups in cases:
+        assert symmetry(angles, 12) == g and equal_planets(angles, 12) == groups
+
+
+@pytest.mark.parametrize("uniform", [True, False])
+def test_lines_of_a_later_record_are_turned(uniform):
+    rng = np.random.default_rng(1)
+    tau = np.arange(20) / 20 if uniform else np.sort(rng.random(20))
+    record, turn = rng.standard_normal((2, 20)), np.exp(2j * math.pi * 0.35 * np.arange(9))
+    assert lines((tau - 0.35) % 1.0, record, 8) == pytest.approx(lines(tau, record, 8) * turn, abs=1e-13)
+    fine = np.interp(np.arange(4096) / 4096, tau, record[0], period=1.0)
+    assert uniform or lines(tau, record[0], 8) == pytest.approx(harmonics_of(fine, 8), abs=1e-5)
+
+
+@every_set
+def test_every_number_is_finite(solved):
+    for result in (solved.static, solved.modes, solved.dynamics, solved.housing):
+        data = result.dataset()
+        for name in data.variables:
+            if data[name].dtype.kind in "fc":
+                assert np.isfinite(data[name]).all(), name
+
+
+@every_set
+def test_static_solution_is_in_equilibrium(solved):
+    """Torques on sun, planets, ring and carrier; the forces of the pins, at their places, on the last."""
+    gears, cycle, case = solved.static.planetary_set, solved.static.cycle, solved.case
+    N, angles = gears.n_planets, np.asarray(gears.planet_angles)
+    external = torques(gears, member=case.operation.input, torque=case.operation.torque)
+    on_sun, on_ring = cycle.force[:N], cycle.force[N:]
+    balance = {
+        "sun": on_sun.sum(axis=0) * gears.sun.base_radius / abs(external.sun) - 1.0,
+        "ring": on_ring.sum(axis=0) * gears.ring.base_radius / abs(external.ring) - 1.0,
+        "planets": (on_sun - on_ring) * gears.sun.base_radius * N / abs(external.sun),
+    }
+    x, y = gears.centre_distance * np.stack([np.cos(angles), np.sin(angles)])
+    pins = x @ cycle.bearing_force[:, 1] - y @ cycle.bearing_force[:, 0]
+    balance["carrier"] = pins / external.carrier - 1.0
+    shares = cycle.tooth_load.sum(axis=1) - cycle.force
+    balance["teeth"] = shares / cycle.force.max()
+    for name, rest in balance.items():
+        assert np.abs(rest).max() < 1e-9, name
+    assert cycle.residual.max() < 1e-9
+    assert cycle.force.min() > 0
+
+
+@every_set
+def test_equal_planets_are_equal(solved):
+    """Every planet that a rotation of the set takes to another has its record, a mesh phase later."""
+    cycle = solved.static.cycle
+    for state in (cycle, getattr(solved.modes, "state", cycle)):
+        for name in ("stiffness", "deflection", "force"):
+            record = getattr(state, name)
+            assert unequal_lines(lines(state.position, record, LINES), solved) < 1e-8, name
+            assert unequal_peaks(record.max(axis=1), solved) < 1e-8, name
+            assert unequal_peaks(record.min(axis=1), solved) < 1e-8, name
+    assert unequal_peaks(cycle.tooth_load.max(axis=(1, 2)), solved) < 1e-8
+    for name, amplitudes in (("DTE", solved.dynamics.dte), ("mesh force", solved.dynamics.response.force)):
+        for amplitude in amplitudes:
+            assert unequal_lines(amplitude, solved) < 1e-8, name
+
+
+@every_set
+def test_housing_has_only_the_orders_of_the_symmetry(solved):
+    """A set that a rotation by 2 pi/g takes to itself gives a fixed sensor multiples of g alone."""
+    g, housing = symmetry(solved.angles, solved.teeth_sum), solved.housing
+    for kind in ("exact", "signal"):
+        if kind == "exact":
+            spectrum = OrderSpectrum(housing.exact.order, housing.exact.acceleration)
+        else:
+            value = np.fft.rfft(housing.signal.acceleration, axis=-1)
+            spectrum = OrderSpectrum(np.arange(value.shape[-1]), value)
+        assert (spectrum.amplitude.max(axis=-1) > 0).all()
+        assert symmetry_leakage(spectrum, g).max() < 1e-8, kind
+
+
+@every_set
+def test_dynamic_transmission_error_at_rest_is_the_static_one(solved):
+    """At the lowest speed of the case, in the harmonics that the excitation keeps."""
+    position, static = ste_on_supports(solved)
+    count = solved.case.dynamics.mesh_harmonics
+    rest = int(np.argmin(solved.dynamics.input_speed))
+    dynamic, expected = solved.dynamics.dte[rest, :, : count + 1], lines(position, static, count)
+    mean = np.abs(dynamic[:, 0] / expected[:, 0] - 1.0)
+    difference = sample(dynamic - expected, 256)
+    moving = np.ptp(difference, axis=-1) / np.ptp(static, axis=-1)
+    assert mean.max() < 1e-3
+    assert moving.max() < 1e-3
