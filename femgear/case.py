@@ -25,7 +25,7 @@ from femgear.casefile.origin import text_with_points
 from femgear.casefile.problems import combine, translate
 from femgear.casefile.profiles import embed_profiles
 from femgear.casefile.published import without_uncomputed
-from femgear.casefile.sections import FORMAT, Case, PlanetSection, RackSection, RingSection, SunSection
+from femgear.casefile.sections import FORMAT, Case, PlanetSection, RingSection, SunSection
 from femgear.errors import CaseError, GeometryError
 from femgear.gears import (
     BasicRack,
@@ -230,8 +230,8 @@ def planetary_set(case: Case) -> PlanetarySet:
         check_floating(case, closed)
     except GeometryError as error:
         in_terms_of_the_case(error, case)
-        if error.code == "E-ROOT-RADIUS":
-            _largest_root_radius(error, case)
+        if (error.key or "").endswith("rack.root_radius"):
+            _name_root_radius(error, case)
         raise
     return closed
 
@@ -254,37 +254,44 @@ def _closed_set(case: Case) -> PlanetarySet:
     )
 
 
-def _largest_root_radius(error: GeometryError, case: Case) -> None:
-    """Let the refusal name the largest root radius that no gear of the case refuses.
+def _name_root_radius(error: GeometryError, case: Case) -> None:
+    """Let a refusal of the tool's rounding name the largest root radius that can be typed in its place.
 
     The limit of one gear is not that of the others, and that of a gear whose profile shift is found only
     shows with that shift.
     """
-    key = error.key
+    if error.code == "E-FILLET":
+        if (most := _largest_root_radius(case, error.key, ("E-ROOT-RADIUS", "E-FILLET"))) is not None:
+            error.remedy = error.remedy.replace("root_radius", f"root_radius to {most:.4f} or less", 1)
+        return
+    most = _largest_root_radius(case, error.key, ("E-ROOT-RADIUS", "E-FILLET"))
+    if most is None:
+        most = _largest_root_radius(case, error.key, ("E-ROOT-RADIUS",))
+    if most is None:
+        error.limit, error.remedy = None, "reduce the dedendum: no root_radius fits"
+    else:
+        error.limit = f"<= {most:.4f} modules for the gears of this rack"
+        error.remedy = "reduce root_radius"
+
+
+def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float | None:
+    """Largest root radius [modules] of four decimals that is not refused with one of the codes, if any."""
 
     def fits(steps: int) -> bool:
-        rack = RackSection.model_construct(**(rack_at(case, key).model_dump() | {"root_radius": steps / 1e4}))
-        if key == "rack.root_radius":
-            trial = case.model_copy(update={"rack": rack})
-        else:
-            gear = key.partition(".")[0]
-            section = getattr(case, gear).model_copy(update={"rack": rack})
-            trial = case.model_copy(update={gear: section})
+        rack = rack_at(case, key).model_copy(update={"root_radius": steps / 1e4})
+        gear = key.partition(".")[0]
+        owner = {} if gear == "rack" else {gear: getattr(case, gear).model_copy(update={"rack": rack})}
         try:
-            _closed_set(trial)
+            check_set(_closed_set(case.model_copy(update=owner or {"rack": rack})))
         except GeometryError as other:
-            return other.code != "E-ROOT-RADIUS"
+            return other.code not in codes
         return True
 
     low, high = -1, round(1e4 * rack_at(case, key).root_radius)
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if fits(middle) else (low, middle)
-    if low >= 0:
-        error.limit = f"<= {low / 1e4:.4f} modules for all gears of this rack"
-        error.remedy = "reduce root_radius"
-    else:
-        error.limit, error.remedy = None, "reduce the dedendum: no root_radius fits"
+    return low / 1e4 if low >= 0 else None
 
 
 def _gear(

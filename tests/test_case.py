@@ -579,8 +579,17 @@ def test_largest_root_radius_is_accepted_as_printed(open_shifts):
     with pytest.raises(GeometryError, match="E-ROOT-RADIUS") as caught:
         planetary_set(case)
     limit = float(re.search(r"<= ([0-9.]+) modules", caught.value.limit)[1])
-    assert _root_radius_code(case, limit) != "E-ROOT-RADIUS"
-    assert _root_radius_code(case, limit + 1e-4) == "E-ROOT-RADIUS"
+    assert _root_radius_code(case, limit) not in ("E-ROOT-RADIUS", "E-FILLET")
+    assert _root_radius_code(case, limit + 1e-4) in ("E-ROOT-RADIUS", "E-FILLET")
+
+
+def test_fillets_in_the_way_name_a_root_radius_that_is_not():
+    case = with_value(read_case(CASE), "rack.root_radius", 0.38)
+    with pytest.raises(GeometryError, match="E-FILLET") as caught:
+        planetary_set(case)
+    limit = float(re.search(r"root_radius to ([0-9.]+) or less", caught.value.remedy)[1])
+    planetary_set(with_value(case, "rack.root_radius", limit))
+    assert _root_radius_code(case, limit + 1e-4) == "E-FILLET"
 
 
 def _root_radius_code(case, value):

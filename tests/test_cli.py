@@ -131,7 +131,7 @@ def test_check_flags_undercut_with_the_shift_that_avoids_it(check):  # bad input
 GEOMETRY = [
     # bad input, text, code, words of the message
     (34, edited(("sun.tip_diameter", "48 mm")), "E-POINTED", "pointed"),
-    (36, edited(("rack.root_radius", 0.6)), "E-ROOT-RADIUS", "<= 0.4718 modules"),
+    (36, edited(("rack.root_radius", 0.6)), "E-ROOT-RADIUS", "<= 0.2716 modules"),
     (36, edited(("rack.root_radius", 0.38)), "E-FILLET", "planet's root fillet"),
     (37, edited(("sun.profile_shift", -0.5)), "E-CONTACT-RATIO", "contact ratio 0.8283"),
     (38, standard(36, 18, 72), "E-INTERFERENCE", "0.3849 mm"),
