@@ -258,7 +258,10 @@ def _held(mass, stiffness, rigid):
     from scipy import linalg
 
     carried = mass @ rigid
-    weight = np.trace(stiffness) / np.trace(mass) or 1.0
+    # as soft as the softest coordinate: a stiff spring would drown soft couplings in its rounding
+    own = np.diag(stiffness) / np.diag(mass)
+    weight = own[own > 0.0].min(initial=np.inf)
+    weight = weight if np.isfinite(weight) else 1.0
     return linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
 
 
