@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from femgear.contact.bodies import Sectors
     from femgear.contact.cycle import MeshCycle
     from femgear.contact.loaded_period import LoadedPeriod
+    from femgear.frequency_limit import FrequencyLimit
     from femgear.gears import PlanetarySet, Speeds
     from femgear.housing import HousingSignal, SensorLines
-    from femgear.frequency_limit import FrequencyLimit
     from femgear.models.elastic import ElasticSet
     from femgear.models.ring import RingModel
     from femgear.solvers.floquet import Stability

@@ -113,7 +113,7 @@ def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
     wanted = max(case.dynamics.up_to or 0.0, (case.mesh_harmonics or 3) * mesh_frequency)
     if wanted > reach * (1.0 + 1e-9):
         raise CaseError(
-            f"the modal basis was made for excitation up to {reach:.4g} Hz, and this case has {wanted:.4g} Hz",
+            f"the modal basis was made for excitation up to {reach:.4g} Hz, this case has {wanted:.4g} Hz",
             code="E-OTHER-CASE",
             key="operation.speeds" if case.dynamics.up_to is None else "dynamics.up_to",
             limit=f"up to {reach:.4g} Hz",

@@ -20,9 +20,14 @@ _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
 
 def static_entries(case: Case) -> Entries:
     """Entries that decide the static solution: flanks, bodies, loads; supports only where members move."""
-    left_out = _WORDS | {"dynamics", "motor", "brake", "planar", "operation.speeds", "static.stresses"}
+    from femgear.case import planetary_set
+    from femgear.gears import torques
+
+    left_out = _WORDS | {"dynamics", "motor", "brake", "planar", "operation", "static.stresses"}
     fixed = case.static.members == "fixed"
-    return {
+    # whatever member the torque is given for: the flanks see that of the sun
+    sun = torques(planetary_set(case), member=case.operation.input, torque=case.operation.torque).sun
+    return {"operation.torque": f"{sun:.9g} N m on the sun"} | {
         key: value
         for key, value in _flat(case.model_dump())
         if not _begins(key, left_out)

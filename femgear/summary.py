@@ -320,8 +320,8 @@ def _dynamics(data: xr.Dataset) -> Block:
     if "level_change" in data:
         change = data.level_change.values
         notes += (
-            f"the level of the housing changes by {np.nanmax(np.abs(change)):.2g} dB at most with excitation up "
-            f"to {data.attrs['compared_to'] / 1e3:.4g} kHz, at {int(np.isfinite(change).sum())} speeds looked at",
+            f"with excitation up to {data.attrs['compared_to'] / 1e3:.4g} kHz the level of the housing changes "
+            f"by {np.nanmax(np.abs(change)):.2g} dB at most, at {int(np.isfinite(change).sum())} speeds looked at",
         )
     return Block("Dynamics", header, rows, notes)
 

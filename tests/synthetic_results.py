@@ -304,11 +304,13 @@ def housing() -> xr.Dataset:
             "seconds": _variable(st, turn / CARRIER_FREQUENCY[:, None], "s", "time"),
             "order_amplitude": _variable(so, 0.95 * np.abs(lines), "m/s^2", "amplitude, linear"),
             "order_amplitude_exact": _variable(so, np.abs(lines), "m/s^2", "amplitude, exact"),
+            "excitation_limit": _variable("speed", np.full(len(SPEEDS), 5e3), "Hz", "limit"),
+            "level": _variable("speed", np.sqrt(np.mean(signal**2, axis=1)), "m/s^2", "level"),
         },
         coords={
             "speed": _variable("speed", SPEEDS, "rpm", "input speed"),
             "time": _variable("time", turn, "1", "carrier revolutions"),
             "order": _variable("order", np.arange(top), "1", "carrier order"),
         },
-        attrs={"sensor_angle": 0.0, "ring_teeth": RING},
+        attrs={"sensor_angle": 0.0, "ring_teeth": RING, "form": "linear", "points": 54},
     )

@@ -113,7 +113,7 @@ def test_check_echoes_negative_ring_teeth(check):  # bad input 32
         (("set.backlash", "1 mm"), "W-TIP-THIN"),  # 35
         (("set.planets", 1), "W-PLANETS"),  # 47
         (("set.pin_errors", [{"planet": 1, "tangential": "20 um"}]), "W-WEDGING"),  # 50
-        (("housing.points", 7), "W-POINTS"),
+        (("housing", {"form": "linear", "points": 9}), "W-POINTS"),
     ],
 )
 def test_check_warns(check, change, words):
@@ -288,7 +288,8 @@ def test_run_writes_and_sums_up(tmp_path, capsys, pipeline):
 
 def test_run_prints_its_warnings_before_it_computes(tmp_path, capsys, pipeline):
     path = tmp_path / "case.toml"
-    path.write_text(edited(("sun.tip_diameter", "45.6 mm"), ("housing.points", 7)), encoding="utf-8")
+    changes = (("sun.tip_diameter", "45.6 mm"), ("housing", {"form": "linear", "points": 9}))
+    path.write_text(edited(*changes), encoding="utf-8")
     assert cli.main(["run", str(path), "-o", str(tmp_path / "out")]) == 0
     printed = capsys.readouterr()
     lines = printed.err.splitlines()

@@ -130,7 +130,7 @@ def _check_numbers(case: Case):
             limit="together with dynamics.mesh_harmonics",
             remedy="give dynamics.mesh_harmonics too, or leave dynamics.response_harmonics out",
         )
-    planets = case.set.planets
+    planets, points = case.set.planets, case.housing.points
     if case.housing.form == "linear" and case.set.planet_angles is None and case.housing.points % planets:
         yield CaseError(
             f"{case.housing.points} points break the symmetry of {planets} equally spaced planets: the "
@@ -139,7 +139,7 @@ def _check_numbers(case: Case):
             key="housing.points",
             value=case.housing.points,
             limit=f"a multiple of {planets}",
-            remedy=f"write {planets * round(case.housing.points / planets) or planets}, or leave housing.form out",
+            remedy=f"write {planets * max(round(points / planets), 1)}, or leave housing.form out",
         )
 
 

@@ -217,8 +217,8 @@ class StaticSection(_Section):
 class DynamicsSection(_Section):
     """Modal damping, reach of the excitation and tolerance of the periodic solution.
 
-    The excitation of an elastic ring's set ends at the frequency ``up_to``, or after ``mesh_harmonics``; where
-    neither is given it reaches so far that the level of the housing no longer changes.
+    The excitation of a set with an elastic ring ends at the frequency ``up_to``, or after ``mesh_harmonics``;
+    where neither is given it reaches so far that the level of the housing no longer changes.
     """
 
     damping_ratio: Number(0.0, 1.0, open_high=True) = 0.05

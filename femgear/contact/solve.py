@@ -38,7 +38,8 @@ class ContactState:
         Number of linear solutions.
     residual : float
         Largest violation, before the clean-up of rounding errors: separation at touching candidates and
-        penetration relative to the largest elastic displacement (1e-6 of the largest gap at least), pull and imbalance relative to the
+        penetration relative to the largest elastic displacement (at least 1e-6 of the largest gap), pull
+        and imbalance relative to the
         largest load.
     method : str
         ``"active set"``, ``"active set, single pivots"``, ``"daqp"`` or ``"no load"``.

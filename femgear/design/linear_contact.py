@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.assembly import assemble_contact, mesh_pairs, mesh_windows, rotation_approach
+from femgear.contact.assembly import (
+    assemble_contact,
+    cycle_positions,
+    mesh_pairs,
+    mesh_windows,
+    rotation_approach,
+)
 from femgear.contact.candidates import separation
 from femgear.contact.mirror_image import mirrored_set
 from femgear.contact.pivoting import factor
@@ -121,18 +127,18 @@ def linear_positions(original, bodies, sun_torque, chosen, record, deviations, s
         As `contact.cycle.walk_mesh_cycle`.
     """
     solved, order = original, np.arange(original.n_planets)
-    count = record["positions"] * record["periods"]
-    first, numbers = 0, chosen
+    position = cycle_positions(record["positions"], periods=record["periods"])
+    numbers = chosen
     if sun_torque < 0:
         # the mirror image turns the other way and ends at position zero
         solved, order = mirrored_set(original)
-        first, numbers = 1 - count, count - 1 - chosen
+        position, numbers = -position[::-1], len(position) - 1 - chosen
         if deviations is not None:
             deviations = mirrored_deviations(deviations, original, solved, order)
     load = abs(sun_torque) / solved.sun.base_radius
     members = moving_members(solved, supports)
     setup, answers = _solve(
-        solved, bodies, load, numbers, members, record | {"first": first, "deviations": deviations}
+        solved, bodies, load, numbers, members, record | {"positions": position, "deviations": deviations}
     )
     rows = original_rows(order)
     stacked = {name: np.stack([answer[name] for answer in answers]) for name in answers[0] if name != "cells"}
@@ -142,7 +148,7 @@ def linear_positions(original, bodies, sun_torque, chosen, record, deviations, s
         order=order,
         load=load,
         position=chosen / record["positions"],
-        solved_position=(first + numbers) / record["positions"],
+        solved_position=position[numbers],
         sun_arc=stacked["sun_arc"],
         deflection=stacked["deflection"].T[rows],
         force=stacked["force"].T[rows],

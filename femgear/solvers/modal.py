@@ -56,8 +56,8 @@ def solve_modes(
     Residual flexibility ``W^T K^+ W - sum r r^T / omega^2``, ``r = W^T phi`` (Geradin and Rixen, Mechanical
     Vibrations, 3rd ed., section 2.9); ``K^+`` is the inverse on the motions free of rigid modes.
 
-    With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give ``d = S (W^T q - C g)``
-    and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the directions ``W S^T``, whose
+    With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give
+    ``d = S (W^T q - C g)`` and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the directions ``W S^T``, whose
     total stiffness is ``W (k^-1 + C)^-1 W^T``, and the flexibility ``S C`` beside that of the modes left out.
     """
     stiffness = total_stiffness(system, mesh_stiffness)

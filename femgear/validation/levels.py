@@ -52,7 +52,8 @@ foundation_radial = "1e10 N/m^3"
 foundation_tangential = "1e10 N/m^3"
 """
 SMALL = {
-    "teeth": (21, 19, 59), "shift": 0.0, "bores": (10, 10), "outer": 75, "planets": 4, "ring": 'tip_diameter = "114.4 mm"',
+    "teeth": (21, 19, 59), "shift": 0.0, "bores": (10, 10), "outer": 75, "planets": 4,
+    "ring": 'tip_diameter = "114.4 mm"',
     "more": ', centre_distance = "40.1 mm"',
 }  # fmt: skip
 
@@ -121,7 +122,7 @@ def at_rest() -> tuple[Row, ...]:
 
 
 def more_torque() -> tuple[Row, ...]:
-    """Tangent of the whole set: deflections under more torque, statically and by the dynamic model at rest."""
+    """Deflections under more torque, statically and by the dynamic model at rest."""
     from femgear.analysis import solve_modes, solve_static, state_on_supports
 
     step, rows = 0.02, []

@@ -269,8 +269,8 @@ THEMES = (
     Theme(
         "levels",
         "Dynamic model at rest, and level of the housing",
-        "Default settings: the excitation reaches as far as each row says. Beside the reference set one out of "
-        "phase and one with two opposite pairs of planets.",
+        "Default settings: the excitation reaches as far as each row says. Beside the reference set one out "
+        "of phase and one with two opposite pairs of planets.",
         (),
         (levels.at_rest, levels.more_torque, levels.reach),
     ),
