@@ -163,6 +163,23 @@ def modes_dataset(result: ModesResult) -> xr.Dataset:
             "mesh deflection of the mode",
         ),
     }
+    state, record = result.state, ("mesh", "supported_position")
+    variables |= {
+        "supported_ste": (
+            record,
+            state.deflection,
+            "m",
+            "static transmission error of the set on its supports",
+        ),
+        "supported_force": (record, state.force, "N", "mesh force of the set on its supports"),
+        "supported_stiffness": (record, state.stiffness, "N/m", "tangent mesh stiffness on the supports"),
+        "flexibility": (
+            ("mesh", "other_mesh"),
+            model.system.flexibility,
+            "m/N",
+            "compliance between the meshes through their bodies",
+        ),
+    }
     for name, output in (("ring_shape", RADIAL), ("ring_tangential_shape", TANGENTIAL)):
         field = ring_field(model, result.ring.modes, coordinates, output, n_max)
         words = f"outer {'radial' if output == RADIAL else 'tangential'} displacement, component exp(i n phi)"
@@ -176,12 +193,20 @@ def modes_dataset(result: ModesResult) -> xr.Dataset:
             "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
             "dof": (("dof",), list(modes.dofs), "1", "degree of freedom"),
             "mesh": (("mesh",), _mesh_names(n_meshes // 2), "1", "gear mesh"),
+            "other_mesh": (("other_mesh",), _mesh_names(n_meshes // 2), "1", "gear mesh"),
+            "supported_position": (
+                ("supported_position",),
+                state.position,
+                "1",
+                "position in mesh periods, denser near jumps of the stiffness",
+            ),
             "circumferential": (("circumferential",), diameters, "1", "signed nodal diameter n"),
         },
         attrs={
             "title": "modal basis with mean mesh stiffnesses",
             "unknowns": len(model.system.M),
             "planet_angles": model.planet_angles,
+            "excitation_reach": result.reach,
         },
     )
 

@@ -86,6 +86,11 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
     if case.operation.torque < 0:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
     elastic = case.planar is None and case.helical is None
+    if elastic and case.planet.bearing_clearance and case.operation.fixed == "ring":
+        found.append(
+            "[W-BEARING] planet.bearing_clearance: the dynamics have linear planet bearings; the clearance "
+            'acts in the static results alone, with static.members = "elastic"'
+        )
     if elastic and case.housing.form == "linear" and case.housing.points <= 2 * MAX_DIAMETER:
         found.append(
             f"[W-POINTS] housing.points: {case.housing.points} points do not resolve the ring's "
@@ -318,10 +323,10 @@ def _dynamics(data: xr.Dataset) -> Block:
         f"{int(data.converged.sum())} of {len(stable)} speeds converged, {int(stable.sum())} stable",
     )
     if "level_change" in data:
-        change = data.level_change.values
+        change = np.abs(data.level_change.values)
         notes += (
-            f"with excitation up to {data.attrs['compared_to'] / 1e3:.4g} kHz the level of the housing changes "
-            f"by {np.nanmax(np.abs(change)):.2g} dB at most, at {int(np.isfinite(change).sum())} speeds looked at",
+            f"level of the housing with excitation up to {data.attrs['compared_to'] / 1e3:.4g} kHz: "
+            f"{np.nanmax(change):.2g} dB away at most, at {int(np.isfinite(change).sum())} speeds looked at",
         )
     return Block("Dynamics", header, rows, notes)
 

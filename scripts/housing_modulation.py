@@ -14,7 +14,9 @@ from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, ru
 
 from femgear.errors import CaseError
 
-CSV_HEADER = ("carrier order", "harmonic", "offset", "linear [m/s^2]", "exact [m/s^2]", "Hanning [relative]")
+CSV_HEADER = ("carrier order", "harmonic", "offset", "exact [m/s^2]", "Hanning [relative]")
+LINEAR = "linear [m/s^2]"
+EXPORTED = 18  # harmonics of the ring in the grid file, and the one that is looked at
 FILES = (
     "order_spectrum.png",
     "envelope.png",
@@ -49,37 +51,47 @@ def main(
     from femgear import planetary_set, read_case, with_value
 
     data = with_value(read_case(case), "operation.speeds", [speed])
-    if not 1 <= harmonic <= data.response_harmonics:
-        raise CaseError(
-            f"there is no harmonic {harmonic} in the response",
-            code="E-HARMONIC",
-            key="--harmonic",
-            limit=f"1 to {data.response_harmonics} (dynamics.response_harmonics of the case)",
-        )
-    planetary_set(data)  # refuse before the folder is touched
+    # refuse before the folder is touched, and what only the response tells after it
+    _check_harmonic(harmonic, data.response_harmonics)
+    planetary_set(data)
     folder = ready_folder(output)
     with Progress() as progress:
         static, dynamics, housing = _solve(data, progress)
+        _check_harmonic(harmonic, dynamics.response.force.shape[-1] - 1)
         heard = _bands(data, static, dynamics, housing, harmonic)
         progress("pictures", 0, 1)
         _draw(folder, speed, heard, static.planetary_set.ring.teeth)
         _export(folder, static.planetary_set, dynamics, heard)
         progress("pictures", 1, 1)
-    write_csv(folder / "lines.csv", CSV_HEADER, _records(heard, static.planetary_set.ring.teeth))
+    header = CSV_HEADER if heard.linear is None else (*CSV_HEADER, LINEAR)
+    write_csv(folder / "lines.csv", header, _records(heard, static.planetary_set.ring.teeth))
     _print_lines(heard, dynamics, speed)
     say_files(folder, FILES)
 
 
+def _check_harmonic(harmonic: int, highest: int | None) -> None:
+    """Refuse a harmonic that the response does not have, where that is known."""
+    if harmonic < 1 or (highest is not None and harmonic > highest):
+        raise CaseError(
+            f"there is no harmonic {harmonic} in the response",
+            code="E-HARMONIC",
+            key="--harmonic",
+            limit="1 or more" if highest is None else f"1 to {highest}",
+            remedy="raise dynamics.up_to or dynamics.mesh_harmonics for higher ones",
+        )
+
+
 @dataclass(frozen=True)
 class Heard:
-    """One band by three models; amplitudes over the orders of the band, and what `analyse_band` says.
+    """One band by two or three models; amplitudes over the orders of the band, and what `analyse_band` says.
 
-    The Hanning model has no unit of its own: it is scaled to the largest line of the exact form.
+    The Hanning model has no unit of its own: it is scaled to the largest line of the exact form. ``linear``
+    is there where the case has ``housing.form = "linear"``.
     """
 
     harmonic: int
     order: np.ndarray
-    linear: np.ndarray
+    linear: np.ndarray | None
     exact: np.ndarray
     hanning: np.ndarray
     bands: dict
@@ -108,7 +120,10 @@ def _bands(case, static, dynamics, housing, harmonic) -> Heard:
     field = hanning_model(forces, gears.planet_angles)
     windowed = fixed_sensor_lines(field, gears.ring.teeth, carrier, case.housing.sensor_angle)
     found = {}
-    for name, lines in (("linear", housing.linear), ("exact", housing.exact), ("Hanning", windowed)):
+    models = {"exact": housing.exact, "Hanning": windowed}
+    if housing.form == "linear":
+        models["linear"] = housing.lines
+    for name, lines in models.items():
         spectrum = OrderSpectrum(lines.order, lines.acceleration[0])
         found[name] = (spectrum, analyse_band(spectrum, gears.ring.teeth, harmonic))
     low, high = found["exact"][1].low, found["exact"][1].high
@@ -118,7 +133,7 @@ def _bands(case, static, dynamics, housing, harmonic) -> Heard:
     return Heard(
         harmonic,
         order,
-        values["linear"],
+        values.get("linear"),
         values["exact"],
         values["Hanning"] * scale,
         {name: band for name, (_, band) in found.items()},
@@ -128,7 +143,8 @@ def _bands(case, static, dynamics, housing, harmonic) -> Heard:
 def _records(heard: Heard, teeth: int):
     for k, order in enumerate(heard.order):
         offset = int(order) - heard.harmonic * teeth
-        values = (float(v[k]) for v in (heard.linear, heard.exact, heard.hanning))
+        models = (heard.exact, heard.hanning) + (() if heard.linear is None else (heard.linear,))
+        values = (float(v[k]) for v in models)
         yield int(order), heard.harmonic, offset, *values
 
 
@@ -139,8 +155,8 @@ def _print_lines(heard: Heard, dynamics, speed: str):
         (
             f"{heard.order[k]} = {centre} {heard.order[k] - centre:+d}",
             f"{heard.exact[k]:.4g}",
-            f"{heard.linear[k]:.4g}",
             f"{heard.hanning[k]:.4g}",
+            *(() if heard.linear is None else (f"{heard.linear[k]:.4g}",)),
         )
         for k in sorted(strongest)
         if heard.exact[k] > 1e-6 * heard.exact.max()
@@ -148,7 +164,8 @@ def _print_lines(heard: Heard, dynamics, speed: str):
     title = (
         f"{speed}, mesh harmonic {heard.harmonic} (mesh frequency {dynamics.response.mesh_frequency[0]:g} Hz)"
     )
-    header = ("carrier order", "exact [m/s^2]", "linear [m/s^2]", "Hanning, scaled [m/s^2]")
+    header = ("carrier order", "exact [m/s^2]", "Hanning, scaled [m/s^2]")
+    header += () if heard.linear is None else (LINEAR,)
     print_table(f"Strongest lines at {title}", header, rows)
     for name, band in heard.bands.items():
         strong = ", ".join(f"{line.order:g}" for line in band.lines[:2])
@@ -170,11 +187,14 @@ def _spectrum_figure(speed: str, heard: Heard, teeth: int):
     from femgear.plots.style import BLUE, ORANGE, VERMILION, label, legend_below, new_figure
 
     figure, axes = new_figure(rows=2, width=9.5, height=7.0, sharex=True)
-    top = max(heard.exact.max(), heard.linear.max()) or 1.0
+    drawn, text = heard.exact, "ring field, exact circumferential Fourier"
+    if heard.linear is not None:
+        drawn, text = heard.linear, "ring field, Heaviside and linear interpolation"
+    top = max(heard.exact.max(), drawn.max()) or 1.0
     floor = 3e-4 * top
     centre = heard.harmonic * teeth
     for ax, values, colour, text in (
-        (axes[0], heard.linear, BLUE, "ring field, Heaviside and linear interpolation"),
+        (axes[0], drawn, BLUE, text),
         (axes[1], heard.hanning, ORANGE, "Hanning windows, scaled to the largest line"),
     ):
         shown = values > floor
@@ -189,14 +209,15 @@ def _spectrum_figure(speed: str, heard: Heard, teeth: int):
     label(axes[0], y="acceleration [m/s²]")
     label(axes[1], y="acceleration, scaled [m/s²]")
     shown = heard.exact > floor
-    axes[0].plot(
-        heard.order[shown],
-        heard.exact[shown],
-        "o",
-        markerfacecolor="none",
-        color=VERMILION,
-        label="ring field, exact circumferential Fourier",
-    )
+    if heard.linear is not None:
+        axes[0].plot(
+            heard.order[shown],
+            heard.exact[shown],
+            "o",
+            markerfacecolor="none",
+            color=VERMILION,
+            label="ring field, exact circumferential Fourier",
+        )
     reach = int(np.abs(heard.order[shown] - centre).max(initial=6)) + 3
     axes[0].set_xlim(centre - reach, centre + reach)
     label(axes[0], title=f"{speed}, around mesh harmonic {heard.harmonic} (order {centre})")
@@ -280,7 +301,9 @@ def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
     from femgear.files import replace_file
     from femgear.scene import polar_curve, write_vtu
 
-    surface = ring_surface(planetary_set, dynamics.ring_radial[0], dynamics.ring_tangential[0])
+    shown = slice(0, max(EXPORTED, heard.harmonic) + 1)
+    field = dynamics.ring_radial[0, shown], dynamics.ring_tangential[0, shown]
+    surface = ring_surface(planetary_set, *field)
     write_vtu(surface, folder / "ring_deflection.vtu")
     radius = planetary_set.ring.rim_radius
     envelope = heard.bands["exact"].envelope

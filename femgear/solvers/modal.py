@@ -57,8 +57,9 @@ def solve_modes(
     Vibrations, 3rd ed., section 2.9); ``K^+`` is the inverse on the motions free of rigid modes.
 
     With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give
-    ``d = S (W^T q - C g)`` and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the directions ``W S^T``, whose
-    total stiffness is ``W (k^-1 + C)^-1 W^T``, and the flexibility ``S C`` beside that of the modes left out.
+    ``d = S (W^T q - C g)`` and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the
+    directions ``W S^T``, whose total stiffness is ``W (k^-1 + C)^-1 W^T``, and the flexibility ``S C`` beside
+    that of the modes left out.
     """
     stiffness = total_stiffness(system, mesh_stiffness)
     if count is not None and max_frequency is not None:
