@@ -271,7 +271,7 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     np.add.at(out["tooth_load"][:, :, p], (problem.mesh, problem.pair), loads)
     at_edge = problem.at_flank_end(state.active, setup)
     np.logical_or.at(out["edge_contact"][:, p], problem.mesh, at_edge)
-    pressure = loads / setup.cell_area[problem.mesh]
+    pressure = loads / problem.area
     np.maximum.at(out["max_pressure"][:, p], problem.mesh, np.where(at_edge, 0.0, pressure))
     if "pressure" in out:
         drive = problem.mesh < 2 * N
