@@ -263,10 +263,13 @@ def local_compliance(width: float, cells: int, bodies: Bodies) -> np.ndarray:
     half = 0.5 * width * np.diff(cell_edges(cells))
     distance = centre[:, :, None] - centre[:, None, :]
     # reciprocal between cells of different widths
-    return sum(
-        surface_displacement(distance, h, material.shear_modulus, material.poisson_ratio)
-        for h in (half[:, :, None], half[:, None, :])
-    ) / bodies.face_width
+    return (
+        sum(
+            surface_displacement(distance, h, material.shear_modulus, material.poisson_ratio)
+            for h in (half[:, :, None], half[:, None, :])
+        )
+        / bodies.face_width
+    )
 
 
 def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows:

@@ -217,6 +217,14 @@ def cell_centres(cells: int) -> np.ndarray:
     return 0.5 * (edges[:, 1:] + edges[:, :-1])
 
 
+def equal_cells(cells: int) -> np.ndarray:
+    """Share of every cell (last axis) of the layouts that lies in each of equal cells, (4, cells, cells)."""
+    edges, equal = cell_edges(cells), np.linspace(0.0, 1.0, cells + 1)
+    low, high = edges[:, None, :-1], edges[:, None, 1:]
+    overlap = np.minimum(high, equal[1:, None]) - np.maximum(low, equal[:-1, None])
+    return np.maximum(overlap, 0.0) / (high - low)
+
+
 def window_polynomials(cells: int) -> np.ndarray:
     """Quadratic Lagrange polynomials of the window nodes at the cell centres, shape (4, cells, 3)."""
     t = cell_centres(cells)

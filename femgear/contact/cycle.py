@@ -18,6 +18,7 @@ from femgear.contact.assembly import (
     rotation_approach,
 )
 from femgear.contact.bearings import BearingSprings, bearing_springs, pin_forces, solve_position
+from femgear.contact.candidates import equal_cells
 from femgear.contact.record import MeshCycle, cycle_without_load
 from femgear.contact.solve import mesh_tangent_matrix, tangent_stiffness
 from femgear.contact.supports import RIGID, MovingMembers, Supports, moving_members
@@ -275,8 +276,11 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     np.maximum.at(out["max_pressure"][:, p], problem.mesh, np.where(at_edge, 0.0, pressure))
     if "pressure" in out:
         drive = problem.mesh < 2 * N
-        place = problem.mesh[drive], problem.pair[drive], problem.cell[drive], p
-        out["pressure"][place] = pressure[drive]
+        mesh, pair = problem.mesh[drive], problem.pair[drive]
+        # mean pressures of equal cells, however the window is divided
+        shares = equal_cells(setup.gap.shape[-1])[setup.layout[mesh, p, pair], :, problem.cell[drive]]
+        spread = shares * (loads[drive] / setup.cell_area[mesh, 0, 0])[:, None]
+        np.add.at(out["pressure"][..., p], (mesh, pair), spread)
 
 
 def _tangents(problem: ContactProblem, state, setup: MeshWindows) -> np.ndarray:

@@ -113,12 +113,11 @@ def femgear_contact(bodies: Bodies, fraction: float, *, cells: int = 36) -> Pair
     problem = assemble_contact(replace(setup, near=only), bodies, position)
     # the planets are held, the sun turns: the other motions would be without restraint
     state = solve_contact(problem.H, problem.gap, problem.G[:, -1:], [force])
-    pressure = state.loads / setup.cell_area[0]
-    cell = setup.cell_area[0] / bodies.face_width
+    pressure, cell = state.loads / problem.area, problem.area / bodies.face_width
     return PairContact(
         approach=float(state.motions[0]),
         peak_pressure=float(pressure.max()),
-        half_width=equal_half_width(cell * pressure.sum(), cell * (pressure**2).sum()),
+        half_width=equal_half_width(cell @ pressure, cell @ pressure**2),
         unknowns=bodies.sun.unknowns + bodies.planet.unknowns,
     )
 
