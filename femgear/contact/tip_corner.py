@@ -1,11 +1,11 @@
 """What the corner at the tip of a tooth yields more than the half plane of its flank.
 
 Near a tip corner the tooth is a wedge between flank and tip land, not a half plane: the nearer the corner,
-the more it yields, by a logarithm that neither elements nor interpolation between stations can follow. The wedge under a normal line load on one
-face is solved by Mellin's transform in the distance from the apex (E. Sternberg, W. T. Koiter, J. Appl.
-Mech. 25, 1958), that is by powers ``r^lambda`` along ``Re lambda = 1/2`` (M. L. Williams, J. Appl. Mech. 19,
-1952; J. R. Barber, Elasticity, ch. 11). The half plane, itself a wedge of 180 degrees, is subtracted in the
-transform; what is left is smooth under the load.
+the more it yields, by a logarithm that neither elements nor interpolation between stations can follow. The
+wedge under a normal line load on one face is solved by Mellin's transform in the distance from the apex
+(C. J. Tranter, Q. J. Mech. Appl. Math. 1, 1948), that is by powers ``r^lambda`` along
+``Re lambda = 1/2`` (M. L. Williams, J. Appl. Mech. 19, 1952; J. R. Barber, Elasticity, ch. 11). The half
+plane, itself a wedge of 180 degrees, is subtracted in the transform; what is left is smooth under the load.
 """
 
 from __future__ import annotations
