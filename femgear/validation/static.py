@@ -147,10 +147,11 @@ def numerical_parameters() -> tuple[Row, ...]:
 
 
 def element_size() -> tuple[Row, ...]:
-    """Element size halved, on the flank alone and everywhere."""
+    """Element size doubled and halved on the flank, halved everywhere."""
     static = reference_static()
     rows = []
     for label, options in (
+        ("flank elements doubled", {"flank_elements": 12}),
         ("flank elements halved", {"flank_elements": 48}),
         ("flank elements quartered, all others halved", {"flank_elements": 48, "refine": 2.0}),
     ):
