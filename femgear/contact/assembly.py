@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.candidates import FlankPair, Windows, flank_pair, window_polynomials, windows
+from femgear.contact.candidates import (
+    FlankPair,
+    Windows,
+    cell_centres,
+    cell_edges,
+    flank_pair,
+    window_polynomials,
+    windows,
+)
 from femgear.contact.flank_sides import BACK, DRIVE, flank_side, side_teeth
 from femgear.contact.flanks import LEFT, RIGHT, FlankCompliance, station_weights
 from femgear.contact.halfplane import hertz_line, surface_displacement
@@ -55,12 +63,14 @@ class MeshWindows:
         Tooth numbers on gear 1 and gear 2 during the first mesh period.
     turns : (P,) int array
         Mesh periods passed at each position; one of the record's periods has one number.
-    local : (2, cells, cells) array
-        Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh.
-    cell_area : (2N,) array
-        Area of a pressure cell [m^2].
+    layout : int array
+        Division of the window into cells, see `candidates.cell_edges`.
+    local : (2, 4, cells, cells) array
+        Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh and all layouts.
     cell : (2N,) array
-        Its width along the profile [m].
+        Mean width of a pressure cell along the profile [m].
+    cell_area : (2N, 4, cells) array
+        Areas of the pressure cells [m^2].
     centre : array
         From the point on the path of contact to the middle of the window, along flank 1 [m].
     """
@@ -76,9 +86,10 @@ class MeshWindows:
     edge: tuple[np.ndarray, np.ndarray]
     tooth: tuple[np.ndarray, np.ndarray]
     turns: np.ndarray
+    layout: np.ndarray
     local: np.ndarray
-    cell_area: np.ndarray
     cell: np.ndarray
+    cell_area: np.ndarray
     centre: np.ndarray
 
 
@@ -98,6 +109,7 @@ class ContactProblem:
     mesh: np.ndarray
     pair: np.ndarray
     cell: np.ndarray
+    area: np.ndarray
     position: int
 
     @property
@@ -245,15 +257,19 @@ def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells,
     return found
 
 
-def local_compliance(cell: float, cells: int, bodies: Bodies) -> np.ndarray:
-    """Half-plane compliance of both flanks between the cells of a window, shape (cells, cells) [m/N]."""
-    from scipy.linalg import toeplitz
-
-    material = bodies.material
-    one = surface_displacement(
-        np.arange(cells) * cell, 0.5 * cell, material.shear_modulus, material.poisson_ratio
+def local_compliance(width: float, cells: int, bodies: Bodies) -> np.ndarray:
+    """Half-plane compliance of both flanks between the cells of a window, shape (4, cells, cells) [m/N]."""
+    material, centre = bodies.material, width * cell_centres(cells)
+    half = 0.5 * width * np.diff(cell_edges(cells))
+    distance = centre[:, :, None] - centre[:, None, :]
+    # reciprocal between cells of different widths
+    return (
+        sum(
+            surface_displacement(distance, h, material.shear_modulus, material.poisson_ratio)
+            for h in (half[:, :, None], half[:, None, :])
+        )
+        / bodies.face_width
     )
-    return toeplitz(2.0 * one / bodies.face_width)
 
 
 def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows:
@@ -271,6 +287,7 @@ def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows
         return np.moveaxis(np.moveaxis(joined, 2, 1)[row, take], 1, 2)
 
     gap = join("gap")
+    shares = np.diff(cell_edges(cells))
     return MeshWindows(
         n_planets=N,
         positions=len(turns),
@@ -283,9 +300,10 @@ def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows
         edge=(join("at_low_edge"), join("at_high_edge")),
         tooth=(tooth[0][row, take], tooth[1][row, take]),
         turns=turns,
-        local=np.stack([local_compliance(w.cell, cells, bodies) for w in found[:2]]),
-        cell_area=np.repeat([w.cell * bodies.face_width for w in found], N),
+        layout=join("layout"),
+        local=np.stack([local_compliance(w.cell * cells, cells, bodies) for w in found[:2]]),
         cell=np.repeat([w.cell for w in found], N),
+        cell_area=np.repeat([w.cell * cells * bodies.face_width * shares for w in found], N, axis=0),
         centre=join("centre"),
     )
 
@@ -302,10 +320,12 @@ def assemble_contact(
     mesh, pair = np.nonzero(setup.near[:, position])
     cells = setup.gap.shape[-1]
     H = _regular_part(setup, bodies, position, mesh, pair)
-    polynomials = window_polynomials(cells)
-    n = len(mesh)
-    H = np.einsum("ca,wavb,db->wcvd", polynomials, H, polynomials, optimize=True)
-    H[np.arange(n), :, np.arange(n), :] += setup.local[mesh // N % 2]
+    layout, n = setup.layout[mesh, position, pair], len(mesh)
+    polynomials = window_polynomials(cells)[layout]
+    H = polynomials[:, None] @ H.transpose(0, 2, 1, 3) @ polynomials.transpose(0, 2, 1)
+    H[np.arange(n), np.arange(n)] += setup.local[mesh // N % 2, layout]
+    H[np.arange(n), np.arange(n)] += _corner_part(setup, bodies, position, mesh, pair, polynomials)
+    H = H.transpose(0, 2, 1, 3)
     gap = setup.gap[mesh, position, pair].ravel()
     keep = np.isfinite(gap)
     H = H.reshape(n * cells, n * cells)[np.ix_(keep, keep)]
@@ -325,6 +345,7 @@ def assemble_contact(
         mesh=of_cell,
         pair=np.repeat(pair, cells)[keep],
         cell=np.tile(np.arange(cells), n)[keep],
+        area=setup.cell_area[mesh, layout].ravel()[keep],
         position=position,
     )
 
@@ -337,6 +358,21 @@ def rotation_approach(n_planets: int) -> np.ndarray:
     approach[N:, :N] = np.eye(N)
     approach[:N, N] = 1.0
     return approach
+
+
+def _corner_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair, polynomials) -> np.ndarray:
+    """What tip corners of both flanks add within each window, shape (windows, cells, cells) [m/N]."""
+    total = np.zeros((len(mesh), polynomials.shape[1], polynomials.shape[1]))
+    sun_side = mesh // setup.n_planets % 2 == 0
+    of_gear = ((bodies.sun, bodies.planet), (bodies.planet, bodies.ring))
+    for rows, flanks in zip((sun_side, ~sun_side), of_gear, strict=True):
+        for roll, flank in zip(setup.roll, flanks, strict=True):
+            arc = roll[mesh[rows], position, pair[rows]] ** 2 / (2 * flank.base_radius)
+            away = np.einsum("wcn,wn->wc", polynomials[rows], np.abs(arc - flank.corner.arc))
+            # cells beyond the end of a flank are no candidates
+            away = np.maximum(away, 1e-12)
+            total[rows] += flank.corner.surface(away[:, :, None], away[:, None, :])
+    return total / bodies.face_width
 
 
 def _regular_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair) -> np.ndarray:

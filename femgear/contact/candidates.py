@@ -170,7 +170,9 @@ class Windows:
     centre : (...,) array
         Arc length from the point on the path of contact to the middle of the window [m].
     cell : float
-        Width of a cell [m].
+        Mean width of a cell [m].
+    layout : (...,) int array
+        How the cells are divided, see `cell_edges`.
     gap : (..., cells) array
         Separation at the cell centres [m]; infinite outside the flanks.
     roll_1, roll_2 : (..., nodes) arrays
@@ -184,6 +186,7 @@ class Windows:
     start: np.ndarray
     centre: np.ndarray
     cell: float
+    layout: np.ndarray
     gap: np.ndarray
     roll_1: np.ndarray
     roll_2: np.ndarray
@@ -194,10 +197,38 @@ class Windows:
 WINDOW_NODES = np.array([0.0, 0.5, 1.0])
 
 
+def cell_edges(cells: int) -> np.ndarray:
+    """Cell edges as fractions of a window: inside a flank, at its low end, at its high end, at both.
+
+    Where flanks end they meet at an angle: a light load is carried within some micrometres of the corner, so
+    that the cells there shrink to ``1 / cells^2`` of the window.
+
+    Returns
+    -------
+    (4, cells + 1) array
+    """
+    t = np.linspace(0.0, 1.0, cells + 1)
+    return np.stack([t, t**2, 1.0 - (1.0 - t) ** 2, np.sin(0.5 * np.pi * t) ** 2])
+
+
+def cell_centres(cells: int) -> np.ndarray:
+    """Middles of the cells as fractions of a window, shape (4, cells)."""
+    edges = cell_edges(cells)
+    return 0.5 * (edges[:, 1:] + edges[:, :-1])
+
+
+def equal_cells(cells: int) -> np.ndarray:
+    """Share of every cell (last axis) of the layouts that lies in each of equal cells, (4, cells, cells)."""
+    edges, equal = cell_edges(cells), np.linspace(0.0, 1.0, cells + 1)
+    low, high = edges[:, None, :-1], edges[:, None, 1:]
+    overlap = np.minimum(high, equal[1:, None]) - np.maximum(low, equal[:-1, None])
+    return np.maximum(overlap, 0.0) / (high - low)
+
+
 def window_polynomials(cells: int) -> np.ndarray:
-    """Quadratic Lagrange polynomials of the window nodes at the cell centres, shape (cells, 3)."""
-    t = (np.arange(cells) + 0.5) / cells
-    return np.stack([(2 * t - 1) * (t - 1), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
+    """Quadratic Lagrange polynomials of the window nodes at the cell centres, shape (4, cells, 3)."""
+    t = cell_centres(cells)
+    return np.stack([(2 * t - 1) * (t - 1), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
 
 
 def windows(
@@ -241,7 +272,10 @@ def windows(
         centre = _nearest_arc(pair, zeta, centre, low, high, 6.0 * width, form)
     start = np.clip(centre - 0.5 * width, low, np.maximum(low, high - width))
     cell = width / cells
-    arc = start[..., None] + (np.arange(cells) + 0.5) * cell
+    tiny = 1e-9 * width
+    at_low_edge, at_high_edge = start <= low + tiny, start + width >= high - tiny
+    layout = at_low_edge + 2 * at_high_edge
+    arc = start[..., None] + width * cell_centres(cells)[layout]
     gap = _separation_at(pair, zeta[..., None], arc, form) + np.asarray(shift)[..., None]
     gap = np.where(arc < high[..., None], gap, np.inf)
     node_arc = np.minimum(start[..., None] + WINDOW_NODES * width, np.maximum(high, low + width)[..., None])
@@ -252,18 +286,18 @@ def windows(
     smallest = gap.min(axis=-1)
     smallest = np.where(tip_to_form, smallest, np.inf)
     near = on_path if line_of_action else smallest - smallest.min(axis=-1, keepdims=True) < nearest
-    tiny = 1e-9 * width
     return Windows(
         zeta=zeta,
         near=near,
         start=start,
         centre=start + 0.5 * width - nominal,
         cell=cell,
+        layout=layout,
         gap=gap,
         roll_1=roll_1,
         roll_2=roll_2,
-        at_low_edge=start <= low + tiny,
-        at_high_edge=start + width >= high - tiny,
+        at_low_edge=at_low_edge,
+        at_high_edge=at_high_edge,
     )
 
 

@@ -18,6 +18,7 @@ from femgear.contact.assembly import (
     rotation_approach,
 )
 from femgear.contact.bearings import BearingSprings, bearing_springs, pin_forces, solve_position
+from femgear.contact.candidates import equal_cells
 from femgear.contact.record import MeshCycle, cycle_without_load
 from femgear.contact.solve import mesh_tangent_matrix, tangent_stiffness
 from femgear.contact.supports import RIGID, MovingMembers, Supports, moving_members
@@ -271,12 +272,23 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
     np.add.at(out["tooth_load"][:, :, p], (problem.mesh, problem.pair), loads)
     at_edge = problem.at_flank_end(state.active, setup)
     np.logical_or.at(out["edge_contact"][:, p], problem.mesh, at_edge)
-    pressure = loads / setup.cell_area[problem.mesh]
-    np.maximum.at(out["max_pressure"][:, p], problem.mesh, np.where(at_edge, 0.0, pressure))
+    pressure = _equal_cell_pressure(problem, loads, setup, p)
+    inside = np.ones(pressure.shape[:2], bool)
+    inside[problem.mesh[at_edge], problem.pair[at_edge]] = False
+    out["max_pressure"][:, p] = np.where(inside, pressure.max(axis=2), 0.0).max(axis=1)
     if "pressure" in out:
-        drive = problem.mesh < 2 * N
-        place = problem.mesh[drive], problem.pair[drive], problem.cell[drive], p
-        out["pressure"][place] = pressure[drive]
+        out["pressure"][..., p] = pressure[: 2 * N]
+
+
+def _equal_cell_pressure(problem: ContactProblem, loads, setup: MeshWindows, p) -> np.ndarray:
+    """Mean pressures of equal cells, however the windows are divided, (meshes, pairs, cells) [Pa]."""
+    carries = np.flatnonzero(loads)
+    mesh, pair, cell = problem.mesh[carries], problem.pair[carries], problem.cell[carries]
+    pressure = np.zeros((setup.near.shape[0], setup.pairs, setup.gap.shape[-1]))
+    shares = equal_cells(pressure.shape[2])[setup.layout[mesh, p, pair], :, cell]
+    area = setup.cell_area[mesh].mean(axis=(1, 2))
+    np.add.at(pressure, (mesh, pair), shares * (loads[carries] / area)[:, None])
+    return pressure
 
 
 def _tangents(problem: ContactProblem, state, setup: MeshWindows) -> np.ndarray:

@@ -90,6 +90,10 @@ def _separations(slave, master, edge, t):
     length = np.hypot(*tangent.T)
     normal = np.column_stack([tangent[:, 1], -tangent[:, 0]]) / length[:, None]
     on_edge, on_t, meets = opposite(master, x, normal)
+    for _ in range(3):
+        y, along, on_shape = on_edges(master, on_edge, on_t)
+        normal = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+        on_edge, on_t, meets = opposite(master, x, normal)
     y, _, on_shape = on_edges(master, on_edge, on_t)
     return ((y - x) * normal).sum(axis=1), meets, (x, normal, length, shape), (y, on_edge, on_shape)
 
@@ -143,10 +147,12 @@ def flank_contact(
         slave.placed, master.placed, edge, t
     )
     hats = np.maximum(1.0 - np.abs((edge - first + t)[:, None] - np.arange(last - first + 2)), 0.0)
-    hats *= (np.tile(0.5 * weight, last + 1 - first) * length * meets)[:, None]
+    hats *= (np.tile(0.5 * weight, last + 1 - first) * length)[:, None]
+    whole = hats.sum(axis=0)
+    hats *= meets[:, None]
     width = hats.sum(axis=0)
     # hats that hang over the end of the other flank by nearly all of their length are left out
-    kept = width > 0.02 * width.max()
+    kept = width > 0.02 * whole
     share = hats[:, kept] / width[kept]
     place = (x if drives else y) - (slave.centre if drives else master.centre)
     turning = np.column_stack([-place[:, 1], place[:, 0]]) / base_radius

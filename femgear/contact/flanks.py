@@ -2,9 +2,10 @@
 
 A concentrated load on a finite-element surface has no converged displacement. What converges is the
 displacement at a depth ``d`` under the flank. The half-plane displacement at that depth, which has the
-same singularity, is subtracted; what remains is the regular part of the flank's compliance. It is smooth
+same singularity, is subtracted, and so is what the wedge at the tip corner yields more than the half plane
+(`femgear.contact.tip_corner`). What remains is the regular part of the flank's compliance. It is smooth
 along the flank, so it may be interpolated, and it is extrapolated from the depths d and 2d to the surface.
-The contact solution adds the half-plane displacement at the surface under its pressure cells.
+The contact solution adds half plane and corner at the surface under its pressure cells.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.contact.halfplane import depth_displacement
+from femgear.contact.tip_corner import TipCorner, tip_corner
 from femgear.errors import CaseError
 
 if TYPE_CHECKING:
@@ -58,10 +60,12 @@ class FlankCompliance:
         [m].
     regular : (teeth, 2n, 2n) array
         ``regular[k, a, b]``: displacement into the body [m] at station ``a`` of tooth ``i`` per unit inward
-        normal force [N] at station ``b`` of tooth ``i - k``, less the half-plane part where both lie on the
-        same flank. Stations of the left flank first, then those of the right flank.
+        normal force [N] at station ``b`` of tooth ``i - k``, less half plane and tip corner where both lie
+        on the same flank. Stations of the left flank first, then those of the right flank.
     depth : (n,) array
         Depth under each station at which body and half plane are joined [m].
+    corner : TipCorner
+        What was taken out for the corner at the tip.
     unknowns : int
         Degrees of freedom of the whole body that the sector stands for.
     root : ObservedRoot, optional
@@ -72,6 +76,7 @@ class FlankCompliance:
     base_radius: float
     regular: np.ndarray
     depth: np.ndarray
+    corner: TipCorner
     unknowns: int
     root: ObservedRoot | None = None
 
@@ -240,16 +245,21 @@ def _split_observations(schur: SectorSchur, first: int) -> tuple[SectorSchur, Se
 
 
 def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:
-    """Take the half plane out of the compliance (teeth, 4n, 2n) at both depths and go on to the surface."""
+    """Take the local parts out of the compliance (teeth, 4n, 2n) at both depths and go on to the surface."""
     n, teeth = len(stations.roll), len(compliance)
     compliance = compliance.reshape(teeth, 2, 2, n, 2 * n)
     arc = stations.roll**2 / (2 * gear.base_radius)
     offset = arc[:, None] - arc[None, :]
+    corner = tip_corner(gear, material)
+    away = np.abs(arc - corner.arc)
+    # a load on the corner itself stands a thousandth of the module beside it, far less than any depth
+    loaded = np.maximum(away, 1e-3 * gear.module)
     parts = []
     for level, factor in enumerate((1.0, 2.0)):
         # columns of the observations are mirrored as one block: (side, level, station)
         at_depth = compliance[:, :, level].reshape(teeth, 2 * n, 2 * n).copy()
         local = depth_displacement(offset, factor * depths, material.shear_modulus, material.poisson_ratio)
+        local += corner.depth(away[:, None], factor * depths, loaded[None, :])
         for side in (LEFT, RIGHT):
             block = slice(side * n, (side + 1) * n)
             at_depth[0, block, block] -= local / gear.face_width
@@ -262,6 +272,7 @@ def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> 
         base_radius=gear.base_radius,
         regular=regular,
         depth=depths[:, 0],
+        corner=corner,
         unknowns=teeth * 2 * nodes,
     )
 

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 Side = Literal["left", "right"]
 FINE = 1.35  # half of the finely divided stretch, in half widths of the contact
+CORNER = 1 / 16  # smallest element at a tip corner that touches, in those of the fine stretch
+CORNER_GROWTH = 0.3  # of the element size beside it
 GROWTH = 0.2  # of the element size along the flank beyond it
 MIRROR = np.array([1.0, -1.0])
 
@@ -35,6 +37,7 @@ def graded_sector(
     edges: int | None,
     refine: float = 1.0,
     flank_elements: int = 24,
+    corner: float | None = None,
 ) -> Outline:
     """Whole sector with the boundary ``contact`` on one flank.
 
@@ -53,18 +56,21 @@ def graded_sector(
         Divides all other element sizes.
     flank_elements : int
         Element edges along a flank that is divided evenly.
+    corner : float, optional
+        Roll length where a tip corner touches [m]: the edges shrink towards it.
     """
     half = half_sector(gear, refine=refine, flank_elements=flank_elements)
     flank = np.asarray(half.curve("flank"))
     if edges is not None:
-        flank = _graded(gear, half, roll, half_width, edges, refine)
+        flank = _graded(gear, half, roll, half_width, edges, refine, corner)
     own = [(name, points) for name, points in half.curves if name != "symmetry"]
     fine = [("contact", flank) if name == "flank" else (name, points) for name, points in own]
     mirrored = [(name, np.asarray(points)[::-1] * MIRROR) for name, points in own[::-1]]
+    if corner is not None and math.isclose(corner, gear.tip_roll, rel_tol=1e-6):
+        size = CORNER * half_width / edges
+        fine = [(n, _graded_tip(p, gear, size, refine)) if n == "tip" else (n, p) for n, p in fine]
     if side == "right":
-        mirrored = [
-            ("contact", flank[::-1] * MIRROR) if name == "flank" else (name, p) for name, p in mirrored
-        ]
+        mirrored = [(name, np.asarray(points)[::-1] * MIRROR) for name, points in fine[::-1]]
         fine = own
     curves = [(_named(name, "left"), points) for name, points in fine]
     curves += [(_named(name, "right"), points) for name, points in mirrored]
@@ -77,13 +83,17 @@ def _named(name, side):
     return name if name in ("contact", "rim", "tip") else f"{name}_{side}"
 
 
-def _graded(gear, half, roll, half_width, edges, refine):
+def _graded(gear, half, roll, half_width, edges, refine, corner):
     """Flank points (2k + 1, 2) with small edges around the contact that grow to those of the even flank."""
     arc = half.flank_roll**2 / (2 * gear.base_radius)
     largest = abs(arc[0] - arc[-1]) / (len(arc) // 2)
     s = np.linspace(arc[0], arc[-1], 20001)
     beyond = np.maximum(np.abs(s - roll**2 / (2 * gear.base_radius)) - FINE * half_width, 0.0)
-    density = 1.0 / np.minimum(half_width / edges + GROWTH / refine * beyond, largest)
+    size = np.minimum(half_width / edges + GROWTH / refine * beyond, largest)
+    if corner is not None:
+        away = np.abs(s - corner**2 / (2 * gear.base_radius))
+        size = np.minimum(size, CORNER * half_width / edges + CORNER_GROWTH / refine * away)
+    density = 1.0 / size
     steps = 0.5 * (density[1:] + density[:-1]) * abs(s[1] - s[0])
     integral = np.concatenate([[0.0], np.cumsum(steps)])
     corners = np.interp(np.linspace(0.0, integral[-1], math.ceil(integral[-1]) + 1), integral, s)
@@ -92,3 +102,21 @@ def _graded(gear, half, roll, half_width, edges, refine):
     ends = half.curve("flank")
     flank[0], flank[-1] = ends[0], ends[-1]
     return flank
+
+
+def _graded_tip(tip, gear, size, refine):
+    """Points (2k + 1, 2) of half a tip arc with edges that grow from `size` at the flank [m]."""
+    angle = np.arctan2(*np.asarray(tip).T[::-1])
+    end = np.abs(angle).max()
+    s = np.linspace(0.0, 1.0, 20001) ** 2 * gear.tip_radius * end
+    largest = np.hypot(*np.diff(np.asarray(tip)[::2], axis=0).T).max()
+    density = 1.0 / np.minimum(size + CORNER_GROWTH / refine * s, largest)
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
+    corners = np.interp(np.linspace(0.0, integral[-1], math.ceil(integral[-1]) + 1), integral, s)
+    stations = np.interp(np.arange(2 * len(corners) - 1) / 2, np.arange(len(corners)), corners)
+    found = end - stations / gear.tip_radius
+    points = gear.tip_radius * np.column_stack([np.cos(found), np.sin(found)])
+    if abs(angle[0]) < abs(angle[-1]):
+        points = points[::-1]
+    points[0], points[-1] = tip[0], tip[-1]
+    return points

@@ -124,8 +124,13 @@ class RootCycle:
     @property
     def worst(self) -> tuple[int, int, int]:
         """Slot, position and root point of the largest stress in the root of the loaded flank."""
-        found = np.unravel_index(self.stress[:, :, LOADED].argmax(), self.stress[:, :, LOADED].shape)
-        return tuple(int(i) for i in found)
+        loaded, tension = self.stress[:, :, LOADED], self.tension
+        slot, position = np.nonzero(tension >= tension.max() - 1e-9 * abs(tension.max()))
+        # of teeth that are loaded alike one that the record follows all the way, if there is one
+        entered = position * self.periods // tension.shape[1] - slot
+        k = int(((entered >= 0) & (entered + len(tension) <= self.periods)).argmax())
+        slot, position = int(slot[k]), int(position[k])
+        return slot, position, int(loaded[slot, position].argmax())
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 SPREAD = 1.35
 """Half of the finely divided stretch of flank, in half widths of the contact under the whole load."""
+CORNER_REACH = 2.0
+"""Of a contact towards a tip corner, which then is divided finely too, in the same half widths."""
 ROUGH_STIFFNESS = 10e9
 """Of a mesh per face width, to choose the tooth pairs that may touch [N/m^2]."""
 INCREMENT = 0.02
@@ -213,12 +215,16 @@ def _near_pairs(pair: GearPair, fraction: float, options: _Division) -> list[_Pa
         middle = flanks[slave].placed[2 * edge + 1]
         rolls = [_roll(gear, middle - place[1]) for gear, place in zip(gears, places, strict=True)]
         a = _half_width(pair, rolls, options.force)
+        end = _tip(flanks[slave], gears[slave])
+        corners = (None, None)
+        if np.hypot(*(middle - end)) < CORNER_REACH * a:
+            corners = [_roll(gear, end - place[1]) for gear, place in zip(gears, places, strict=True)]
         sectors = tuple(
             graded_sector(
                 gear, _side(k, gear), roll, a, edges=options.edges, refine=options.refine,
-                flank_elements=options.flank_elements,
+                flank_elements=options.flank_elements, corner=corner,
             )
-            for k, (gear, roll) in enumerate(zip(gears, rolls, strict=True))
+            for k, (gear, roll, corner) in enumerate(zip(gears, rolls, corners, strict=True))
         )  # fmt: skip
         plans.append(_PairPlan(int(number), sectors, places, slave, middle, a))
     if not plans:
@@ -226,6 +232,12 @@ def _near_pairs(pair: GearPair, fraction: float, options: _Division) -> list[_Pa
             "no tooth pair comes near", code="E-CONTACT-WINDOW", remedy="check the centre distance"
         )
     return plans
+
+
+def _tip(flank, gear) -> np.ndarray:
+    """Tip corner of a placed flank [m]."""
+    radius = np.hypot(*flank.points[[0, -1]].T)
+    return flank.placed[[0, -1][int(np.abs(radius - gear.tip_radius).argmin())]]
 
 
 def _side(k, gear) -> Side:

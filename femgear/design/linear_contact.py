@@ -14,7 +14,7 @@ from femgear.contact.assembly import (
     mesh_windows,
     rotation_approach,
 )
-from femgear.contact.candidates import separation
+from femgear.contact.candidates import cell_centres, separation
 from femgear.contact.mirror_image import mirrored_set
 from femgear.contact.pivoting import factor
 from femgear.contact.solve import solve_contact
@@ -233,8 +233,10 @@ def _touching(solved, bodies, setup, numbers, cells) -> TouchingCells:
         rows = mesh // N == kind
         here = tuple(index[rows] for index in place)
         twice = 2.0 * contact.base_radius_1
-        width = setup.cell_area[mesh[rows]] / bodies.face_width
-        arc = setup.roll[0][here][:, 0] ** 2 / twice + (cell[rows] + 0.5) * width
+        cells_in_window = setup.gap.shape[-1]
+        place_in_window = cell_centres(cells_in_window)[setup.layout[here], cell[rows]]
+        width = setup.cell[mesh[rows]] * cells_in_window
+        arc = setup.roll[0][here][:, 0] ** 2 / twice + place_in_window * width
         roll_1[rows] = np.sqrt(twice * arc)
         roll_2[rows] = separation(contact, setup.zeta[here], roll_1[rows])[1]
     return TouchingCells(at, mesh, roll_1, roll_2, tooth_1, tooth_2, weight)

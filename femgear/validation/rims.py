@@ -100,6 +100,8 @@ def contact_displacement(
         if (tooth - at) % gear.teeth == 0 and on == side:
             distance = 0.5 * np.square(rolls)[:, None] / gear.base_radius - arcs
             local = surface_displacement(distance, half, material.shear_modulus, material.poisson_ratio)
+            away = np.abs(0.5 * np.square(rolls) / gear.base_radius - flank.corner.arc)[:, None]
+            local += flank.corner.surface(away, np.abs(arcs - flank.corner.arc))
             total += local @ (force * shares) / gear.face_width
     return total
 

@@ -169,6 +169,7 @@ THEMES = (
         (
             torque_rotation.all_positions,
             torque_rotation.planet_and_ring,
+            torque_rotation.tip_corners,
             torque_rotation.other_treatments,
         ),
     ),
