@@ -187,14 +187,14 @@ def _spectrum_figure(speed: str, heard: Heard, teeth: int):
     from femgear.plots.style import BLUE, ORANGE, VERMILION, label, legend_below, new_figure
 
     figure, axes = new_figure(rows=2, width=9.5, height=7.0, sharex=True)
-    drawn, text = heard.exact, "ring field, exact circumferential Fourier"
+    drawn, form = heard.exact, "ring field, exact circumferential Fourier"
     if heard.linear is not None:
-        drawn, text = heard.linear, "ring field, Heaviside and linear interpolation"
+        drawn, form = heard.linear, "ring field, Heaviside and linear interpolation"
     top = max(heard.exact.max(), drawn.max()) or 1.0
     floor = 3e-4 * top
     centre = heard.harmonic * teeth
     for ax, values, colour, text in (
-        (axes[0], drawn, BLUE, text),
+        (axes[0], drawn, BLUE, form),
         (axes[1], heard.hanning, ORANGE, "Hanning windows, scaled to the largest line"),
     ):
         shown = values > floor
