@@ -64,9 +64,34 @@ class LoadedPeriod:
     held_compliance: np.ndarray
 
     def resampled(self, name: str, count: int) -> np.ndarray:
-        """Values (2N, count) of one of the arrays (2N, P) at equidistant positions."""
-        at, values = np.arange(count) / count, getattr(self, name)
-        return np.array([np.interp(at, self.position, row, period=1.0) for row in values])
+        """Values (2N, count) of one of the arrays (2N, P) at equidistant positions.
+
+        Between jumps by cubics (Akima's, modified): straight lines would make harmonics of their own, images
+        of the low ones beside the number of positions.
+        """
+        from scipy.interpolate import Akima1DInterpolator
+
+        at, values, tau = np.arange(count) / count, getattr(self, name), self.position
+        found = np.array([np.interp(at, tau, row, period=1.0) for row in values])
+        for piece, place in self._smooth_pieces():
+            curve = Akima1DInterpolator(place, values[:, piece], axis=1, method="makima")
+            for turn in (-1.0, 0.0, 1.0):
+                inside = (at + turn >= place[0]) & (at + turn <= place[-1])
+                found[:, inside] = curve(at[inside] + turn)
+        return found
+
+    def _smooth_pieces(self):
+        """Positions without a jump between them: their numbers, and their places counted on past one."""
+        tau, P = self.position, len(self.position)
+        jumps = np.flatnonzero(np.diff(np.append(tau, tau[0] + 1.0)) <= SHORTEST)
+        if not len(jumps):
+            around = np.arange(-3, P + 3)
+            yield around % P, tau[around % P] + around // P
+            return
+        for last, jump in zip(np.append(jumps[1:], jumps[0] + P), jumps, strict=True):
+            piece = np.arange(jump + 1, last + 1)
+            if len(piece) > 2:
+                yield piece % P, tau[piece % P] + piece // P
 
 
 def planet_symmetry(planetary_set: PlanetarySet, deviations: SetDeviations | None = None) -> int:
