@@ -243,9 +243,7 @@ def test_dynamics_start_from_the_static_solution_with_elastic_members(solved):
     cycle = solved.static.cycle
     if case.static.members == "fixed":
         cycle = solve_static(with_value(case, "static.members", "elastic"), cache=solved.cache).cycle
-    # positions that both have
-    here, there = np.nonzero(np.abs(state.position[:, None] - cycle.position[None]) < 1e-9)
-    assert len(here) >= 8
     for name in ("deflection", "force"):
-        found, expected = getattr(state, name)[:, here], getattr(cycle, name)[:, there]
-        assert np.abs(found - expected).max() < 1e-7 * expected.max(), name
+        found, expected = state.resampled(name, len(cycle.position)), getattr(cycle, name)
+        # between positions of the one that the other does not have
+        assert np.abs(found - expected).max() < 2e-3 * np.ptp(expected, axis=1).max() + 1e-7 * expected.max()

@@ -128,7 +128,7 @@ def sharing_model(
     load = abs(sun_torque) / solved.sun.base_radius
     # planets open and close at small loads, where a line contact changes most
     force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
-    place = {"first": position, "positions": positions, "contact": contact, "deviations": deviations}
+    place = {"positions": np.array([position / positions]), "contact": contact, "deviations": deviations}
     deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
     for k, one in enumerate(force):
         deflection[:, k], coupling[k] = _paths(solved, bodies, max(one, 1e-9 * load), place)

@@ -45,7 +45,8 @@ def uneven(**changes):
 @pytest.mark.parametrize("part", [helical.table_4, helical.rigid, helical.leakage, helical.response])
 def test_validation_rows_pass(part):
     rows = part()
-    assert len(rows) >= 4 and [row for row in rows if row.verdict != "passes"] == []
+    judged = [row for row in rows if row.verdict != "information"]
+    assert len(judged) >= 4 and [row for row in judged if row.verdict != "passes"] == []
 
 
 def helicoid(base, pitch, start, side, roll, height):

@@ -78,10 +78,10 @@ def test_mathieu_by_splitting_and_by_hill(a, q, damping):
     mesh = GearMeshes(np.array([0]), FourierSeries([[a, -2.0 * q]]), separates=False)
     problem, solution = pair(oscillator(damping, (mesh,), load=1.0), 2.0)
     expected = np.linalg.eigvals(mathieu_monodromy(a, q, damping))
-    expected = np.sort_complex(expected)
     for method in ("monodromy", "hill"):
         verdict = floquet_verdict(problem, solution, method=method, tolerance=1e-12)
-        np.testing.assert_allclose(np.sort_complex(verdict.multipliers), expected, atol=2e-9)
+        away = np.abs(verdict.multipliers[:, None] - expected)
+        assert max(away.min(axis=0).max(), away.min(axis=1).max()) < 2e-9
         assert np.prod(verdict.multipliers).real == pytest.approx(np.exp(-damping * np.pi), rel=1e-10)
         period_map = np.exp(verdict.exponents * np.pi)
         np.testing.assert_allclose(period_map, verdict.multipliers, atol=1e-12)
