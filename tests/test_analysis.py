@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from femgear.analysis import max_nodal_diameter, solve_dynamics, solve_housing, solve_modes, solve_static
-from femgear.case import read_case, with_value, with_values
+from femgear.case import parse_case, read_case, with_value, with_values
+from femgear.casefile import tomlfile
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, symmetry_leakage
 from femgear.solvers.harmonics import harmonics_of, sample
@@ -70,6 +71,41 @@ def test_planets_in_phase_leave_only_multiples_of_three(case, dynamics):
     for lines in (housing.exact, housing.lines):
         for one in lines.acceleration:
             assert symmetry_leakage(OrderSpectrum(lines.order, one), 3) < 1e-7
+
+
+def test_planets_out_of_phase_are_equal_and_leave_only_multiples_of_three(case):
+    """28/41/110 at the default 64 positions, which three planets would meet unequally: 66 are taken."""
+    data = tomlfile.parse(case.source, "")
+    data["sun"] |= {"teeth": 28}
+    data["planet"] |= {"teeth": 41, "profile_shift": 0.2}
+    data["ring"] |= {"teeth": 110}
+    data["static"] |= {"positions": 64}
+    for entry in (
+        (data["set"], "centre_distance"),
+        (data["sun"], "profile_shift"),
+        (data["housing"], "published"),
+    ):
+        entry[0].pop(entry[1])
+    other = parse_case(tomlfile.write(data))
+    static = solve_static(other)
+    assert len(static.cycle.position) == 66
+    means = static.cycle.stiffness.mean(axis=1)
+    assert np.ptp(means[:3]) < 1e-9 * means[0] and np.ptp(means[3:]) < 1e-9 * means[3]
+    housing = solve_housing(other, solve_dynamics(other, static, solve_modes(other, static)))
+    for lines in housing.lines.acceleration:
+        assert symmetry_leakage(OrderSpectrum(housing.lines.order, lines), 3) < 1e-8
+
+
+def test_the_default_signal_has_only_lines_of_the_ring(case, dynamics):
+    """No images of an interpolation: components (h, n) at orders 108 h - n, h up to 26 nodal diameters."""
+    housing = solve_housing(case, dynamics)
+    assert housing.form == "exact" and housing.lines is housing.exact
+    order, n_max = housing.lines.order, dynamics.ring_radial.shape[-1] // 2
+    far = np.abs(order / 108 - np.rint(order / 108)) * 108 > n_max + 0.5
+    assert far.sum() > 1000 and not housing.lines.acceleration[:, far].any()
+    linear = solve_housing(with_value(case, "housing.form", "linear"), dynamics)
+    assert linear.lines.method == "linear, 54 points" and linear.lines.acceleration[:, far].any()
+    assert np.array_equal(linear.exact.displacement, housing.lines.displacement)
 
 
 def test_mesh_harmonics_of_the_force_balance_the_torque(dynamics, static):

@@ -228,7 +228,7 @@ def test_dynamic_transmission_error_at_rest_is_the_static_one(solved):
     rest = int(np.argmin(dynamics.input_speed))
     count = round(dynamics.excitation_limit[rest] / dynamics.response.mesh_frequency[rest])
     dynamic = dynamics.dte[rest, :, : count + 1]
-    expected = lines(state.position, state.deflection, count)
+    expected = harmonics_of(state.resampled("deflection", 8192), count)
     mean = np.abs(dynamic[:, 0] / expected[:, 0] - 1.0)
     difference = sample(dynamic - expected, 4 * count)
     moving = np.ptp(difference, axis=-1) / np.ptp(state.deflection, axis=-1)
