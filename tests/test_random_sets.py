@@ -246,4 +246,4 @@ def test_dynamics_start_from_the_static_solution_with_elastic_members(solved):
     for name in ("deflection", "force"):
         found, expected = state.resampled(name, len(cycle.position)), getattr(cycle, name)
         # between positions of the one that the other does not have
-        assert np.abs(found - expected).max() < 2e-3 * np.ptp(expected, axis=1).max() + 1e-7 * expected.max()
+        assert np.abs(found - expected).max() < 5e-3 * np.ptp(expected, axis=1).max() + 1e-7 * expected.max()
