@@ -97,11 +97,20 @@ def _dynamics_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
         figures["dynamic_transmission_error"] = transmission_errors(dynamics, data["modes"])
         figures["mesh_force_spectra"] = mesh_force_spectra(dynamics, data["modes"])
     else:
-        figures["dynamic_transmission_error"] = plots.transmission_error_period(dynamics, static)
+        figures["dynamic_transmission_error"] = plots.transmission_error_period(
+            dynamics, _on_supports(data.get("modes"), static)
+        )
         figures["ring_static_deflection"] = plots.ring_mean_deflection(dynamics, gears)
     if dynamics.sizes["speed"] > 3:
         figures["speed_sweep"] = plots.speed_sweep(dynamics)
     return figures
+
+
+def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Dataset | None:
+    """Static transmission errors that the dynamics start from, those of static.nc where they are not known."""
+    if modes is None or "supported_ste" not in modes:
+        return static
+    return modes[["supported_ste"]].rename(supported_ste="ste", supported_position="position")
 
 
 def _housing_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
