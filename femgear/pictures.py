@@ -107,7 +107,7 @@ def _dynamics_figures(data: dict[str, xr.Dataset], gears: PlanetarySet) -> dict:
 
 
 def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Dataset | None:
-    """Static transmission errors that the dynamics start from, those of static.nc where they are not known."""
+    """Static transmission errors that the dynamics start from, else those of static.nc."""
     if modes is None or "supported_ste" not in modes:
         return static
     return modes[["supported_ste"]].rename(supported_ste="ste", supported_position="position")

@@ -120,7 +120,8 @@ CAPTIONS = (
         "dynamic_transmission_error",
         "Dynamics",
         "Dynamic transmission error over one mesh period (thick) beside the static one of the set on its "
-        "supports, both without their mean. The thin static curve has the harmonics of the excitation alone: what rings in both curves "
+        "supports, both without their mean. The thin static curve has the harmonics of the excitation alone: "
+        "what rings in both curves "
         "is the cut series, not vibration. Pale: the whole static curve.",
     ),
     (
