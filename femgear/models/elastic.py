@@ -213,7 +213,9 @@ def _mesh_directions(W, place, planetary_set, side):
 def highest_mesh_mode(
     planetary_set: PlanetarySet, stiffness, *, sun: BodyData, carrier: BodyData, planet: BodyData, sun_torque
 ) -> float:
-    """Highest natural frequency of the rigid sun and planets on their meshes and a rigid ring [Hz].
+    """Highest natural frequency of the rigid gears in a rigid ring whose strain is in the meshes [Hz].
+
+    Modes with less than a tenth of it there are left out: those of stiff bearings and supports.
 
     Parameters
     ----------
@@ -229,7 +231,9 @@ def highest_mesh_mode(
     _place_bodies(M, K, place, planetary_set, sun, carrier, planet)
     _mesh_directions(W, place, planetary_set, 1.0 if sun_torque >= 0 else -1.0)
     K += (W * stiffness) @ W.T
-    return float(np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(M, M)))[-1]) / (2 * np.pi))
+    values, shapes = np.linalg.eigh(K / np.sqrt(np.outer(M, M)))
+    strain = stiffness @ (W.T @ (shapes / np.sqrt(M)[:, None])) ** 2
+    return float(np.sqrt(values[strain > 0.1 * np.abs(values)].max()) / (2 * np.pi))
 
 
 def ring_mesh_compliance(harmonic_compliance, nodal_diameters, count, angles) -> np.ndarray:

@@ -567,3 +567,22 @@ def test_wave_shares_tell_standing_from_travelling_waves(ring):
     assert shares[[24, 28], 2] == pytest.approx([0.5, 0.5])
     assert shares[26, 3] == pytest.approx(1.0 / 1.22)
     assert shares.sum(axis=0) == pytest.approx([1.0, 1.0, 1.0, 1.0 / 1.22])
+
+
+def test_highest_mesh_mode_is_not_that_of_a_stiff_bearing():
+    """Sun and planets in torsion: the reference set's 14 to 17 kHz, whatever the bearings are."""
+    from femgear.models.elastic import BodyData, highest_mesh_mode
+
+    gears, stiffness = gear_set(), np.repeat([5e8, 6.8e8], 3)
+    found = [
+        highest_mesh_mode(
+            gears,
+            stiffness,
+            sun=BodyData(0.22, 1e-4, 5e7),
+            carrier=BodyData(3.0, 6e-3, 2e8),
+            planet=BodyData(0.355, 2.17e-4, bearing),
+            sun_torque=100.0,
+        )
+        for bearing in (1e7, 3e8, 1e12, 1e15)
+    ]
+    assert found == pytest.approx(found[0] * np.ones(4), rel=0.1) and 12e3 < found[0] < 18e3
