@@ -66,7 +66,7 @@ def graded_sector(
     own = [(name, points) for name, points in half.curves if name != "symmetry"]
     fine = [("contact", flank) if name == "flank" else (name, points) for name, points in own]
     mirrored = [(name, np.asarray(points)[::-1] * MIRROR) for name, points in own[::-1]]
-    if corner is not None and math.isclose(corner, gear.tip_roll, rel_tol=1e-6):
+    if edges is not None and corner is not None and math.isclose(corner, gear.tip_roll, rel_tol=1e-6):
         size = CORNER * half_width / edges
         fine = [(n, _graded_tip(p, gear, size, refine)) if n == "tip" else (n, p) for n, p in fine]
     if side == "right":
