@@ -301,7 +301,7 @@ def excitation_reach(case: Case, state: LoadedPeriod, sun_torque: float) -> floa
 def modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, sun_torque, reach):
     """Modes of the set with the ring given and the meshes of the loaded state."""
     from femgear.models.elastic import body_flexibility, elastic_set, mesh_excitation, ring_mesh_compliance
-    from femgear.solvers.modal import solve_modes as modal_basis
+    from femgear.solvers import modal
 
     gears, diameters = planetary_set(case), np.arange(len(ring.compliance))
     held, compliance = (
@@ -327,7 +327,7 @@ def modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, sun
         driven=case.operation.input,
         flexibility=flexibility,
     )
-    modes = modal_basis(
+    modes = modal.solve_modes(
         model.system,
         excitation.stiffness.mean(axis=1),
         damping_ratio=case.dynamics.damping_ratio,

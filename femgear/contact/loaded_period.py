@@ -193,7 +193,8 @@ def _record(cycle: MeshCycle, base_pitch: float) -> _Record:
 
 def _unresolved(record: _Record) -> np.ndarray:
     """Numbers of the intervals that need a position in their middle."""
-    k = record.stiffness / record.stiffness.max(axis=1, initial=0.0)[:, None]
+    largest = record.stiffness.max(axis=1, initial=0.0)[:, None]
+    k = record.stiffness / np.where(largest > 0.0, largest, 1.0)
     gap = np.diff(record.position)
     steep = (np.abs(np.diff(k)) > STEEP).any(axis=0)
     other = record.loaded[1:] != record.loaded[:-1]
