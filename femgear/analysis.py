@@ -442,23 +442,48 @@ def _checked_response(case: Case, modes: ModesResult, all_speeds):
     from femgear.frequency_limit import NOTICEABLE, checked_speeds
 
     frequency = np.array([s.mesh_frequency for s in all_speeds])
-    given, up_to = case.dynamics.mesh_harmonics, modes.reach
+    given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
+    automatic = given is None and case.dynamics.up_to is None
     some = checked_speeds(len(frequency))
     limit, response = periodic_response(case, modes, frequency, up_to, given=given)
     while True:
-        beyond = 2.0 * up_to if given is None else max(up_to, 2.0 * float(limit.frequency.max()))
+        beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
         further, wider = periodic_response(case, modes, frequency[some], beyond, given=None)
         levels = [_level(case, modes, one, all_speeds, some) for one in (response, wider)]
         change = np.full(len(frequency), np.nan)
         change[some] = 20.0 * np.log10(levels[1] / levels[0])
-        automatic = given is None and case.dynamics.up_to is None
-        if not automatic or up_to > modes.reach or np.abs(change[some]).max() < NOTICEABLE:
-            return limit, response, change, float(beyond)
+        reached = further.frequency > beyond - frequency[some]
+        doubted = np.abs(change[some][reached]).max(initial=0.0) >= NOTICEABLE
+        if not (automatic and doubted) or up_to > modes.reach:
+            return limit, response, _slow_speeds(case, modes, all_speeds, limit, change, beyond), beyond
         up_to = beyond
         if len(some) == len(frequency):
             limit, response = further, wider
         else:
             limit, response = periodic_response(case, modes, frequency, up_to, given=None)
+
+
+def _slow_speeds(case: Case, modes: ModesResult, all_speeds, limit, change, beyond: float) -> np.ndarray:
+    """Changes of the level [dB], estimated where no run reaches the frequency compared with.
+
+    By the slowest speed that does reach it, see `femgear.frequency_limit.levels_below`.
+    """
+    from femgear.frequency_limit import HARMONICS, levels_below
+    from femgear.housing import fixed_sensor_lines
+
+    frequency = np.array([s.mesh_frequency for s in all_speeds])
+    slow = frequency * HARMONICS < beyond - frequency
+    if not slow.any():
+        return change
+    fast = beyond / HARMONICS * (1.0 + 1e-9)
+    _, response = periodic_response(case, modes, np.array([fast]), beyond, given=None)
+    teeth = planetary_set(case).ring.teeth
+    carrier = np.sign(all_speeds[0].carrier) * 2.0 * np.pi * fast / teeth
+    field = _outputs(modes, response)[1][0][0]
+    lines = fixed_sensor_lines(field, teeth, carrier, case.housing.sensor_angle)
+    change = change.copy()
+    change[slow] = -20.0 * np.log10(np.maximum(levels_below(lines, limit.frequency[slow]), 1e-10))
+    return change
 
 
 def _level(case: Case, modes: ModesResult, response: Response, all_speeds, some) -> np.ndarray:

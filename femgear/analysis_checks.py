@@ -38,6 +38,17 @@ def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
     fastest = speeds(gears, input=case.operation.input, fixed="ring", speed=max(case.operation.speeds))
     harmonics = case.response_harmonics or 3
     response = max(harmonics * fastest.mesh_frequency, case.dynamics.up_to or 0.0)
+    up_to = case.dynamics.up_to
+    if up_to is not None and up_to < fastest.mesh_frequency:
+        raise CaseError(
+            f"the excitation ends at {up_to:.6g} Hz, below the mesh frequency of the fastest speed: "
+            "nothing would excite the set there",
+            code="E-RANGE",
+            key="dynamics.up_to",
+            value=f"{up_to:.6g} Hz",
+            limit=f"{fastest.mesh_frequency:.6g} Hz or more",
+            remedy="raise it, or leave the highest speeds out",
+        )
     if response > HIGHEST_RESPONSE:
         allowed = max(case.operation.speeds) * HIGHEST_RESPONSE / response
         raise CaseError(
@@ -110,7 +121,7 @@ def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
     CaseError
         E-OTHER-CASE.
     """
-    wanted = max(case.dynamics.up_to or 0.0, (case.mesh_harmonics or 3) * mesh_frequency)
+    wanted = case.dynamics.up_to or (case.mesh_harmonics or 3) * mesh_frequency
     if wanted > reach * (1.0 + 1e-9):
         raise CaseError(
             f"the modal basis was made for excitation up to {reach:.4g} Hz, this case has {wanted:.4g} Hz",

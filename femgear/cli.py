@@ -313,3 +313,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except OSError as error:
         return _fail(storage_error(error, error.filename))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -38,13 +38,13 @@ def static_entries(case: Case) -> Entries:
 
 
 def modal_entries(case: Case) -> Entries:
-    """Entries that decide the modal basis: all but the speeds, the solution in time and the sensor."""
+    """Entries that decide the modal basis: all but speeds, number of harmonics, tolerance and sensor."""
     left_out = _WORDS | {"operation.speeds", "static.stresses", "static.members"}
-    kept = "dynamics.damping_ratio"
+    kept = {"dynamics.damping_ratio", "dynamics.up_to"}
     return {
         key: value
         for key, value in _flat(case.model_dump())
-        if not _begins(key, left_out) and (key == kept or not key.startswith("dynamics."))
+        if not _begins(key, left_out) and (key in kept or not key.startswith("dynamics."))
     }
 
 
@@ -100,5 +100,5 @@ def _begins(key: str, names: set[str]) -> bool:
 
 
 def _show(value: object) -> str:
-    text = "not given" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+    text = "not given" if value is None else f"{value:.12g}" if isinstance(value, float) else str(value)
     return text if len(text) <= 60 else text[:57] + "..."

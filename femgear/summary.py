@@ -86,6 +86,11 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
     if case.operation.torque < 0:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
     elastic = case.planar is None and case.helical is None
+    if elastic and case.dynamics.damping_ratio == 0.0 and case.operation.fixed == "ring":
+        found.append(
+            "[W-DAMPING] dynamics.damping_ratio: without damping resonances have no limit, and levels depend "
+            "on how near a line lies to one; 0.02 to 0.05 is usual"
+        )
     if elastic and case.planet.bearing_clearance and case.operation.fixed == "ring":
         found.append(
             "[W-BEARING] planet.bearing_clearance: the dynamics have linear planet bearings; the clearance "

@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.analysis import solve_dynamics, solve_housing, solve_modes, solve_static
+from femgear.analysis import _outputs, solve_dynamics, solve_housing, solve_modes, solve_static
 from femgear.case import planetary_set, read_case, with_value, with_values
+from femgear.errors import CaseError
 from femgear.frequency_limit import HARMONICS, MEMORY, highest_excitation, limited, missing_level
-from femgear.housing import order_level
+from femgear.housing import fixed_sensor_lines, order_level
+from femgear.solvers.spectral import solve_spectral
 
 ROOT = Path(__file__).parents[1]
 
@@ -66,7 +68,8 @@ def test_a_limit_below_the_modes_of_the_meshes_is_warned_of(case, static, modes)
     low = with_value(case, "dynamics.up_to", "8 kHz")
     dynamics = solve_dynamics(low, static, solve_modes(low, static))
     assert dynamics.excitation_limit == pytest.approx([88 * 90.0, 7 * 1116.0])
-    assert dynamics.compared_to == 16e3
+    # compared with the default, which reaches the modes of the meshes
+    assert dynamics.compared_to == modes.reach > 16e3
     assert len(dynamics.warnings) == 1 and np.nanmax(dynamics.level_change) > 1.0
 
 
@@ -83,12 +86,35 @@ def test_lines_end_at_the_frequency_and_at_what_memory_and_record_carry(case):
     assert given.excitation.tolist() == [6, 6] and given.response.tolist() == [18, 18]
 
 
+def test_speeds_too_slow_for_the_record_are_estimated_from_faster_ones(case, static, modes):
+    """At 60 rpm 512 harmonics end at 11 kHz, below the modes of the meshes; twice as many by hand."""
+    slow = with_value(case, "operation.speeds", ["60 rpm", "250 rpm"])
+    dynamics, found = levels(slow, static, modes)
+    assert dynamics.excitation_limit[0] == pytest.approx(512 * 21.6) and "at 60 rpm" in dynamics.warnings[0]
+    assert np.abs(dynamics.level_change[1]) < 1.0
+    wide = solve_spectral(
+        modes.modes, modes.excitation, [21.6], excitation_harmonics=1041, response_harmonics=1053
+    )
+    field = _outputs(modes, wide)[1][0]
+    lines = fixed_sensor_lines(field, 108, np.array([dynamics.speeds[0].carrier]), 0.0)
+    missing = 20 * np.log10(order_level(lines)[0] / found[0])
+    assert missing > 3.0 and dynamics.level_change[0] == pytest.approx(missing, abs=1.0)
+
+
+def test_a_limit_that_excites_nothing_is_refused(case, static):
+    with pytest.raises(CaseError) as caught:
+        solve_modes(with_value(case, "dynamics.up_to", "1000 Hz"), static)
+    assert caught.value.code == "E-RANGE" and "1116" in caught.value.limit
+
+
 def test_the_reach_follows_meshes_speeds_and_the_case(case):
     assert highest_excitation(case, 5e3, 100.0) == 20e3
     assert highest_excitation(case, 16e3, 100.0) == 22.5e3
     assert highest_excitation(case, 5e3, 12e3) == 37.5e3
     assert highest_excitation(case, 90e3, 100.0) == 100e3
-    assert highest_excitation(with_value(case, "dynamics.up_to", "3 kHz"), 16e3, 100.0) == 3e3
+    # the basis reaches the default all the same, for the comparison
+    assert highest_excitation(with_value(case, "dynamics.up_to", "3 kHz"), 16e3, 100.0) == 22.5e3
+    assert highest_excitation(with_value(case, "dynamics.up_to", "30 kHz"), 16e3, 100.0) == 30e3
 
 
 def test_only_a_noticeable_change_is_told():
@@ -100,14 +126,13 @@ def test_only_a_noticeable_change_is_told():
 
 def test_results_of_another_case_are_refused_with_the_entries_that_differ(case, static, modes):
     """Every stage; entries on which a result does not depend may change."""
-    from femgear.errors import CaseError
-
     dynamics = solve_dynamics(case, static, modes)
     for changes, stage, named in (
         ({"planet.bore_radius": "16 mm"}, lambda c: solve_modes(c, static), "planet.bore_radius (0.018)"),
         ({"operation.torque": "60 N m"}, lambda c: solve_modes(c, static), "operation.torque"),
         ({"set.pin_errors": [{"planet": 1, "radial": "3 um"}]}, lambda c: solve_modes(c, static), "set.pin"),
         ({"sun.mass": "0.3 kg"}, lambda c: solve_dynamics(c, static, modes), "sun.mass (0.22)"),
+        ({"dynamics.up_to": "10 kHz"}, lambda c: solve_dynamics(c, static, modes), "dynamics.up_to"),
         ({"planet.bearing_stiffness": "1e8 N/m"}, lambda c: solve_dynamics(c, static, modes), "planet.bear"),
         ({"operation.speeds": ["90000 rpm"]}, lambda c: solve_dynamics(c, static, modes), "excitation up to"),
         ({"dynamics.damping_ratio": 0.02}, lambda c: solve_housing(c, dynamics), "dynamics.damping_ratio"),

@@ -139,7 +139,7 @@ def _check_numbers(case: Case):
             key="housing.points",
             value=case.housing.points,
             limit=f"a multiple of {planets}",
-            remedy=f"write {planets * max(round(points / planets), 1)}, or leave housing.form out",
+            remedy=f"write {planets * -(-max(points, 54) // planets)}, or leave housing.form out",
         )
 
 

@@ -88,7 +88,9 @@ def housing_signal(
         around = found.envelope, -found.envelope
         _draw_signal(ax, found.signal, around, _band_title(speed, found))
         lobes = found.lobes
-        ax.plot(lobes.position, lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False)
+        # an empty set of markers that are not clipped would upset the layout
+        if len(lobes.position):
+            ax.plot(lobes.position, lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False)
     axes[-1].set_xlim(0, 1)
     label(axes[-1], "carrier revolutions [1]")
     legend_below(figure)
@@ -115,8 +117,8 @@ def _extremes(signal, ring_teeth):
 def _band_title(speed: str, found: BandAnalysis) -> str:
     count, threshold = len(found.lobes.position), found.lobes.threshold
     return (
-        f"{speed}: orders {found.low} to {found.high}, around mesh harmonic {found.harmonic}: {count} lobes "
-        f"(prominence above {threshold:.0%} of the largest value)"
+        f"{speed}: orders {found.low} to {found.high}, mesh harmonic {found.harmonic}: {count} lobes "
+        f"(prominence above {threshold:.0%} of the largest)"
     )
 
 
