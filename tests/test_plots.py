@@ -213,7 +213,7 @@ def test_envelope_of_the_housing_signal():
     line = line_of(figure, "envelope")
     angle = 2 * np.pi * line.get_xdata()
     np.testing.assert_allclose(line.get_ydata(), 1 + 0.5 * np.cos(6 * angle), atol=1e-9)
-    assert "6 lobes (prominence above 10% of the largest value)" in figure.axes[1].get_title(loc="left")
+    assert "6 lobes (prominence above 10% of the largest)" in figure.axes[1].get_title(loc="left")
 
 
 def test_sweep_marks_speeds_without_convergence():
