@@ -15,6 +15,8 @@ PLANETS = (2, 3, 4, 5, 6, 7)
 REST = 0.01
 # another set is drawn where femgear refuses the geometry; so many refusals tell of a bad draw
 MOST_DRAWS = 25
+# most that the torque turns the ends of a coupling against one another [rad]
+MOST_WINDING = 1.0
 
 
 @dataclass(frozen=True)
@@ -115,6 +117,7 @@ def _text(rng, kind: str, planets: int, title: str) -> str:
     planet_inertia = 0.5 * planet_mass * ((0.5 * module * planet) ** 2 + planet_bore**2)
     carrier_mass = planets * planet_mass * rng.uniform(0.5, 3.0)
     carrier_inertia = carrier_mass * distance**2 * rng.uniform(0.4, 0.8)
+    at_sun, at_carrier = (sun_inertia, sun_torque), (carrier_inertia, -sun_torque * (1 + ring / sun))
     lines = [
         f'title = "{title}"',
         "[set]",
@@ -154,8 +157,8 @@ def _text(rng, kind: str, planets: int, title: str) -> str:
         f'mass = "{carrier_mass!r} kg"',
         f'inertia = "{carrier_inertia!r} kg m^2"',
         f'support_stiffness = "{carrier!r} N/m"',
-        *_machine(rng, "motor", sun_inertia if driven == "sun" else carrier_inertia),
-        *_machine(rng, "brake", carrier_inertia if driven == "sun" else sun_inertia),
+        *_machine(rng, "motor", *(at_sun if driven == "sun" else at_carrier)),
+        *_machine(rng, "brake", *(at_carrier if driven == "sun" else at_sun)),
         "[operation]",
         f'input = "{driven}"',
         'fixed = "ring"',
@@ -178,12 +181,16 @@ def _log(rng, low: float, high: float) -> float:
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def _machine(rng, name: str, inertia: float) -> list[str]:
-    """Rotor on a coupling with a torsional frequency of 20 to 500 Hz, or none."""
+def _machine(rng, name: str, inertia: float, torque: float) -> list[str]:
+    """Rotor on a coupling with a torsional frequency of 20 to 500 Hz, or none.
+
+    The coupling is stiffer where the torque would wind it up by more than a radian: no coupling stands that,
+    and deflections of a micrometre beside hundreds of turns have no digits left for their symmetry.
+    """
     rotor, frequency = inertia * _log(rng, 1.0, 100.0), _log(rng, 20.0, 500.0)
     if rng.random() < 0.4:
         return []
-    stiffness = inertia * (2 * math.pi * frequency) ** 2
+    stiffness = max(inertia * (2 * math.pi * frequency) ** 2, abs(torque) / MOST_WINDING)
     return [f"[{name}]", f'inertia = "{rotor!r} kg m^2"', f'coupling_stiffness = "{stiffness!r} N m/rad"']
 
 
