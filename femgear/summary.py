@@ -13,6 +13,7 @@ from femgear.casefile.drivetrain import DrivetrainCase
 from femgear.gears import check_set, speeds, tooth_thickness, torques
 from femgear.gears.checks import tip_clearances
 from femgear.gears.deviation_checks import check_deviations
+from femgear.gears.motion import MEMBERS
 from femgear.models.ring import MAX_DIAMETER
 from femgear.summary_block import Block
 from femgear.summary_drivetrain import (
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
 RPM = math.pi / 30
 _MANY = 8
+# Angle between the ends of a coupling that is worth a warning [rad].
+MOST_WINDING = 1.0
 
 
 def describe(case: Case | DrivetrainCase) -> tuple[Block, ...]:
@@ -91,6 +94,8 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
             "[W-DAMPING] dynamics.damping_ratio: without damping resonances have no limit, and levels depend "
             "on how near a line lies to one; 0.02 to 0.05 is usual"
         )
+    if elastic:
+        found += _wound_up(case, planetary)
     if elastic and case.planet.bearing_clearance and case.operation.fixed == "ring":
         found.append(
             "[W-BEARING] planet.bearing_clearance: the dynamics have linear planet bearings; the clearance "
@@ -102,6 +107,21 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
             f"{MAX_DIAMETER} nodal diameters; use more than {2 * MAX_DIAMETER}"
         )
     return tuple(found)
+
+
+def _wound_up(case: Case, planetary: PlanetarySet) -> Iterator[str]:
+    """Couplings that the torque turns further than any stands: a slip of units, as a rule."""
+    acting = torques(planetary, member=case.operation.input, torque=case.operation.torque)
+    output = next(name for name in MEMBERS if name not in (case.operation.input, case.operation.fixed))
+    for name, member in (("motor", case.operation.input), ("brake", output)):
+        section = getattr(case, name)
+        angle = 0.0 if section is None else abs(getattr(acting, member)) / section.coupling_stiffness
+        if angle > MOST_WINDING:
+            yield (
+                f"[W-COUPLING] {name}.coupling_stiffness: {section.coupling_stiffness:.4g} N m/rad lets the "
+                f"torque turn the coupling by {math.degrees(angle):.4g} deg; couplings stand a few degrees, "
+                "elastic ones twenty"
+            )
 
 
 def _gears(s: PlanetarySet) -> Block:

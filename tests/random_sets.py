@@ -8,6 +8,7 @@ import numpy as np
 from femgear.case import parse_case, planetary_set
 from femgear.casefile.sections import Case
 from femgear.errors import GeometryError
+from femgear.summary import MOST_WINDING
 
 KINDS = ("in phase", "out of phase", "unequal")
 PLANETS = (2, 3, 4, 5, 6, 7)
@@ -15,8 +16,6 @@ PLANETS = (2, 3, 4, 5, 6, 7)
 REST = 0.01
 # another set is drawn where femgear refuses the geometry; so many refusals tell of a bad draw
 MOST_DRAWS = 25
-# most that the torque turns the ends of a coupling against one another [rad]
-MOST_WINDING = 1.0
 
 
 @dataclass(frozen=True)

@@ -114,6 +114,8 @@ def test_check_echoes_negative_ring_teeth(check):  # bad input 32
         (("set.planets", 1), "W-PLANETS"),  # 47
         (("set.pin_errors", [{"planet": 1, "tangential": "20 um"}]), "W-WEDGING"),  # 50
         (("housing", {"form": "linear", "points": 9}), "W-POINTS"),
+        # 100 N m (1 + 108/27) on the brake
+        (("brake.coupling_stiffness", "0.4 kN m/rad"), "turn the coupling by 71.62 deg"),
     ],
 )
 def test_check_warns(check, change, words):
