@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.analysis import DynamicsResult, HousingResult, ModesResult, StaticResult
-    from femgear.analysis_helical import HelicalDynamicsResult
 
 RPM = np.pi / 30.0
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
@@ -38,8 +37,11 @@ def complex_entries(entries) -> dict[str, tuple]:
     return found
 
 
-def response_entries(result: DynamicsResult | HelicalDynamicsResult) -> dict[str, tuple]:
-    """What is known of the periodic response at every speed: frequency, convergence, stability."""
+def response_entries(result: Any) -> dict[str, tuple]:
+    """What is known of the periodic response at every speed: frequency, convergence, stability.
+
+    Of any result with a response, its stability and the speeds of the members.
+    """
     response, stability, speed = result.response, result.stability, ("speed",)
     return {
         "mesh_frequency": (speed, response.mesh_frequency, "Hz", "mesh frequency"),

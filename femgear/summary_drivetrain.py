@@ -17,6 +17,7 @@ from femgear.models.drivetrain_rates import (
     shift_rate,
 )
 from femgear.models.drivetrain_record import PASS_BAND
+from femgear.datasets import RPM
 from femgear.summary_block import Block
 from femgear.summary_transient import GROWN, growth_rates, largest_gains, separating, shown_factor
 
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from femgear.models.drivetrain import DrivetrainModel
     from femgear.models.drivetrain_rates import SpeedRange
 
-RPM = math.pi / 30
 _SHOWN = 16
 # A speed that changes by more is worth a remark.
 _CHANGE = 2.0

@@ -48,11 +48,11 @@ def result_warnings(results: Results) -> tuple[str, ...]:
     if "transient" in results.stages:
         found += transient_warnings(results.transient)
     if "dynamics" in results.stages:
-        found += _dynamics(results.dynamics)
+        found += _of_dynamics(results.dynamics)
     return tuple(dict.fromkeys(found))
 
 
-def _dynamics(data: xr.Dataset) -> Iterator[str]:
+def _of_dynamics(data: xr.Dataset) -> Iterator[str]:
     if warnings := str(data.attrs.get("warnings", "")):
         yield from (f"[{text.strip()}" for text in warnings.split("[") if text)
     speed = data["speed"].values
