@@ -37,7 +37,7 @@ lint: environment
 	$(PY) -m ruff format --check .
 
 validate: environment
-	$(FEMGEAR) validate -o docs/validation.md
+	$(PY) tests/validation -o docs/validation.md
 	$(PY) -m pytest -m slow --benchmark-disable $(ARGS)
 
 bench: environment

@@ -60,7 +60,7 @@ def test_errors_and_floating_sun(benchmark, reference, erroneous, periods, posit
 @pytest.mark.benchmark(group=ERRORS)
 def test_monte_carlo(benchmark, reference):
     from femgear.contact.supports import Supports
-    from femgear.design import pin_samples, sharing_model, sharing_of_samples
+    from femgear.study.sharing import pin_samples, sharing_model, sharing_of_samples
 
     pins = pin_samples(3, samples=SAMPLES, radial=3e-6, tangential=3e-6, seed=1)
 
@@ -80,7 +80,7 @@ def test_monte_carlo(benchmark, reference):
 
 @pytest.mark.benchmark(group=ERRORS)
 def test_derivatives(benchmark, reference):
-    from femgear.design import linearise, pin_sensitivities
+    from femgear.study.sensitivity import linearise, pin_sensitivities
 
     def derive():
         linear = linearise(reference.gears, reference.bodies, sun_torque=reference.sun_torque, positions=64)
@@ -105,7 +105,8 @@ class Planets:
 
     @staticmethod
     def gears(n_planets):
-        from femgear.gears import Gear, PlanetarySet, equal_planet_angles
+        from femgear.gears.gear import Gear
+        from femgear.gears.planetary import PlanetarySet, equal_planet_angles
 
         common = {
             "module": 1.5e-3,

@@ -57,7 +57,7 @@ def test_daqp(benchmark, problems):
 
 @pytest.mark.benchmark(group="Periodic response at one speed (700 Hz)")
 def test_mesh_unknowns(benchmark, reference):
-    from femgear.solvers.spectral import solve_spectral
+    from femgear.solvers.periodic.spectral import solve_spectral
 
     result = reference.modes
     basis = conventional.without_residual(result.modes)
@@ -72,7 +72,7 @@ def test_mesh_unknowns(benchmark, reference):
 
 @pytest.mark.benchmark(group="Periodic response at one speed (700 Hz)")
 def test_modal_unknowns(benchmark, reference):
-    from femgear.solvers.spectral import solve_spectral
+    from femgear.solvers.periodic.spectral import solve_spectral
 
     result = reference.modes
     basis = conventional.without_residual(result.modes)

@@ -20,16 +20,18 @@ SETTLING = 30.0
 
 @cache
 def model():
-    from femgear.models.drivetrain import drivetrain_model
-    from femgear.models.wind_turbine_drivetrain import wind_turbine_drivetrain
+    from published.wind_turbine_drivetrain import wind_turbine_drivetrain
+
+    from femgear.trains.drivetrain.model import drivetrain_model
 
     return drivetrain_model(wind_turbine_drivetrain())
 
 
 def run(duration, step, **options):
-    from femgear.models.drivetrain_march import march_drivetrain
-    from femgear.models.drivetrain_torque import constant_torques
-    from femgear.models.wind_turbine_drivetrain import PRINTED, paper_torques
+    from published.wind_turbine_drivetrain import PRINTED, paper_torques
+
+    from femgear.trains.drivetrain.data import constant_torques
+    from femgear.trains.drivetrain.time import march_drivetrain
 
     torques = constant_torques(paper_torques(balanced=True))
     return march_drivetrain(
@@ -38,8 +40,9 @@ def run(duration, step, **options):
 
 
 def settled():
-    from femgear.models.drivetrain_balance import settled_motion
-    from femgear.models.wind_turbine_drivetrain import PRINTED, paper_torques
+    from published.wind_turbine_drivetrain import PRINTED, paper_torques
+
+    from femgear.trains.drivetrain.multitone import settled_motion
 
     return settled_motion(model(), paper_torques(balanced=True), speed=PRINTED.speed)
 

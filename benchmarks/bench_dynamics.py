@@ -65,7 +65,7 @@ def beside_balance(benchmark, medians, case, title, note):
 
 @case_of
 def test_harmonic_balance(benchmark, medians, ratio, tolerance):
-    from femgear.solvers.harmonic_balance import solve_harmonic_balance
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 
     benchmark.group = SETTLED.format(ratio)
     harmonics, samples = BALANCE[tolerance]
@@ -121,9 +121,9 @@ def test_adaptive_integration(benchmark, medians, ratio, tolerance):
 @pytest.mark.benchmark(group=GROWTH, timer=process_time)
 @pytest.mark.parametrize("links", [0, 9, 99])
 def test_growth_over_degrees_of_freedom(benchmark, medians, links):
-    from femgear.solvers.harmonic_balance import solve_harmonic_balance
-    from femgear.solvers.harmonic_equations import harmonic_balance
-    from femgear.solvers.receptance import reduce_problem
+    from femgear.solvers.periodic.equations import harmonic_balance
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+    from femgear.solvers.periodic.receptance import reduce_problem
 
     longer = train.with_chains(problem(0.05), links, damping=0.05)
     begin = process_time()
@@ -157,8 +157,8 @@ question_group = pytest.mark.benchmark(group=QUESTIONS, timer=process_time)
 
 @question_group
 def test_branch(benchmark):
-    from femgear.solvers.branches import frequency_response_curve
-    from femgear.solvers.continuation import StepOptions
+    from femgear.solvers.continuation.arclength import StepOptions
+    from femgear.solvers.continuation.branches import frequency_response_curve
 
     # the default step needs 70 points for this range
     options = StepOptions(largest=0.0135)
@@ -177,7 +177,7 @@ def test_branch(benchmark):
 
 @question_group
 def test_solution_with_verdict(benchmark):
-    from femgear.solvers.periodic_response import periodic_response
+    from femgear.solvers.periodic.harmonic_balance import periodic_response
 
     found = ask(
         benchmark, "one periodic solution, 8 harmonics, with fixed-point radius and stability",
@@ -190,8 +190,8 @@ def test_solution_with_verdict(benchmark):
 
 @question_group
 def test_two_base_frequencies(benchmark):
-    from femgear.solvers.harmonic_balance import solve_harmonic_balance
-    from femgear.solvers.lines import side_bands
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+    from femgear.system.series import side_bands
 
     set_, orders = train.two_base_train(0.05), side_bands(2, 8, 2)
     omega = [train.OMEGA / 108.0, train.OMEGA]
@@ -205,8 +205,8 @@ def test_two_base_frequencies(benchmark):
 
 @question_group
 def test_shooting(benchmark):
-    from femgear.solvers.harmonic_balance import solve_harmonic_balance
-    from femgear.solvers.shooting import solve_shooting
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+    from femgear.solvers.periodic.shooting import solve_shooting
 
     start = train.state_at_zero(
         problem(0.05), solve_harmonic_balance(problem(0.05), train.OMEGA, harmonics=8)
@@ -221,7 +221,7 @@ def test_shooting(benchmark):
 
 @question_group
 def test_transient(benchmark):
-    from femgear.solvers.transient import solve_transient
+    from femgear.solvers.time.transient import solve_transient
 
     times, start = np.linspace(0.0, 100 / train.MESH_FREQUENCY, 2001), train.static_start(problem(0.05))
     found = ask(
@@ -236,7 +236,7 @@ def test_transient(benchmark):
 
 @question_group
 def test_sweep_with_jumps(benchmark):
-    from femgear.solvers.sweep_response import sweep_up_and_down
+    from femgear.solvers.continuation.sweep import sweep_up_and_down
 
     speeds = 2.0 * np.pi * np.linspace(6200.0, 7000.0, 9)
     options = {"steps": 100, "tolerance": 1e-4, "most": 300}
@@ -252,7 +252,7 @@ def test_sweep_with_jumps(benchmark):
 
 @question_group
 def test_poincare_section(benchmark):
-    from femgear.solvers.poincare import stroboscopic_section
+    from femgear.solvers.chaos.poincare import stroboscopic_section
 
     found = ask(
         benchmark, "stroboscopic section: 100 points after 100 periods of 100 steps",
@@ -267,8 +267,8 @@ def test_poincare_section(benchmark):
 @question_group
 @pytest.mark.parametrize("route", ["direct", "modal"])
 def test_frequency_response(benchmark, route):
-    from femgear.solvers.frequency_response import direct_response, modal_response
-    from femgear.solvers.modal import solve_modes
+    from femgear.solvers.linear.frequency_response import direct_response, modal_response
+    from femgear.solvers.linear.modal import solve_modes
 
     system, k = problem(0.05).system, problem(0.05).reference
     frequency, W = np.linspace(50.0, 12000.0, 2000), system.W
@@ -286,9 +286,10 @@ def test_frequency_response(benchmark, route):
 
 @question_group
 def test_campbell_diagram(benchmark):
-    from femgear.models.planar import planar_system
-    from femgear.solvers.campbell import campbell_data
-    from femgear.validation.planar import lin_parker_set
+    from validation.planar import lin_parker_set
+
+    from femgear.solvers.linear.campbell import campbell_data
+    from femgear.system.assembler import planar_system
 
     data = lin_parker_set(3)
     found = ask(
@@ -304,7 +305,7 @@ def test_campbell_diagram(benchmark):
 
 @question_group
 def test_stability_chart(benchmark):
-    from femgear.solvers.stability_chart import stability_chart
+    from femgear.solvers.stability.chart import stability_chart
 
     frequency = 2.0 * np.pi * np.linspace(6000.0, 16000.0, 100)
     found = ask(
@@ -319,9 +320,9 @@ def test_stability_chart(benchmark):
 
 @question_group
 def test_spectral_speeds(benchmark):
-    from femgear.solvers.modal import solve_modes
-    from femgear.solvers.spectral import solve_spectral
-    from femgear.system import MeshExcitation
+    from femgear.solvers.linear.modal import solve_modes
+    from femgear.solvers.periodic.spectral import solve_spectral
+    from femgear.system.system import MeshExcitation
 
     system, k = problem(0.05).system, problem(0.05).reference
     modes = solve_modes(system, k)

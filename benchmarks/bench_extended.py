@@ -19,7 +19,7 @@ def frequency():
 
 @pytest.fixture(scope="module")
 def problem():
-    from femgear.models.wind_turbine import extended_problem_b
+    from published.wind_turbine import extended_problem_b
 
     return extended_problem_b()
 
@@ -32,9 +32,10 @@ def medians():
 @pytest.mark.benchmark(group=GROUP, timer=process_time)
 @pytest.mark.parametrize("name", LINES)
 def test_extended_harmonic_balance(benchmark, medians, problem, name):
-    from femgear.models.wind_turbine import drive_reduction
-    from femgear.solvers.harmonic_balance import solve_harmonic_balance
-    from femgear.solvers.lines import side_bands
+    from published.wind_turbine import drive_reduction
+
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+    from femgear.system.series import side_bands
 
     orders = side_bands(*LINES[name])
     options = {"orders": orders, "reduction": drive_reduction(problem), "stability": False}
@@ -50,7 +51,7 @@ def test_extended_harmonic_balance(benchmark, medians, problem, name):
 @pytest.mark.benchmark(group=GROUP, timer=process_time)
 @pytest.mark.parametrize("steps", STEPS)
 def test_integration_of_two_turns(benchmark, medians, problem, steps):
-    from femgear.solvers.transient import solve_transient
+    from femgear.solvers.time.transient import solve_transient
 
     turn = 60.0 / SPEED
     times = np.append(0.0, np.linspace(turn, 2.0 * turn, TEETH * 32, endpoint=False))

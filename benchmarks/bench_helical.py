@@ -15,11 +15,16 @@ HERTZ = np.linspace(10.0, 15e3, 2000)
 @cache
 def inputs():
     """System, modes, rows of the loads and errors (8, 8, 4): four tooth sums, two lags of the planets."""
+    from validation.helical import kahraman_set
+
     from femgear.gears.phasing import MeshPhasing
-    from femgear.models.helical import helical_system
-    from femgear.models.helical_modes import helical_modes, helical_springs
-    from femgear.models.helical_response import phased_errors, spring_loads
-    from femgear.validation.helical import kahraman_set
+    from femgear.trains.helical.model import (
+        helical_modes,
+        helical_springs,
+        helical_system,
+        phased_errors,
+        spring_loads,
+    )
 
     data = kahraman_set()
     cases = [
@@ -38,7 +43,7 @@ def medians():
 @pytest.mark.benchmark(group=GROUP, timer=process_time)
 @pytest.mark.parametrize("loads", [False, True])
 def test_sum_of_modes(benchmark, medians, loads):
-    from femgear.models.helical_response import modal_error_response
+    from femgear.trains.helical.model import modal_error_response
 
     system, modes, rows, error = inputs()
     options = {"outputs": rows if loads else None}
@@ -56,8 +61,8 @@ def test_sum_of_modes(benchmark, medians, loads):
 @pytest.mark.benchmark(group=GROUP, timer=process_time)
 def test_direct(benchmark, medians):
     """One receptance from all meshes serves the eight cases."""
-    from femgear.models.helical_response import modal_error_response
-    from femgear.solvers.frequency_response import direct_response
+    from femgear.solvers.linear.frequency_response import direct_response
+    from femgear.trains.helical.model import modal_error_response
 
     system, modes, _, error = inputs()
     k = modes.mesh_stiffness
@@ -82,8 +87,9 @@ def test_direct(benchmark, medians):
 
 @pytest.mark.benchmark(group="Modes of the helical set of 42 dof", timer=process_time)
 def test_modes(benchmark):
-    from femgear.models.helical_modes import helical_modes
-    from femgear.validation.helical import kahraman_set
+    from validation.helical import kahraman_set
+
+    from femgear.trains.helical.model import helical_modes
 
     data = kahraman_set()
     found = benchmark.pedantic(helical_modes, args=(data,), rounds=9, warmup_rounds=1)

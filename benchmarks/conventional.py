@@ -60,7 +60,7 @@ def modal_harmonic_balance(modes, excitation, frequency, *, excitation_harmonics
     Parameters
     ----------
     modes, excitation
-        As `femgear.solvers.spectral.solve_spectral` takes them.
+        As `femgear.solvers.periodic.spectral.solve_spectral` takes them.
     frequency : float
         Mesh frequency [Hz].
 

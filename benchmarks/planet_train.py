@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.solvers.harmonics import harmonics_of
-from femgear.solvers.nonlinear import NonlinearSystem
+from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.series import harmonics_of
 
 PHASES = np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])
 FLUCTUATION = 0.15 * np.array([1.0, 0.3, 0.15])
@@ -21,17 +21,20 @@ LINES = 24
 
 def mesh_stiffness():
     """k(t) of the six meshes in sequential phase."""
-    from femgear.models.planar_problem import phased_series
-    from femgear.validation.planar import lin_parker_set
+    from validation.planar import lin_parker_set
+
+    from femgear.trains.planar.model import phased_series
 
     return phased_series(FLUCTUATION, FLUCTUATION, PHASES, mean=lin_parker_set(3).mesh_stiffness)
 
 
 def planet_train(damping: float) -> NonlinearSystem:
     """Example set of Lin and Parker (1999) with three planets, 300 N m and 20 um of backlash."""
-    from femgear.models.planar_data import PlanarTorque
-    from femgear.models.planar_problem import planar_meshes, planar_problem
-    from femgear.validation.planar import lin_parker_set
+    from validation.planar import lin_parker_set
+
+    from femgear.system.assembler import planar_meshes
+    from femgear.system.lumped import PlanarTorque
+    from femgear.trains.planar.model import planar_problem
 
     data = lin_parker_set(3)
     meshes = planar_meshes(data, stiffness=mesh_stiffness(), backlash=20e-6)
@@ -40,9 +43,11 @@ def planet_train(damping: float) -> NonlinearSystem:
 
 def two_base_train(damping: float) -> NonlinearSystem:
     """The same set with its weight, which turns with the carrier: carrier first, mesh second frequency."""
-    from femgear.models.planar_data import PlanarTorque
-    from femgear.models.planar_problem import Gravity, planar_meshes, planar_problem
-    from femgear.validation.planar import lin_parker_set
+    from validation.planar import lin_parker_set
+
+    from femgear.system.assembler import planar_meshes
+    from femgear.system.lumped import PlanarTorque
+    from femgear.trains.planar.model import Gravity, planar_problem
 
     data, stiffness = lin_parker_set(3), replace(mesh_stiffness(), orders=(0, 1))
     meshes = planar_meshes(data, stiffness=stiffness, backlash=20e-6)
@@ -63,8 +68,8 @@ def with_chains(
     lowest : float
         Lowest frequency of a chain whose body stands still [Hz].
     """
-    from femgear.solvers.nonlinear import modal_damping
-    from femgear.system import MechanicalSystem
+    from femgear.solvers.linear.modal import modal_damping
+    from femgear.system.system import MechanicalSystem
 
     s, n = problem.system, len(problem.system.M)
     m, size = share * np.diag(s.M) / max(links, 1), n * (1 + links)
@@ -96,7 +101,7 @@ def static_start(problem: NonlinearSystem) -> tuple[np.ndarray, np.ndarray]:
 
 def state_at_zero(problem: NonlinearSystem, solution) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and velocity of a periodic solution at time zero."""
-    from femgear.solvers.harmonic_balance import displacements
+    from femgear.solvers.periodic.harmonic_balance import displacements
 
     lines = displacements(problem, solution)
     return lines.sum(axis=1).real, (1j * solution.line_frequency * lines).sum(axis=1).real
@@ -118,8 +123,8 @@ class Target:
 
 def shot(problem: NonlinearSystem) -> Target:
     """Reference: shooting, adaptive integration that stops at every contact change, tolerance 1e-11."""
-    from femgear.solvers.harmonic_balance import solve_harmonic_balance
-    from femgear.solvers.shooting import solve_shooting
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+    from femgear.solvers.periodic.shooting import solve_shooting
 
     near = solve_harmonic_balance(problem, OMEGA, harmonics=8)
     found = solve_shooting(problem, OMEGA, start=state_at_zero(problem, near), harmonics=LINES)
@@ -137,7 +142,7 @@ def settle_by_steps(problem, target: Target, tolerance: float, *, steps: int, mo
     error : float
     periods : int
     """
-    from femgear.solvers.strobe import strobe
+    from femgear.solvers.time.stroboscopic import strobe
 
     period = strobe(problem, OMEGA, steps=steps, method=method)
     state, g = period.enter(static_start(problem))
@@ -158,7 +163,7 @@ def settle_by_steps(problem, target: Target, tolerance: float, *, steps: int, mo
 
 def settle_adaptively(problem, target: Target, *, method: str, tolerance: float, periods: int):
     """Error of the lines, and change from period to period, after so many periods in one integration."""
-    from femgear.solvers.transient import solve_transient
+    from femgear.solvers.time.transient import solve_transient
 
     samples = 128
     last = (periods - 2 + np.arange(2 * samples) / samples) / MESH_FREQUENCY

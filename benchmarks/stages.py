@@ -23,7 +23,7 @@ class Reference:
 
     @cached_property
     def case(self):
-        from femgear import read_case
+        from femgear.case.case import read_case
 
         return read_case(CASE)
 
@@ -41,7 +41,7 @@ class Reference:
 
     @cached_property
     def gears(self):
-        from femgear import planetary_set
+        from femgear.case.case import planetary_set
 
         return planetary_set(self.case)
 
@@ -141,21 +141,21 @@ def contact(reference: Reference):
 
 def static(reference: Reference):
     """The static stage, grids cached."""
-    from femgear import solve_static
+    from femgear.trains.static.stages import solve_static
 
     return solve_static(reference.case, cache=reference.cache)
 
 
 def modes(reference: Reference):
     """The modal stage."""
-    from femgear import solve_modes
+    from femgear.trains.elastic.stages import solve_modes
 
     return solve_modes(reference.case, reference.static)
 
 
 def dynamics(reference: Reference):
     """The dynamic stage: the speeds of the case, with their Floquet verdicts."""
-    from femgear import solve_dynamics
+    from femgear.trains.elastic.stages import solve_dynamics
 
     return solve_dynamics(reference.case, reference.static, reference.modes)
 
@@ -165,7 +165,7 @@ SWEEP_HARMONICS = 6
 
 def sweep(reference: Reference):
     """Periodic responses at 1000 speeds, six mesh harmonics."""
-    from femgear.solvers.spectral import solve_spectral
+    from femgear.solvers.periodic.spectral import solve_spectral
 
     result = reference.modes
     return solve_spectral(
@@ -179,7 +179,7 @@ def sweep(reference: Reference):
 
 def sweep_verdicts(reference: Reference):
     """Periodic responses at 1000 speeds and the Floquet verdict of each."""
-    from femgear.solvers.floquet import stability
+    from femgear.solvers.stability.floquet import stability
 
     result, response = reference.modes, sweep(reference)
     stability(
@@ -193,14 +193,15 @@ def sweep_verdicts(reference: Reference):
 
 def housing(reference: Reference):
     """The housing stage."""
-    from femgear import solve_housing
+    from femgear.trains.elastic.stages import solve_housing
 
     return solve_housing(reference.case, reference.dynamics)
 
 
 def whole(reference: Reference):
     """Static, modes, dynamics and housing, grids cached; no pictures."""
-    from femgear import solve_dynamics, solve_housing, solve_modes, solve_static
+    from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+    from femgear.trains.static.stages import solve_static
 
     case = reference.case
     still = solve_static(case, cache=reference.cache)
@@ -210,7 +211,8 @@ def whole(reference: Reference):
 
 def whole_cold(reference: Reference):
     """The same with new grids."""
-    from femgear import solve_dynamics, solve_housing, solve_modes, solve_static
+    from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+    from femgear.trains.static.stages import solve_static
 
     case = reference.case
     still = solve_static(case)

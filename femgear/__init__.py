@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from femgear.analysis import solve_dynamics, solve_housing, solve_modes, solve_static
-    from femgear.analysis_stress import solve_stress
-    from femgear.case import Case, planetary_set, read_case, with_value, with_values
+    from femgear.case.case import planetary_set, read_case, with_value, with_values
+    from femgear.case.sections import Case
     from femgear.errors import FemgearError
-    from femgear.storage import open_results
+    from femgear.storage.results import open_results
+    from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+    from femgear.trains.static.stages import solve_static, solve_stress
 
 __all__ = [
     "Case",
@@ -30,18 +31,18 @@ __all__ = [
 ]
 
 _HOME = {
-    "Case": "case",
+    "Case": "case.sections",
     "FemgearError": "errors",
-    "open_results": "storage",
-    "planetary_set": "case",
-    "read_case": "case",
-    "solve_dynamics": "analysis",
-    "solve_housing": "analysis",
-    "solve_modes": "analysis",
-    "solve_static": "analysis",
-    "solve_stress": "analysis_stress",
-    "with_value": "case",
-    "with_values": "case",
+    "open_results": "storage.results",
+    "planetary_set": "case.case",
+    "read_case": "case.case",
+    "solve_dynamics": "trains.elastic.stages",
+    "solve_housing": "trains.elastic.stages",
+    "solve_modes": "trains.elastic.stages",
+    "solve_static": "trains.static.stages",
+    "solve_stress": "trains.static.stages",
+    "with_value": "case.case",
+    "with_values": "case.case",
 }
 
 

@@ -1,4 +1,4 @@
-"""The command line: ``femgear check``, ``run``, ``report``, ``sweep``, ``validate`` and ``schema``."""
+"""The command line: ``femgear check``, ``run``, ``report``, ``sweep`` and ``schema``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ try:
 
     from femgear import __version__
     from femgear.errors import CaseError, FemgearError
-    from femgear.files import storage_error
+    from femgear.storage.files import storage_error
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
     raise SystemExit(INTERRUPTED) from None
@@ -57,7 +57,7 @@ class _Progress:
 
 
 def _print(blocks) -> None:
-    """Print blocks of `femgear.summary` as tables on standard output."""
+    """Print blocks of `femgear.report.summary` as tables on standard output."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -126,8 +126,8 @@ def check(case: Path, /) -> int:
     case
         TOML case file.
     """
-    from femgear.case import read_case
-    from femgear.summary import describe
+    from femgear.case.case import read_case
+    from femgear.report.summary import describe
 
     _print(describe(read_case(case)))
     return 0
@@ -162,12 +162,11 @@ def run(
     force
         Replace the results that the folder holds, once the new ones are complete.
     """
-    from femgear.case import read_case
+    from femgear.case.case import read_case
+    from femgear.report.summary import case_warnings, describe_results, result_warnings
     from femgear.run import run_case
-    from femgear.run_stages import check_case
-    from femgear.storage import open_results, run_folder
-    from femgear.summary import describe_results
-    from femgear.summary_warnings import case_warnings, result_warnings
+    from femgear.storage.results import open_results, run_folder
+    from femgear.trains.registry import check_case
 
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
@@ -200,32 +199,6 @@ def report(folder: Path, /) -> int:
 
 
 @app.command
-def validate(
-    *,
-    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
-    theme: str | None = None,
-    quick: bool = False,
-) -> int:
-    """Compute the validation tables and write them; exit code 3 if a row fails.
-
-    Parameters
-    ----------
-    output
-        Markdown file; docs/validation.md unless a theme is chosen.
-    theme
-        Compute this theme alone and print each of its rows.
-    quick
-        Leave out what takes long.
-    """
-    from femgear.validation import validate as compute
-
-    if output is None and theme is None:
-        output = Path("docs/validation.md")
-    with _Progress() as progress:
-        return compute(output, theme=theme, quick=quick, progress=progress)
-
-
-@app.command
 def sweep(
     case: Path,
     /,
@@ -250,10 +223,10 @@ def sweep(
     speeds
         First and last speed of the input, for mesh forces and the housing.
     """
-    from femgear.case import read_case
-    from femgear.case_drivetrain import refuse_drivetrain
-    from femgear.optimisation import sweep_into
+    from femgear.case.case import read_case
     from femgear.run import grid_cache
+    from femgear.study.sweep import sweep_into
+    from femgear.trains.drivetrain.section import refuse_drivetrain
 
     data = read_case(case)
     refuse_drivetrain(data)
@@ -277,7 +250,7 @@ def schema(*, model: Literal["drivetrain"] | None = None) -> int:
     """
     import json
 
-    from femgear.case import case_schema
+    from femgear.case.case import case_schema
 
     print(json.dumps(case_schema(model), indent=1))
     return 0

@@ -7,14 +7,15 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from femgear import analysis
-from femgear.case import planetary_set, set_deviations
-from femgear.casefile.drivetrain import DrivetrainCase
-from femgear.run_stages import KINDS, check_case, kind_of, stages_of
-from femgear.storage import finish, record, write_dataset, write_text
+from femgear.case.case import planetary_set, set_deviations
+from femgear.storage.files import write_dataset, write_text
+from femgear.storage.results import finish, record
+from femgear.trains import protocol
+from femgear.trains.drivetrain.section import DrivetrainCase
+from femgear.trains.registry import KINDS, check_case, kind_of, stages_of
 
 if TYPE_CHECKING:
-    from femgear.case import Case
+    from femgear.case.sections import Case
 
 
 def grid_cache() -> Path:
@@ -33,7 +34,7 @@ def run_case(
     *,
     only: str | None = None,
     pictures: bool = True,
-    progress: analysis.Progress | None = None,
+    progress: protocol.Progress | None = None,
 ) -> None:
     """Compute a case and write its results.
 
@@ -43,8 +44,8 @@ def run_case(
     folder : path
         From `storage.run_folder`; its manifest says after every stage what is there.
     only : str, optional
-        Last stage to compute, one of `femgear.run_stages.KINDS`; ``"stress"`` computes the stresses whatever
-        ``static.stresses`` says.
+        Last stage to compute, one of `trains.registry.KINDS`; ``"stress"`` computes the stresses
+        whatever ``static.stresses`` says.
     pictures : bool
         Draw figures, fields and report.
     progress : callable, optional
@@ -75,14 +76,14 @@ def run_case(
             if progress is not None:
                 progress(stage, 1, 1)
     if pictures:
-        from femgear.pictures import write_pictures
+        from femgear.report.draw import write_pictures
 
         start = time.perf_counter()
         names += write_pictures(folder, case, results, data=data, cache=cache, progress=progress)
         timings["pictures"] = time.perf_counter() - start
     finish(folder, names, timings=timings, convergence=convergence)
     if pictures:
-        from femgear.report import write_report
+        from femgear.report.html import write_report
 
         write_report(folder)
         finish(folder, [*names, "report.html"], timings=timings, convergence=convergence)
@@ -111,10 +112,10 @@ def report_again(folder: Path) -> None:
     folder : path
         Results of a complete run.
     """
-    from femgear.pictures import write_figures
-    from femgear.pictures_drivetrain import write_drivetrain_pictures
-    from femgear.report import write_report
-    from femgear.storage import folder_lock, open_results
+    from femgear.report.draw import write_figures
+    from femgear.report.html import write_report
+    from femgear.storage.results import folder_lock, open_results
+    from femgear.trains.drivetrain.figures import write_drivetrain_pictures
 
     with folder_lock(folder):
         results = open_results(folder, partial=False)

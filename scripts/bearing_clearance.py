@@ -42,10 +42,11 @@ def main(
     frequencies, points
         Number of frequencies and clearances of the maps.
     """
-    from femgear.casefile.units import LENGTH, to_si
-    from femgear.models.wind_turbine_response import wedging_map
-    from femgear.plots import save_figure
-    from femgear.plots.planar import response_branches
+    from published.wind_turbine_response import wedging_map
+
+    from femgear.case.units import LENGTH, to_si
+    from femgear.report.style import save_figure
+    from femgear.trains.planar.figures import response_branches
 
     plays, play = [to_si(text, LENGTH) for text in clearance], to_si(backlash, LENGTH)
     if min(plays, default=0.0) < 0.0 or play <= 0.0 or harmonics < 1 or min(frequencies, points) < 2:
@@ -80,8 +81,8 @@ MAP_HEADER = ("frequency [Hz]", "clearance [m]", "drive flanks in contact [1]", 
 
 
 def _resonance(text, clearance, harmonics):
-    from femgear.models.wind_turbine import bearing_problem_a
-    from femgear.models.wind_turbine_response import member_rms, resonance, weight_branch
+    from published.wind_turbine import bearing_problem_a
+    from published.wind_turbine_response import member_rms, resonance, weight_branch
 
     problem = bearing_problem_a(clearance)
     branch = weight_branch(problem, (10.0, 180.0), harmonics=harmonics, largest=0.03)
@@ -98,8 +99,9 @@ def _map_records(found):
 
 
 def _map_figure(found, play):
-    from femgear.models.wind_turbine import wind_turbine_a
-    from femgear.plots.planar import contact_map
+    from published.wind_turbine import wind_turbine_a
+
+    from femgear.trains.planar.figures import contact_map
 
     rigid = 0.5 * play / np.sin(wind_turbine_a().pressure_angle_sun_planet)
     panels = [("drive flanks", found.drive.mean(axis=2)), ("back flanks", found.back.mean(axis=2))]
@@ -107,7 +109,7 @@ def _map_figure(found, play):
 
 
 def _print(curves, found, play):
-    from femgear.models.wind_turbine_response import wedging_onset
+    from published.wind_turbine_response import wedging_onset
 
     rows = [(text, f"{hertz:.2f}", f"{1e6 * size:.1f}", end) for text, _, _, (hertz, size, end) in curves]
     header = ("bearing", "ring resonance [Hz]", "ring x r.m.s. [um]", "end of the branch")

@@ -45,10 +45,11 @@ def main(
     harmonics
         Mesh harmonics drawn as lines of excitation.
     """
-    from femgear.models.planar import planar_system
-    from femgear.models.wind_turbine import wind_turbine_a, wind_turbine_b
-    from femgear.plots import save_figure
-    from femgear.solvers.campbell import campbell_data
+    from published.wind_turbine import wind_turbine_a, wind_turbine_b
+
+    from femgear.report.style import save_figure
+    from femgear.solvers.linear.campbell import campbell_data
+    from femgear.system.assembler import planar_system
 
     if not (np.isfinite(highest) and highest > 0.0) or speeds < 5 or modes < 1 or harmonics < 0:
         raise CaseError(
@@ -82,7 +83,7 @@ def main(
 
 
 def _figure(found, train):
-    from femgear.plots.style import GREY, label, legend_below, line_style, new_figure
+    from femgear.report.style import GREY, label, legend_below, line_style, new_figure
 
     figure, (ax,) = new_figure(width=8.5, height=5.0)
     speed = found.speed / RPM

@@ -51,12 +51,12 @@ def main(
     sensitivity
         Whether to vary the assumed inputs of the published set.
     """
-    from femgear.analysis_drivetrain import solve_drivetrain_modes, solve_spectrum, solve_transient_run
-    from femgear.case import read_case, with_value
-    from femgear.case_drivetrain import need_drivetrain
-    from femgear.models.drivetrain_case import case_model, check_spectrum
-    from femgear.pictures_drivetrain import write_drivetrain_pictures
-    from femgear.summary_drivetrain import describe_drivetrain, describe_spectrum, describe_transient
+    from femgear.case.case import read_case, with_value
+    from femgear.trains.drivetrain.figures import write_drivetrain_pictures
+    from femgear.trains.drivetrain.results import describe_drivetrain, describe_spectrum, describe_transient
+    from femgear.trains.drivetrain.section import need_drivetrain
+    from femgear.trains.drivetrain.setup import case_model, check_spectrum
+    from femgear.trains.drivetrain.stages import solve_drivetrain_modes, solve_spectrum, solve_transient_run
 
     data, paper = need_drivetrain(read_case(case)), read_case(PAPER)
     if duration is not None:
@@ -96,7 +96,7 @@ def main(
 
 def _draw_extras(folder: Path, extras) -> list[str]:
     """Pictures beside those of a run; what stops one of them is said and stops nothing else."""
-    from femgear.plots import save_figure
+    from femgear.report.style import save_figure
 
     names = []
     for title, draw in extras.items():
@@ -127,7 +127,7 @@ def _is_paper(data, paper) -> bool:
 
 def _kinematics() -> None:
     """Mesh lines of two choices of tooth numbers beside the printed ones."""
-    from femgear.models.wind_turbine_drivetrain import PRINTED, RADII_TEETH, line_teeth, ratio_of_radii
+    from published.wind_turbine_drivetrain import PRINTED, RADII_TEETH, line_teeth, ratio_of_radii
 
     rows = []
     for text, teeth in (("nearest to the lines", line_teeth()), ("module 5 mm", RADII_TEETH)):

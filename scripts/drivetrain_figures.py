@@ -12,7 +12,7 @@ SENSITIVE = 0.1
 
 def with_balance(case):
     """The case with the share of a torque that balances all others; as it is where it has no share."""
-    from femgear.case import with_value
+    from femgear.case.case import with_value
 
     for i, one in enumerate(case.operation.torque):
         if one.share is not None:
@@ -38,7 +38,7 @@ def backlash_figure(case, model, *, steps: int = 100_000):
     str
         What was found.
     """
-    from femgear.plots.drivetrain import backlash_forces
+    from femgear.trains.drivetrain.figures import backlash_forces
 
     parted, linear = separating_start(case, model, steps=steps)
     if not parted.lost.any():
@@ -62,10 +62,10 @@ def separating_start(case, model, *, steps: int):
 
     The second is None where the linear motion outgrows the numbers.
     """
-    from femgear.casefile.drivetrain_checks import settle_time
     from femgear.errors import ConvergenceError
-    from femgear.models.drivetrain_case import torque_histories
-    from femgear.models.drivetrain_march import march_drivetrain
+    from femgear.trains.drivetrain.section import settle_time
+    from femgear.trains.drivetrain.setup import torque_histories
+    from femgear.trains.drivetrain.time import march_drivetrain
 
     s, torques = case.simulation, torque_histories(case, model.ratio)
     duration = min(max(settle_time(case), 10.0 / s.rate), s.duration, steps / s.rate)
@@ -99,8 +99,9 @@ def first_separation(run, mesh: int, period: float) -> tuple[slice, int]:
 
 def sensitivity_figure(progress):
     """Settled motion with every assumed number lower and higher."""
-    from femgear.models.wind_turbine_drivetrain import ASSUMED, assumption_names, varied
-    from femgear.plots.drivetrain import sensitivity
+    from published.wind_turbine_drivetrain import ASSUMED, assumption_names, varied
+
+    from femgear.trains.drivetrain.figures import sensitivity
 
     names = [
         n for n in assumption_names() if "teeth" not in n and np.all(np.asarray(getattr(ASSUMED, n)) != 0.0)
@@ -120,9 +121,10 @@ def sensitivity_figure(progress):
 
 def settled_quantities(assumed) -> np.ndarray:
     """Amplitudes [N] of four lines of the settled mesh forces; NaN where its lines are not found."""
-    from femgear.models.drivetrain import drivetrain_model
-    from femgear.models.drivetrain_balance import settled_motion
-    from femgear.models.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
+    from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
+
+    from femgear.trains.drivetrain.model import drivetrain_model
+    from femgear.trains.drivetrain.multitone import settled_motion
 
     model = drivetrain_model(wind_turbine_drivetrain(assumed))
     found = settled_motion(model, paper_torques(balanced=True), speed=PRINTED.speed, tolerance=SENSITIVE)

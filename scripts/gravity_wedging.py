@@ -54,10 +54,11 @@ def main(
     steps
         Of the integration, a period.
     """
-    from femgear.casefile.units import LENGTH, to_si
-    from femgear.models.wind_turbine import gravity_problem_b
-    from femgear.plots import save_figure
-    from femgear.plots.planar import response_branches
+    from published.wind_turbine import gravity_problem_b
+
+    from femgear.case.units import LENGTH, to_si
+    from femgear.report.style import save_figure
+    from femgear.trains.planar.figures import response_branches
 
     plays = [to_si(text, LENGTH) for text in backlash]
     if not 0.0 < lowest < highest < np.inf or harmonics < 1 or sweep < 0 or min(plays, default=0.0) <= 0.0:
@@ -94,7 +95,7 @@ HEADER = ("play", "point", "frequency [Hz]", "carrier x r.m.s. [m]", "stable")
 
 
 def _follow(problem, limits, harmonics, stability):
-    from femgear.models.wind_turbine_response import member_rms, weight_branch
+    from published.wind_turbine_response import member_rms, weight_branch
 
     branch = weight_branch(problem, limits, harmonics=harmonics, stability=stability)
     rms = member_rms(problem, branch.solutions, "carrier")[:, 0]
@@ -115,8 +116,9 @@ SWEEP_HEADER = (
 
 def _sweeps(result, hertz, steps):
     """Curves of the integration, and rows with the branch's solution nearest to each motion."""
-    from femgear.models.wind_turbine_response import sweep_rms
-    from femgear.solvers.sweep_response import sweep_up_and_down
+    from published.wind_turbine_response import sweep_rms
+
+    from femgear.solvers.continuation.sweep import sweep_up_and_down
 
     problem = result[1]
     found = sweep_up_and_down(problem, 2.0 * np.pi * hertz, steps=steps, most=100, tolerance=1e-4)
@@ -132,9 +134,10 @@ def _sweeps(result, hertz, steps):
 
 def _beside(result, omega: float, size: float) -> float:
     """Carrier x r.m.s. [m] of harmonic balance from the branch point nearest to a motion; nan without one."""
-    from femgear.models.wind_turbine import drive_reduction
-    from femgear.models.wind_turbine_response import member_rms
-    from femgear.solvers.harmonic_balance import solve_harmonic_balance
+    from published.wind_turbine import drive_reduction
+    from published.wind_turbine_response import member_rms
+
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 
     _, problem, branch, _, rms, _ = result
     away = np.abs(branch.parameter - omega) / np.ptp(branch.parameter) + np.abs(rms - size) / rms.max()
@@ -164,9 +167,10 @@ def _print_sweeps(rows):
 
 def _details(folder, result) -> list[str]:
     """Orbits, planet bearing forces at the peak and contact along the branch, of the first play."""
-    from femgear.models.wind_turbine_response import bearing_history, contact_shares, member_lines
-    from femgear.plots import save_figure
-    from femgear.plots.planar import bearing_forces, contact_over_frequency, orbits
+    from published.wind_turbine_response import bearing_history, contact_shares, member_lines
+
+    from femgear.report.style import save_figure
+    from femgear.trains.planar.figures import bearing_forces, contact_over_frequency, orbits
 
     text, problem, branch, hertz, rms, _ = result
     top, phase = int(np.argmax(rms)), np.linspace(0.0, 2.0 * np.pi, 361)

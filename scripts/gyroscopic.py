@@ -45,10 +45,12 @@ def main(
     below
         Frequency with its unit; modes that are lower at rest are followed.
     """
-    from femgear import planetary_set, read_case, solve_modes, solve_static
-    from femgear.analysis_checks import check_rim_speed
-    from femgear.casefile.units import FREQUENCY, SPEED, to_si
-    from femgear.plots import save_figure
+    from femgear.case.case import planetary_set, read_case
+    from femgear.case.units import FREQUENCY, SPEED, to_si
+    from femgear.report.style import save_figure
+    from femgear.trains.elastic.checks import check_rim_speed
+    from femgear.trains.elastic.stages import solve_modes
+    from femgear.trains.static.stages import solve_static
 
     top, limit = to_si(highest, SPEED), to_si(below, FREQUENCY)
     if not top > 0.0 or speeds < 3 or not limit > 0.0:
@@ -106,8 +108,8 @@ class Branches:
 
 def followed(result, centre_distance: float, speeds, below: float) -> Branches:
     """Branches of all elastic modes that are below a frequency [Hz] at rest."""
-    from femgear.models.elastic import ring_wave_shares, turning_system
-    from femgear.solvers.campbell import campbell_data
+    from femgear.solvers.linear.campbell import campbell_data
+    from femgear.trains.elastic.model import ring_wave_shares, turning_system
 
     modes, model = result.modes, result.model
     elastic = np.flatnonzero(modes.frequency > 0.0)
@@ -193,7 +195,7 @@ def _write(folder: Path, branches: Branches) -> None:
 
 
 def _figure(branches: Branches, ring, top: float):
-    from femgear.plots.style import BLACK, BLUE, GREY, VERMILION, label, legend_below, line_style, new_figure
+    from femgear.report.style import BLACK, BLUE, GREY, VERMILION, label, legend_below, line_style, new_figure
 
     figure, (left, right) = new_figure(columns=2, width=11.0, height=5.2)
     still = branches.frequency[0]

@@ -49,14 +49,14 @@ def main(
     positions
         Positions over one mesh period.
     """
-    from femgear import planetary_set, read_case
-    from femgear.case_drivetrain import refuse_drivetrain
-    from femgear.casefile.units import LENGTH, TORQUE, to_si
-    from femgear.design.basis import design_basis, sun_torque
-    from femgear.design.relief import harris_map, loads_back, relief_starts, with_tip_relief
-    from femgear.plots.design import harris_curves
-    from femgear.plots.style import save_figure
+    from femgear.case.case import planetary_set, read_case
+    from femgear.case.units import LENGTH, TORQUE, to_si
+    from femgear.report.style import save_figure
     from femgear.run import grid_cache
+    from femgear.study.figures import harris_curves
+    from femgear.study.linearised import design_basis, sun_torque
+    from femgear.study.relief import harris_map, loads_back, relief_starts, with_tip_relief
+    from femgear.trains.drivetrain.section import refuse_drivetrain
 
     data = read_case(case)
     refuse_drivetrain(data)

@@ -48,7 +48,7 @@ def main(
     harmonic
         Harmonic of the mesh frequency, 1 upwards.
     """
-    from femgear import planetary_set, read_case, with_value
+    from femgear.case.case import planetary_set, read_case, with_value
 
     data = with_value(read_case(case), "operation.speeds", [speed])
     # refuse before the folder is touched, and what only the response tells after it
@@ -99,8 +99,9 @@ class Heard:
 
 def _solve(case, progress):
     """Static, dynamic and housing results of the case."""
-    from femgear import solve_dynamics, solve_housing, solve_modes, solve_static
     from femgear.run import grid_cache
+    from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+    from femgear.trains.static.stages import solve_static
 
     static = solve_static(case, cache=grid_cache(), progress=progress)
     progress("modes", 0, 1)
@@ -112,7 +113,8 @@ def _solve(case, progress):
 
 def _bands(case, static, dynamics, housing, harmonic) -> Heard:
     """The band around the harmonic, heard through the ring's field and through Hanning windows."""
-    from femgear.housing import OrderSpectrum, analyse_band, fixed_sensor_lines, hanning_model
+    from femgear.housing.orders import OrderSpectrum, analyse_band
+    from femgear.housing.sensor import fixed_sensor_lines, hanning_model
 
     gears = static.planetary_set
     carrier = np.array([s.carrier for s in dynamics.speeds])
@@ -176,7 +178,7 @@ def _print_lines(heard: Heard, dynamics, speed: str):
 
 
 def _draw(folder: Path, speed: str, heard: Heard, teeth: int) -> None:
-    from femgear.plots import save_figure
+    from femgear.report.style import save_figure
 
     save_figure(_spectrum_figure(speed, heard, teeth), folder / "order_spectrum.png")
     save_figure(_envelope_figure(speed, heard), folder / "envelope.png")
@@ -184,7 +186,7 @@ def _draw(folder: Path, speed: str, heard: Heard, teeth: int) -> None:
 
 def _spectrum_figure(speed: str, heard: Heard, teeth: int):
     """Lines of the band: the ring's field above, the Hanning model below."""
-    from femgear.plots.style import BLUE, ORANGE, VERMILION, label, legend_below, new_figure
+    from femgear.report.style import BLUE, ORANGE, VERMILION, label, legend_below, new_figure
 
     figure, axes = new_figure(rows=2, width=9.5, height=7.0, sharex=True)
     drawn, form = heard.exact, "ring field, exact circumferential Fourier"
@@ -228,7 +230,7 @@ def _spectrum_figure(speed: str, heard: Heard, teeth: int):
 
 def _envelope_figure(speed: str, heard: Heard):
     """Signal and envelope of the band over one carrier revolution, by the ring's field and by windows."""
-    from femgear.plots.style import BLACK, BLUE, VERMILION, label, legend_below, new_figure
+    from femgear.report.style import BLACK, BLUE, VERMILION, label, legend_below, new_figure
 
     figure, axes = new_figure(rows=2, width=9.5, height=6.4, sharex=True)
     for ax, name, text in ((axes[0], "exact", "ring field"), (axes[1], "Hanning", "Hanning windows")):
@@ -270,7 +272,7 @@ def ring_surface(planetary_set, radial, tangential, *, columns: int = 360):
         Point data [m]: ``static`` and, for every harmonic, ``harmonic h, cosine`` and ``harmonic h, sine``
         (displacement at ``h omega t = 0`` and ``-pi/2``), each with three components.
     """
-    from femgear.scene import load_pyvista
+    from femgear.report.scene import load_pyvista
 
     pv = load_pyvista()
     phi = 2 * np.pi * np.arange(columns + 1) / columns
@@ -298,8 +300,8 @@ def ring_surface(planetary_set, radial, tangential, *, columns: int = 360):
 
 def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
     """The ring's deflection as VTU; the polar modulation as VTP and PNG."""
-    from femgear.files import replace_file
-    from femgear.scene import polar_curve, write_vtu
+    from femgear.report.scene import polar_curve, write_vtu
+    from femgear.storage.files import replace_file
 
     shown = slice(0, max(EXPORTED, heard.harmonic) + 1)
     field = dynamics.ring_radial[0, shown], dynamics.ring_tangential[0, shown]
@@ -316,8 +318,7 @@ def _export(folder: Path, planetary_set, dynamics, heard: Heard) -> None:
 
 def _polar_picture(path: Path, planetary_set, heard: Heard, curve) -> None:
     """The envelope around the ring over the angle of the carrier, beside that of the Hanning model."""
-    from femgear.scene import load_pyvista, polar_curve
-    from femgear.scene.drawing import add_text, look_down, write_png
+    from femgear.report.scene import add_text, load_pyvista, look_down, polar_curve, write_png
 
     pv = load_pyvista()
     size, ring = 900, planetary_set.ring

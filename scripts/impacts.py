@@ -71,8 +71,8 @@ def main(
 
 def follow(pair, harmonics: int):
     """Branch of a pair from ratio 3.5 to 0.1, with amplitude, mean, smallest and largest deflection."""
-    from femgear.solvers.branches import parameter_curve
-    from femgear.solvers.continuation import StepOptions
+    from femgear.solvers.continuation.arclength import StepOptions
+    from femgear.solvers.continuation.branches import parameter_curve
 
     branch = parameter_curve(
         pair.problem, (3.5, 0.1), 1.0, harmonics=harmonics, samples=1024, radius=False,
@@ -86,8 +86,7 @@ def follow(pair, harmonics: int):
 
 def damping_study(folder: Path, harmonics: int) -> list[str]:
     """Amplitude and mean for two damping ratios."""
-    from femgear.models.impact_borders import impact_borders
-    from femgear.models.impact_pair import BACK, DRIVE, example_pair
+    from femgear.trains.gear_pair.model import BACK, DRIVE, example_pair, impact_borders
 
     curves, rows = [], []
     for zeta in DAMPING:
@@ -108,7 +107,7 @@ def error_study(folder: Path, harmonics: int) -> list[str]:
     """Amplitude and mean for several tooth-frequency errors."""
     from dataclasses import replace
 
-    from femgear.models.impact_pair import example_pair
+    from femgear.trains.gear_pair.model import example_pair
 
     curves = []
     for error in ERRORS:
@@ -120,8 +119,8 @@ def error_study(folder: Path, harmonics: int) -> list[str]:
 
 def _drawn(folder: Path, name: str, curves, title: str) -> list[str]:
     """Picture and table of curves over the frequency ratio."""
-    from femgear.plots import save_figure
-    from femgear.plots.impacts import amplitude_and_mean
+    from femgear.report.style import save_figure
+    from femgear.trains.gear_pair.figures import amplitude_and_mean
 
     records = [
         (text, float(r), float(a), float(m), int(s))
@@ -136,11 +135,17 @@ def _drawn(folder: Path, name: str, curves, title: str) -> list[str]:
 
 def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
     """Contact states by harmonic balance and by sweeps up and down."""
-    from femgear.models.contact_states import STATE_NAMES, range_states, state_regions
-    from femgear.models.impact_pair import BACK, DRIVE, example_pair
-    from femgear.plots import save_figure
-    from femgear.plots.impacts import state_bands
-    from femgear.solvers.sweep_response import sweep_up_and_down
+    from femgear.report.style import save_figure
+    from femgear.solvers.continuation.sweep import sweep_up_and_down
+    from femgear.trains.gear_pair.figures import state_bands
+    from femgear.trains.gear_pair.model import (
+        BACK,
+        DRIVE,
+        STATE_NAMES,
+        example_pair,
+        range_states,
+        state_regions,
+    )
 
     pair, flanks = example_pair(0.09), {"drive": DRIVE, "back": BACK}
     branch, _, _, low, high = follow(pair, harmonics)
@@ -170,10 +175,10 @@ def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
 
 def chaos_study(folder: Path, ratios: int, points: int) -> list[str]:
     """Bifurcation diagram, exponents and sections of the lightly loaded pair."""
-    from femgear.models.impact_pair import lightly_loaded_pair
-    from femgear.plots import save_figure
-    from femgear.plots.impacts import bifurcation_and_exponent, phase_sections
-    from femgear.solvers.lyapunov import lyapunov_exponents
+    from femgear.report.style import save_figure
+    from femgear.solvers.chaos.lyapunov import lyapunov_exponents
+    from femgear.trains.gear_pair.figures import bifurcation_and_exponent, phase_sections
+    from femgear.trains.gear_pair.model import lightly_loaded_pair
 
     pair, start, found = lightly_loaded_pair(), None, []
     grid = np.linspace(1.0, 2.2, ratios)
@@ -217,11 +222,19 @@ def eccentric_set(eccentricity: float, floating: bool):
     """Lin and Parker's set of three planets with an eccentric sun and a tooth error: errors and problem."""
     from dataclasses import replace
 
-    from femgear.models.equivalent_damping import equivalent_damping, planar_mesh_dampers
-    from femgear.models.planar_data import PlanarTorque
-    from femgear.models.planar_problem import phased_series, planar_meshes, planar_problem
-    from femgear.models.transmission_errors import Eccentricity, TransmissionErrors, tooth_lines, with_errors
-    from femgear.validation.planar import lin_parker_set
+    from validation.planar import lin_parker_set
+
+    from femgear.system.assembler import planar_meshes
+    from femgear.system.lumped import PlanarTorque
+    from femgear.system.transmission_errors import (
+        Eccentricity,
+        TransmissionErrors,
+        equivalent_damping,
+        planar_mesh_dampers,
+        tooth_lines,
+        with_errors,
+    )
+    from femgear.trains.planar.model import phased_series, planar_problem
 
     data = lin_parker_set(3)
     data = replace(data, sun=replace(data.sun, support=1e6 if floating else 1e9))
@@ -240,9 +253,9 @@ def eccentric_set(eccentricity: float, floating: bool):
 
 def eccentricity_study(folder: Path, frequencies: int) -> list[str]:
     """Sun eccentricity of a planetary set: mesh force over frequency, path of the sun, spectrum."""
-    from femgear.plots import save_figure
-    from femgear.plots.impacts import amplitude_and_mean, line_spectrum
-    from femgear.plots.planar import orbits
+    from femgear.report.style import save_figure
+    from femgear.trains.gear_pair.figures import amplitude_and_mean, line_spectrum
+    from femgear.trains.planar.figures import orbits
 
     hertz = np.linspace(400.0, 3600.0, frequencies)
     curves, records, paths, spectra = [], [], [], []
@@ -272,9 +285,9 @@ def eccentricity_study(folder: Path, frequencies: int) -> list[str]:
 
 def eccentric_response(eccentricity: float, floating: bool, hertz):
     """Force of mesh 1 and convergence (3, F); path of the sun, lines of the force at the first frequency."""
-    from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
-    from femgear.solvers.nonlinear import element_forces
-    from femgear.solvers.receptance import reduce_problem
+    from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+    from femgear.solvers.periodic.receptance import reduce_problem
+    from femgear.system.nonlinear import element_forces
 
     errors, build = eccentric_set(eccentricity, floating)
     orders, start, rows = errors.lines(mesh=3, member=3, bands=2), None, []

@@ -41,10 +41,10 @@ def main(
     planet
         Number of the planet that has the gap, 1 upwards.
     """
-    from femgear import planetary_set, read_case
-    from femgear.casefile.units import LENGTH, to_si
-    from femgear.design.basis import sun_torque
-    from femgear.plots import save_figure
+    from femgear.case.case import planetary_set, read_case
+    from femgear.case.units import LENGTH, to_si
+    from femgear.report.style import save_figure
+    from femgear.study.linearised import sun_torque
 
     data = read_case(case)
     gears = planetary_set(data)
@@ -80,10 +80,10 @@ def _checked(gap: float, text: str) -> float:
 
 def _solve(case, gaps, planet, progress):
     """What all gaps share, and one mesh cycle for each of them."""
-    from femgear.contact.mirrored import walk_either_flank
-    from femgear.design.basis import design_basis, sun_torque
+    from femgear.contact.cycle import walk_either_flank
     from femgear.gears.deviations import common_period
     from femgear.run import grid_cache
+    from femgear.study.linearised import design_basis, sun_torque
 
     progress("compliance", 0, 1)
     basis = design_basis(case, cache=grid_cache())
@@ -189,7 +189,7 @@ def _print_shares(gaps, cycles, planet, plain):
 
 
 def _share_figure(gaps, cycles, planet):
-    from femgear.plots.style import label, legend_below, line_style, new_figure, periodic
+    from femgear.report.style import label, legend_below, line_style, new_figure, periodic
 
     figure, axes = new_figure(columns=len(gaps), width=max(3.4 * len(gaps), 6.0), height=4.2, sharey=True)
     for ax, gap, cycle in zip(axes, gaps, cycles):
@@ -211,7 +211,7 @@ def _share_figure(gaps, cycles, planet):
 
 def _tooth_figure(gaps, cycles, names, planet):
     """Load of the tooth pairs of the planet with the gap and of its neighbour along the path of contact."""
-    from femgear.plots.style import label, legend_below, line_style, new_figure
+    from femgear.report.style import label, legend_below, line_style, new_figure
 
     n = len(cycles[0].load_share)
     neighbour = planet % n + 1

@@ -46,9 +46,10 @@ def main(
     positions
         Positions over one mesh period. Default: as the case says.
     """
-    from femgear import planetary_set, read_case, solve_static, with_value
-    from femgear.plots import save_figure
+    from femgear.case.case import planetary_set, read_case, with_value
+    from femgear.report.style import save_figure
     from femgear.run import grid_cache
+    from femgear.trains.static.stages import solve_static
 
     data = read_case(case)
     if contact is not None:
@@ -82,7 +83,7 @@ def _records(torques, results):
 
 
 def _print_summary(torques, results):
-    from femgear.plots.style import distinct_lines
+    from femgear.report.style import distinct_lines
 
     rows = []
     for torque, static in zip(torques, results):
@@ -97,7 +98,7 @@ def _print_summary(torques, results):
 
 def _figure(torques, results):
     """Transmission error above, stiffness below; sun-planet meshes left, planet-ring meshes right."""
-    from femgear.plots.style import (
+    from femgear.report.style import (
         distinct_lines,
         family,
         label,

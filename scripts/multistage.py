@@ -30,7 +30,7 @@ def main(
     balance: int = 0,
     published: bool = False,
 ) -> None:
-    """Solve the example train of femgear.models.multistage_example; its numbers are femgear's own.
+    """Solve the example train of published.multistage_example; its numbers are femgear's own.
 
     With --published: natural frequencies of a published four-stage table, for every reading that it allows.
 
@@ -54,11 +54,12 @@ def main(
         Only the natural frequencies of the table of "Optimized design of dynamic characteristics of planetary
         gear train", whose units and missing entries allow several readings.
     """
-    from femgear.models.multistage_example import SPEED, TORQUE, four_stage_train
-    from femgear.models.multistage_modes import multistage_modes
-    from femgear.models.multistage_motion import train_speeds
-    from femgear.plots import save_figure
-    from femgear.plots.multistage import mesh_orders, stage_energy, stage_forces
+    from published.multistage_example import SPEED, TORQUE, four_stage_train
+
+    from femgear.report.style import save_figure
+    from femgear.trains.multistage.figures import mesh_orders, stage_energy, stage_forces
+    from femgear.trains.multistage.model import train_speeds
+    from femgear.trains.multistage.stages import multistage_modes
 
     if (
         not 0.0 < lowest < highest < math.inf
@@ -103,10 +104,10 @@ def main(
 
 def _published(folder: Path) -> None:
     """Natural frequencies of the published table by stiffness unit, number of planets and support."""
-    from femgear.models.multistage_example import PUBLISHED_FREQUENCIES, published_train
-    from femgear.models.multistage_modes import multistage_modes
-    from femgear.plots import save_figure
-    from femgear.plots.style import BLUE, GREY, label, new_figure
+    from published.multistage_example import PUBLISHED_FREQUENCIES, published_train
+
+    from femgear.report.style import BLUE, GREY, label, new_figure, save_figure
+    from femgear.trains.multistage.stages import multistage_modes
 
     low, high = PUBLISHED_FREQUENCIES
     rows, records, ladders = [], [], []
@@ -141,9 +142,10 @@ def _published(folder: Path) -> None:
 
 def _forces(train, speed, torque, harmonics, modes) -> dict[str, np.ndarray]:
     """Root mean squares (F, S) of the force in sun-planet 1 of every stage, by the stage that excites."""
-    from femgear.models.multistage import mesh_columns
-    from femgear.models.multistage_example import example_errors
-    from femgear.models.multistage_response import error_response
+    from published.multistage_example import example_errors
+
+    from femgear.trains.multistage.model import mesh_columns
+    from femgear.trains.multistage.stages import error_response
 
     first = [columns[0] for columns in mesh_columns(train)]
     answers = error_response(train, speed, example_errors(train, torque, harmonics), modes=modes)
@@ -154,11 +156,12 @@ def _forces(train, speed, torque, harmonics, modes) -> dict[str, np.ndarray]:
 
 def _balance(train, rpm, torque, harmonics, damping, progress) -> dict[str, tuple]:
     """The same by harmonic balance with the stiffness waves, first orders of two stages together."""
-    from femgear.models.multistage import mesh_columns
-    from femgear.models.multistage_example import example_meshes
-    from femgear.models.multistage_response import base_frequencies, multistage_problem
-    from femgear.solvers.harmonic_balance import solve_harmonic_balance
-    from femgear.solvers.lines import distinct_lines
+    from published.multistage_example import example_meshes
+
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+    from femgear.system.series import distinct_lines
+    from femgear.trains.multistage.model import mesh_columns
+    from femgear.trains.multistage.stages import base_frequencies, multistage_problem
 
     if not len(rpm):
         return {}
@@ -195,7 +198,7 @@ def _write(folder, train, modes, rpm, forces) -> None:
 
 
 def _print(train, speed, torque) -> None:
-    from femgear.models.multistage_motion import speed_ratio, train_speeds, train_torques
+    from femgear.trains.multistage.model import speed_ratio, train_speeds, train_torques
 
     speeds, torques = train_speeds(train, speed), train_torques(train, torque)
     header = ("stage", "teeth", "sun [1/min]", "carrier [1/min]", "mesh [Hz]", "sun [N m]", "carrier [N m]")

@@ -82,17 +82,11 @@ def main(
     check
         Run case and optimum anew into the folders before and after.
     """
-    from femgear import read_case, with_value
-    from femgear.optimisation import (
-        Problem,
-        minimise,
-        named_quantity,
-        parse_limit,
-        parse_variable,
-        with_values,
-    )
-    from femgear.optimisation.reliefs import tip_reliefs
+    from femgear.case.case import read_case, with_value, with_values
     from femgear.run import grid_cache
+    from femgear.study.names import named_quantity, parse_limit, parse_variable, tip_reliefs
+    from femgear.study.problem import Problem
+    from femgear.study.search import minimise
 
     data = read_case(case)
     data = data if torque is None else with_value(data, "operation.torque", torque)
@@ -153,7 +147,7 @@ def _refined(rough, case, folder: Path, options, method: str):
     """The optimum at the positions and on the grid of the case: between few positions errors may hide."""
     from dataclasses import replace
 
-    from femgear.optimisation import minimise
+    from femgear.study.search import minimise
 
     problem = replace(rough.problem, case=case)
     local = "auto" if rough.method == "minimax" else "simplex" if method in ("auto", "global") else method
@@ -165,12 +159,11 @@ def _refined(rough, case, folder: Path, options, method: str):
 
 def _write(found, data, folder: Path, rough) -> list[str]:
     """Tables on the terminal, and the files of the search."""
-    from femgear.case import to_toml
-    from femgear.files import write_text
-    from femgear.optimisation import with_values
-    from femgear.optimisation.words import comparison_rows, tolerance_rows, verdict
-    from femgear.plots.optimisation import tolerance_bars
-    from femgear.plots.style import save_figure
+    from femgear.case.case import to_toml, with_values
+    from femgear.report.style import save_figure
+    from femgear.storage.files import write_text
+    from femgear.study.figures import tolerance_bars
+    from femgear.study.search import comparison_rows, tolerance_rows, verdict
 
     best, name, dimension = found.values, found.problem.objective.name, found.problem.objective.dimension
     write_text(to_toml(with_values(data, best)), folder / "optimum.toml")
@@ -195,9 +188,9 @@ def _write(found, data, folder: Path, rough) -> list[str]:
 
 
 def _front(problem, second, folder: Path, options) -> list[str]:
-    from femgear.optimisation import pareto_front
-    from femgear.plots.optimisation import front
-    from femgear.plots.style import save_figure
+    from femgear.report.style import save_figure
+    from femgear.study.figures import front
+    from femgear.study.search import pareto_front
 
     with Progress() as progress:
         found = pareto_front(problem, second, progress=progress, **options)
@@ -221,9 +214,9 @@ def _front(problem, second, folder: Path, options) -> list[str]:
 
 def _check(found, data, folder: Path, speeds, rough) -> list[str]:
     """Case and optimum anew: a full run each on a finer grid, read back from its files."""
-    from femgear.optimisation import with_values
-    from femgear.plots.optimisation import before_and_after
-    from femgear.plots.style import save_figure
+    from femgear.case.case import with_values
+    from femgear.report.style import save_figure
+    from femgear.study.figures import before_and_after
 
     fine = {"static.positions": 128, "static.flank_elements": 32} | QUIET
     if speeds is not None:
@@ -255,9 +248,8 @@ def _check(found, data, folder: Path, speeds, rough) -> list[str]:
 
 
 def _run(case, folder: Path, only: str):
-    from femgear import open_results
     from femgear.run import run_case
-    from femgear.storage import run_folder
+    from femgear.storage.results import open_results, run_folder
 
     with run_folder(folder, force=True) as place, Progress() as progress:
         run_case(case, place, only=only, pictures=False, progress=progress)

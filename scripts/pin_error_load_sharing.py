@@ -59,13 +59,13 @@ def main(
     position
         In mesh periods, 0 to 1, rounded to a sixteenth.
     """
-    from femgear import planetary_set, read_case
-    from femgear.casefile.units import LENGTH, to_si
-    from femgear.design.basis import design_basis, sun_torque
-    from femgear.design.sharing import pin_samples
-    from femgear.plots.design import sharing_histogram
-    from femgear.plots.style import save_figure
+    from femgear.case.case import planetary_set, read_case
+    from femgear.case.units import LENGTH, to_si
+    from femgear.report.style import save_figure
     from femgear.run import grid_cache
+    from femgear.study.figures import sharing_histogram
+    from femgear.study.linearised import design_basis, sun_torque
+    from femgear.study.sharing import pin_samples
 
     data = read_case(case)
     gears = planetary_set(data)
@@ -129,10 +129,9 @@ def _check_place(seed: int, position: float) -> None:
 def _solve(data, basis, kind, torque, place, pins):
     """Load sharing of all samples, the difference of some from the whole contact problem, sensitivities."""
     from femgear.contact.supports import RIGID, Supports
-    from femgear.design import linearise, pin_sensitivities
-    from femgear.design.basis import case_supports
-    from femgear.design.samples import sharing_of_samples
-    from femgear.design.sharing import sharing_model, walked_shares
+    from femgear.study.linearised import case_supports
+    from femgear.study.sensitivity import linearise, pin_sensitivities
+    from femgear.study.sharing import sharing_model, sharing_of_samples, walked_shares
 
     supports = {"fixed": RIGID, "floating": Supports(sun=0.0), "case": case_supports(data)}[kind]
     options = {"sun_torque": torque, "supports": supports, "deviations": basis.deviations, **place}

@@ -55,13 +55,12 @@ def main(
     points
         Frequencies of the mesh-force spectra, 2 or more.
     """
-    from femgear.gears import equal_planet_angles
     from femgear.gears.checks import feasible_angles
-    from femgear.gears.phasing import mesh_phasing, standard_lag
-    from femgear.gears.phasing_tables import phasing_table
-    from femgear.gears.tooth_choice import check_teeth, neighbouring_teeth
-    from femgear.plots import save_figure
-    from femgear.plots.phasing import mesh_force_spectra, phase_diagram, resultant_chart
+    from femgear.gears.phasing import mesh_phasing, phasing_table, standard_lag
+    from femgear.gears.planetary import equal_planet_angles
+    from femgear.gears.teeth_numbers import check_teeth, neighbouring_teeth
+    from femgear.report.style import save_figure
+    from femgear.trains.static.figures import mesh_force_spectra, phase_diagram, resultant_chart
 
     if points < 2 or not 1 <= harmonics <= MOST_HARMONICS:
         raise CaseError(
@@ -148,9 +147,9 @@ def _choice_rows(choices):
 
 def _types(convention, harmonics):
     """Tables of the three types of four equal planets, and of two pairs that stand unequally."""
-    from femgear.gears.phasing import MeshPhasing
-    from femgear.gears.phasing_tables import phasing_table
-    from femgear.validation.helical import cases
+    from validation.helical import cases
+
+    from femgear.gears.phasing import MeshPhasing, phasing_table
 
     found = cases(convention=convention)
     sets = {_title(name, letter): found[letter] for name, letter in TYPES.items()}
@@ -160,7 +159,7 @@ def _types(convention, harmonics):
 
 def _title(name: str, letter: str) -> str:
     """Phasing, case of Table 2, teeth of sun, planet and ring."""
-    from femgear.validation.helical import TABLE_2
+    from validation.helical import TABLE_2
 
     sun, ring, planet, _ = TABLE_2[letter]
     return f"{name}: {letter}, {sun}/{planet}/{ring}"
@@ -168,11 +167,10 @@ def _title(name: str, letter: str) -> str:
 
 def _spectra(points):
     """Forces of two sun meshes of the published helical train, four harmonics of 1 um, 5 % damping."""
+    from validation.helical import cases, kahraman_set
+
     from femgear.gears.phasing import phase_factors
-    from femgear.models.helical import helical_system
-    from femgear.models.helical_modes import helical_modes
-    from femgear.models.helical_response import modal_error_response
-    from femgear.validation.helical import cases, kahraman_set
+    from femgear.trains.helical.model import helical_modes, helical_system, modal_error_response
 
     data, frequency = kahraman_set(), np.linspace(100.0, 15e3, points)
     system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)

@@ -32,9 +32,9 @@ def main(results: Path, /, *, output: Path = FOLDER) -> None:
     """
     from PIL import Image
 
-    from femgear import open_results
     from femgear.errors import StorageError
-    from femgear.files import replace_file
+    from femgear.storage.files import replace_file
+    from femgear.storage.results import open_results
 
     folder = open_results(results).folder
     for name in ready_images(folder):

@@ -32,7 +32,7 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
     from cyclopts import App, CycloptsError
 
     from femgear.cli import show_warning, wrong_arguments
-    from femgear.files import storage_error
+    from femgear.storage.files import storage_error
     from femgear.threads import one_blas_thread
 
     program = Path(sys.argv[0]).name
@@ -73,7 +73,7 @@ def _fail(error: FemgearError) -> int:
 
 def ready_folder(folder: Path) -> Path:
     """The folder, created where it does not exist."""
-    from femgear.files import storage_errors
+    from femgear.storage.files import storage_errors
 
     with storage_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -128,7 +128,7 @@ def print_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]
 
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a table as CSV, units in the header; the file is either the old or the new one, whole."""
-    from femgear.files import write_text
+    from femgear.storage.files import write_text
 
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")

@@ -58,15 +58,15 @@ def main(
     positions
         Positions over one mesh period.
     """
-    from femgear import planetary_set, read_case
-    from femgear.case_drivetrain import refuse_drivetrain
-    from femgear.casefile.units import LENGTH, TORQUE, to_si
-    from femgear.design.basis import design_basis, relief_snippet, sun_torque
-    from femgear.design.relief import loads_back
-    from femgear.files import write_text
-    from femgear.plots.design import relief_contours
-    from femgear.plots.style import save_figure
+    from femgear.case.case import planetary_set, read_case
+    from femgear.case.units import LENGTH, TORQUE, to_si
+    from femgear.report.style import save_figure
     from femgear.run import grid_cache
+    from femgear.storage.files import write_text
+    from femgear.study.figures import relief_contours
+    from femgear.study.linearised import design_basis, relief_snippet, sun_torque
+    from femgear.study.relief import loads_back
+    from femgear.trains.drivetrain.section import refuse_drivetrain
 
     data = read_case(case)
     refuse_drivetrain(data)
@@ -123,7 +123,7 @@ def _checked(amount: float, text: str, module: float) -> float:
 
 def _mean_deflection(basis, torque: float, contact: str) -> float:
     """Mean deflection of the sun-planet meshes without relief [m]."""
-    from femgear.contact.mirrored import walk_either_flank
+    from femgear.contact.cycle import walk_either_flank
 
     cycle = walk_either_flank(basis.gears, basis.bodies, sun_torque=torque, positions=8, contact=contact)
     return float(cycle.deflection[: basis.gears.n_planets].mean())
@@ -131,8 +131,7 @@ def _mean_deflection(basis, torque: float, contact: str) -> float:
 
 def _search(basis, amounts, on_sun, target, options, progress):
     """The grid, the optimum at the target torque, and its ratio at twice the positions."""
-    from femgear.design.relief import relief_grid
-    from femgear.design.relief_optimum import optimise_relief
+    from femgear.study.relief import optimise_relief, relief_grid
 
     grid = relief_grid(
         basis.gears,
@@ -152,7 +151,7 @@ def _search(basis, amounts, on_sun, target, options, progress):
 
 def _at_more_positions(basis, best, torque: float, options) -> float:
     """Peak to peak of the optimum over that without relief, at twice the positions."""
-    from femgear.design.relief import harris_map, with_tip_relief
+    from femgear.study.relief import harris_map, with_tip_relief
 
     ideal, gears = basis.deviations, basis.gears
     relief = {"amount": best.amount, "length": best.length, "power": options["power"], "back": torque < 0}
@@ -170,7 +169,7 @@ def _at_more_positions(basis, best, torque: float, options) -> float:
 
 def _print_verdict(best, grid) -> None:
     """Slopes on either side of the optimum, and whether it is a minimum."""
-    from femgear.design.relief_optimum import AMOUNT_STEP, LENGTH_STEP
+    from femgear.study.relief import AMOUNT_STEP, LENGTH_STEP
 
     for name, slopes, step, words, number, unit in (
         ("amount", best.amount_slopes, AMOUNT_STEP, ("less", "more"), 1.0, "um per um"),

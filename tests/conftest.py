@@ -1,6 +1,8 @@
-"""Makes the modules beside the tests that several tests share importable by name."""
+"""Makes the modules that several tests share, and those of scripts, importable by name."""
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
+TESTS = Path(__file__).parent
+
+sys.path[:0] = [str(TESTS), str(TESTS.parent / "scripts")]

@@ -2,7 +2,8 @@
 
 import math
 
-from femgear.gears import Gear, PlanetarySet, close_set, equal_planet_angles
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 
 ALPHA = math.radians(20.0)
 UM = 1e-6

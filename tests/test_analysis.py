@@ -4,14 +4,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from validation.cases import reference_case
 
-from femgear.analysis import max_nodal_diameter, solve_dynamics, solve_housing, solve_modes, solve_static
-from femgear.case import parse_case, read_case, with_value, with_values
-from femgear.casefile import tomlfile
+from femgear.case import text as case_text
+from femgear.case.case import parse_case, read_case, with_value, with_values
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, symmetry_leakage
-from femgear.solvers.harmonics import harmonics_of, sample
-from femgear.validation.reference import reference_case
+from femgear.system.series import harmonics_of, sample
+from femgear.trains.elastic.checks import max_nodal_diameter
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).parents[1]
 
@@ -75,7 +77,7 @@ def test_planets_in_phase_leave_only_multiples_of_three(case, dynamics):
 
 def test_planets_out_of_phase_are_equal_and_leave_only_multiples_of_three(case):
     """28/41/110 at the default 64 positions, which three planets would meet unequally: 66 are taken."""
-    data = tomlfile.parse(case.source, "")
+    data = case_text.parse(case.source, "")
     data["sun"] |= {"teeth": 28}
     data["planet"] |= {"teeth": 41, "profile_shift": 0.2}
     data["ring"] |= {"teeth": 110}
@@ -86,7 +88,7 @@ def test_planets_out_of_phase_are_equal_and_leave_only_multiples_of_three(case):
         (data["housing"], "published"),
     ):
         entry[0].pop(entry[1])
-    other = parse_case(tomlfile.write(data))
+    other = parse_case(case_text.write(data))
     static = solve_static(other)
     assert len(static.cycle.position) == 66
     means = static.cycle.stiffness.mean(axis=1)
@@ -165,9 +167,9 @@ def test_nodal_diameters_do_not_depend_on_the_points_of_the_housing(case, points
 
 
 def test_what_the_dynamics_cannot_represent_is_refused_before_computing(case):
-    from femgear.analysis import check_dynamic_case
-    from femgear.case import planetary_set
+    from femgear.case.case import planetary_set
     from femgear.errors import CaseError
+    from femgear.trains.elastic.checks import check_dynamic_case
 
     for key, value, code in (
         ("operation.fixed", "carrier", "E-FIXED-MEMBER"),

@@ -8,12 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear import analysis_stress
-from femgear.analysis import solve_static
-from femgear.analysis_spectrum import LOAD_BINS, LoadedTeeth, body_stress, load_spectrum, loaded_teeth
-from femgear.analysis_stress import nominal_stresses, solve_stress
-from femgear.case import read_case, with_value
+from femgear.case.case import read_case, with_value
 from femgear.contact.flanks import LEFT, RIGHT
+from femgear.contact.load_spectrum import LOAD_BINS, LoadedTeeth, body_stress, load_spectrum, loaded_teeth
 from femgear.contact.root_stress import (
     LOADED,
     root_stress_cycle,
@@ -21,7 +18,9 @@ from femgear.contact.root_stress import (
     tooth_history,
     worst_history,
 )
-from femgear.gears import half_thickness_angle
+from femgear.gears.gear import half_thickness_angle
+from femgear.trains.static import stages as static_stages
+from femgear.trains.static.stages import nominal_stresses, solve_static, solve_stress
 
 FILE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 P, N = 16, 3
@@ -226,7 +225,7 @@ def test_peaks_are_counted_once_an_engagement():
 
 def with_pitch_error(amount, monkeypatch, **changes):
     """One planet and tooth 5 of the sun out of place: a record of 27 mesh periods, of which few are kept."""
-    monkeypatch.setattr(analysis_stress, "WHOLE_RECORD", 2)
+    monkeypatch.setattr(static_stages, "WHOLE_RECORD", 2)
     settings = {
         "sun.errors": {"cumulative_pitch": [amount if tooth == 5 else "0 um" for tooth in range(27)]},
         "set.planets": 1,
@@ -370,6 +369,6 @@ def test_an_elastic_ring_is_on_its_foundation(reference):
     for name in ("radial", "tangential"):
         hard = with_value(hard, f"ring.foundation_{name}", "1e18 N/m^3")
     held = result.influences.ring.influence
-    soft, hard = (analysis_stress._influences(one, static).ring.influence for one in (elastic, hard))
+    soft, hard = (static_stages._influences(one, static).ring.influence for one in (elastic, hard))
     assert np.abs(hard - held).max() < 1e-3 * np.abs(held).max()
     assert np.abs(soft - held).max() > 0.05 * np.abs(held).max()

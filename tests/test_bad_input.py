@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.analysis import solve_static
-from femgear.case import planetary_set, read_case, set_deviations, with_value
+from femgear.case.case import planetary_set, read_case, set_deviations, with_value
 from femgear.cli import main
 from femgear.contact.flanks import flank_load_columns, flank_stations
 from femgear.contact.solve import solve_contact
@@ -17,8 +16,10 @@ from femgear.fe.compliance import condense_sector, dof_pairs, interpolation
 from femgear.fe.elasticity import Material, edge_load, stiffness
 from femgear.fe.grid import mirror
 from femgear.fe.meshing import mesh_outline
-from femgear.gears import check_set, half_sector
+from femgear.gears.checks import check_set
 from femgear.gears.deviation_checks import check_deviations
+from femgear.gears.tooth import half_sector
+from femgear.trains.static.stages import solve_static
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")

@@ -5,20 +5,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from femgear.analysis_checks import check_rim_speed
-from femgear.case import read_case, with_value
+from femgear.case.case import read_case, with_value
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.branches import frequency_response_curve
-from femgear.solvers.continuation import StepOptions
-from femgear.solvers.elements import GearMeshes, PolynomialSprings
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.periodic_response import periodic_response
-from femgear.solvers.series import FourierSeries
-from femgear.solvers.spectral import solve_spectral
-from femgear.solvers.transient import solve_transient
-from femgear.system import MechanicalSystem, MeshExcitation
+from femgear.solvers.continuation.arclength import StepOptions
+from femgear.solvers.continuation.branches import frequency_response_curve
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_harmonic_balance
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries
+from femgear.system.system import MechanicalSystem, MeshExcitation
+from femgear.trains.elastic.checks import check_rim_speed
 
 
 def oscillator(*elements, damping=0.0, load=0.0, forces=()):

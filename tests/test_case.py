@@ -11,8 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from femgear.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value, with_values
-from femgear.casefile import tomlfile
+from femgear.case import text as case_text
+from femgear.case.case import (
+    case_schema,
+    parse_case,
+    planetary_set,
+    read_case,
+    to_toml,
+    with_value,
+    with_values,
+)
 from femgear.errors import CaseError, GeometryError
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
@@ -186,7 +194,7 @@ _values = st.recursive(
 @settings(max_examples=60, deadline=None)
 @given(st.dictionaries(st.text("abcXYZ09_- .\"'\n", min_size=1, max_size=8), _values, max_size=4))
 def test_writing_and_reading_toml_are_inverse(data):
-    assert tomlfile.parse(tomlfile.write(data), "") == data
+    assert case_text.parse(case_text.write(data), "") == data
 
 
 # --- files and syntax ----------------------------------------------------------------------------

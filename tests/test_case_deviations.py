@@ -6,17 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case import parse_case, planetary_set, read_case, set_deviations, to_toml, with_value
+from femgear.case.case import parse_case, planetary_set, read_case, set_deviations, to_toml, with_value
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.gears.deviations import Ovality, Runout, body_separation, common_period
-from femgear.gears.modifications import (
-    ProfileCrowning,
-    ProfileSlope,
-    RootRelief,
-    TipRelief,
-    form_deviation,
-)
-from femgear.summary import warnings_of
+from femgear.gears.modifications import ProfileCrowning, ProfileSlope, RootRelief, TipRelief, form_deviation
+from femgear.trains.static.description import warnings_of
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")

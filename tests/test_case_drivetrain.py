@@ -5,19 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from published.wind_turbine_drivetrain import paper_torques, ratio_of_radii, wind_turbine_drivetrain
 
-from femgear.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value
-from femgear.casefile import tomlfile
-from femgear.casefile.drivetrain import DrivetrainCase
+from femgear.case import text as case_text
+from femgear.case.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value
 from femgear.errors import CaseError
-from femgear.models.drivetrain_case import (
-    case_model,
-    check_drivetrain,
-    drivetrain_of,
-    torque_histories,
-)
-from femgear.models.wind_turbine_drivetrain import paper_torques, ratio_of_radii, wind_turbine_drivetrain
-from femgear.summary import describe
+from femgear.report.summary import describe
+from femgear.trains.drivetrain.section import DrivetrainCase
+from femgear.trains.drivetrain.setup import case_model, check_drivetrain, drivetrain_of, torque_histories
 
 CASES = Path(__file__).parents[1] / "cases"
 PAPER, GRC, OWN = (
@@ -153,29 +148,29 @@ def test_refusals(own, key, value, code, named):
 
 def test_chain_in_a_ring_and_in_pieces(own):
     """A second shaft between two bodies closes a loop; a shaft less leaves two pieces."""
-    data = tomlfile.parse(to_toml(own), "")
+    data = case_text.parse(to_toml(own), "")
     more = {"between": ["pinion", "motor"], "length": "1 m", "outer_diameter": "50 mm"}
     with pytest.raises(CaseError, match="closes a loop") as info:
-        parse_case(tomlfile.write(data | {"shaft": [*data["shaft"], more]}))
+        parse_case(case_text.write(data | {"shaft": [*data["shaft"], more]}))
     assert info.value.code == "E-LOOP" and info.value.key == "shaft[2].between"
     with pytest.raises(CaseError, match="nothing joins fan to motor") as info:
-        parse_case(tomlfile.write(data | {"shaft": data["shaft"][:1]}))
+        parse_case(case_text.write(data | {"shaft": data["shaft"][:1]}))
     assert info.value.code == "E-DISCONNECTED" and info.value.key == "body[3].name"
 
 
 def test_bearings_inside_a_shaft(own):
     """A stiff bearing in the middle of the shaft holds its station; there are three of them."""
     place = {"shaft": ["wheel", "fan"], "station": 2, "radial": "1e12 N/m"}
-    data = tomlfile.parse(to_toml(own), "")
-    case = parse_case(tomlfile.write(data | {"bearing": [*data["bearing"], place]}))
+    data = case_text.parse(to_toml(own), "")
+    case = parse_case(case_text.write(data | {"bearing": [*data["bearing"], place]}))
     free, held = case_model(own), case_model(case)
     rows = [held.index(f"shaft wheel-fan 2: {axis}") for axis in "xy"]
     assert held.system.K[rows, rows] - free.system.K[rows, rows] == pytest.approx([1e12, 1e12], rel=1e-6)
     rigid = data | {"bearing": [*data["bearing"], place | {"radial": "rigid"}]}
-    assert len(case_model(parse_case(tomlfile.write(rigid))).rigid) == len(free.rigid) - 2
+    assert len(case_model(parse_case(case_text.write(rigid))).rigid) == len(free.rigid) - 2
     for wrong in ({"station": 4}, {"shaft": ["fan", "wheel"]}, {"shaft": ["motor", "pinion"]}):
         with pytest.raises(CaseError, match="no such station"):
-            parse_case(tomlfile.write(data | {"bearing": [*data["bearing"], place | wrong]}))
+            parse_case(case_text.write(data | {"bearing": [*data["bearing"], place | wrong]}))
 
 
 def test_mistakes_are_reported_at_once_with_their_lines(tmp_path):
@@ -234,9 +229,9 @@ def test_what_only_the_model_can_tell(paper, own):
     loose = with_value(own, "bearing", [{"body": "motor", "radial": "1e8 N/m", "tilt": "1e6 N m/rad"}])
     error = refused_model(loose)
     assert error.code == "E-MECHANISM" and ("wheel" in error.message or "fan" in error.message)
-    data = tomlfile.parse(to_toml(paper), "")
+    data = case_text.parse(to_toml(paper), "")
     more = data["parallel"][0] | {"between": ["gear 1", "gear 3"]}
-    error = refused_model(parse_case(tomlfile.write(data | {"parallel": [*data["parallel"], more]})))
+    error = refused_model(parse_case(case_text.write(data | {"parallel": [*data["parallel"], more]})))
     assert error.code == "E-KINEMATICS"
 
 

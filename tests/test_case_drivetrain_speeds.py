@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case import parse_case, read_case, to_toml, with_value
-from femgear.casefile import tomlfile
+from femgear.case import text as case_text
+from femgear.case.case import parse_case, read_case, to_toml, with_value
 from femgear.errors import CaseError
-from femgear.models.drivetrain_case import case_model, check_drivetrain, check_spectrum, record_rate
-from femgear.summary import describe
+from femgear.report.summary import describe
+from femgear.trains.drivetrain.setup import case_model, check_drivetrain, check_spectrum, record_rate
 
 CASES = Path(__file__).parents[1] / "cases"
 
@@ -135,10 +135,10 @@ def test_sizes_alone_are_no_mechanism(own):
     assert check_drivetrain(with_value(own, "body[1].inertia", "1e-9 kg m^2"))
     tiny = refused_model(with_value(own, "body[1].inertia", "1e-12 kg m^2"))
     assert tiny.code == "E-SPREAD" and tiny.key == "body[1]" and "pinion" in tiny.remedy
-    data = tomlfile.parse(to_toml(own), "")
+    data = case_text.parse(to_toml(own), "")
     for length, fits in (("70 m", True), ("1 km", False)):
         shafts = [data["shaft"][0], data["shaft"][1] | {"length": length}]
-        case = parse_case(tomlfile.write(data | {"shaft": shafts}))
+        case = parse_case(case_text.write(data | {"shaft": shafts}))
         if fits:
             assert check_drivetrain(case)
         else:
@@ -181,7 +181,7 @@ def test_contact_loss_and_its_notice(own):
 
 def test_chains_too_large_for_dense_matrices_are_refused():
     n = 17
-    text = tomlfile.write(
+    text = case_text.write(
         {
             "model": "drivetrain",
             "title": "long",

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from femgear.analysis import solve_static
-from femgear.case import parse_case, planetary_set, with_value
-from femgear.case_floating import check_floating
+from femgear.case.case import parse_case, planetary_set, with_value
+from femgear.case.checks import check_floating
 from femgear.cli import main
 from femgear.errors import GeometryError
+from femgear.trains.static.stages import solve_static
 
 TEXT = (Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")
 ELASTIC = TEXT.replace("[static]", '[static]\nmembers = "elastic"')

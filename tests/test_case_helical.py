@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from validation.helical import kahraman_set
 
-from femgear.analysis_helical_checks import check_helical_case
-from femgear.analysis_helical_data import base_helix_angle, helical_data, overlap_ratio, rotation_sense
-from femgear.case import parse_case, planetary_set, read_case, to_toml, with_value
+from femgear.case.case import parse_case, planetary_set, read_case, to_toml, with_value
 from femgear.errors import CaseError, GeometryError
-from femgear.gears import check_set
-from femgear.models.helical import HelicalSet
-from femgear.summary import describe_case
-from femgear.validation.helical import kahraman_set
+from femgear.gears.checks import check_set
+from femgear.trains.helical.checks import check_helical_case
+from femgear.trains.helical.model import HelicalSet
+from femgear.trains.helical.virtual_gears import base_helix_angle, helical_data, overlap_ratio, rotation_sense
+from femgear.trains.static.description import describe_case
 
 ROOT = Path(__file__).parents[1]
 GIVEN = {"sun_planet": "200e6 N/m", "planet_ring": "200 N/um"}
@@ -281,10 +281,10 @@ def test_check_tells_helix_and_contact_ratios(case):
     ],
 )
 def test_sense_of_the_sun_against_the_carrier(case, input_, fixed, sense):
-    from femgear.casefile import tomlfile
+    from femgear.case import text as case_text
 
-    data = tomlfile.parse(case.source, "")
+    data = case_text.parse(case.source, "")
     data["operation"] |= {"input": input_, "fixed": fixed}
     data["helical"][fixed].pop("torsional_stiffness", None)
-    turned = parse_case(tomlfile.write(data))
+    turned = parse_case(case_text.write(data))
     assert rotation_sense(turned, planetary_set(turned)) == sense

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from published.wind_turbine import gravity_problem_b, wind_turbine_a, wind_turbine_b
 
-from femgear.analysis_planar import planar_data, planar_model
-from femgear.analysis_planar_checks import check_planar_case, check_smoothing, mean_compression
-from femgear.case import parse_case, planetary_set, read_case, to_toml, with_value
+from femgear.case.case import parse_case, planetary_set, read_case, to_toml, with_value
 from femgear.errors import CaseError
-from femgear.gears import check_set
-from femgear.models.planar_data import PlanarSet
-from femgear.models.wind_turbine import gravity_problem_b, wind_turbine_a, wind_turbine_b
-from femgear.summary import describe_case
+from femgear.gears.checks import check_set
+from femgear.system.lumped import PlanarSet
+from femgear.trains.planar.checks import check_planar_case, check_smoothing, mean_compression
+from femgear.trains.planar.stages import planar_data, planar_model
+from femgear.trains.static.description import describe_case
 
 CASES = Path(__file__).parents[1] / "cases"
 PGA, PGB, PGB_STATIC = (CASES / f"nrel_{name}.toml" for name in ("pga", "pgb", "pgb_static"))

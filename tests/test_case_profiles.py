@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case import parse_case, planetary_set, read_case, set_deviations, to_toml, with_value
-from femgear.casefile.profiles import read_profile
+from femgear.case.case import parse_case, planetary_set, read_case, set_deviations, to_toml, with_value
+from femgear.case.tables import read_profile
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.modifications import MeasuredProfile
-from femgear.summary import warnings_of
+from femgear.trains.static.description import warnings_of
 
 TEXT = (Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")
 UM = 1e-6

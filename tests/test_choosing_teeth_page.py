@@ -30,13 +30,10 @@ def test_frequencies_in_the_prose_are_those_of_the_example(outputs):
 def test_table_of_the_eight_cases_is_computed():
     """Tooth numbers, class, closure, kinds of the four harmonics and peaks of the printed table."""
     import numpy as np
+    from validation.helical import TABLE_2, cases, kahraman_set
 
-    from femgear.gears.phasing import phase_factors
-    from femgear.gears.phasing_tables import phasing_table
-    from femgear.models.helical import helical_system
-    from femgear.models.helical_modes import helical_modes
-    from femgear.models.helical_response import modal_error_response
-    from femgear.validation.helical import TABLE_2, cases, kahraman_set
+    from femgear.gears.phasing import phase_factors, phasing_table
+    from femgear.trains.helical.model import helical_modes, helical_system, modal_error_response
 
     data, hertz = kahraman_set(), np.arange(5000.0, 15000.0, 5.0)
     system, modes = helical_system(data), helical_modes(data, damping_ratio=0.005)

@@ -11,11 +11,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from femgear import cli
-from femgear import run as run_module
-from femgear.case import parse_case, with_value
+from femgear import cli, run
+from femgear.case.case import parse_case, with_value
 from femgear.errors import ConvergenceError
-from femgear.storage import finish, open_results, write_dataset, write_text
+from femgear.storage.files import write_dataset, write_text
+from femgear.storage.results import finish, open_results
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -271,7 +271,7 @@ def fake_run(case, out, *, only=None, pictures=True, progress=None):
 @pytest.fixture
 def pipeline(monkeypatch):
     def use(function):
-        monkeypatch.setattr(run_module, "run_case", function, raising=False)
+        monkeypatch.setattr(run, "run_case", function, raising=False)
 
     use(fake_run)
     return use
@@ -364,8 +364,8 @@ def test_an_interrupted_run_says_how_far_it_came(tmp_path, capsys, monkeypatch):
             dataset[name].attrs |= {"units": "1", "long_name": str(name)}
         return SimpleNamespace(dataset=lambda: dataset)
 
-    monkeypatch.setattr(run_module, "_compute", compute)
-    monkeypatch.setattr(run_module, "_convergence", lambda *_: {})
+    monkeypatch.setattr(run, "_compute", compute)
+    monkeypatch.setattr(run, "_convergence", lambda *_: {})
     out = tmp_path / "out"
     assert cli.main(["run", str(CASE), "-o", str(out)]) == 130
     assert cli.main(["report", str(out)]) == 4

@@ -6,23 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear import planetary_set, read_case
+from femgear.case.case import planetary_set, read_case
 from femgear.contact.supports import RIGID, Supports
-from femgear.design import (
-    SharingModel,
-    harris_map,
-    optimise_relief,
-    pin_samples,
-    relief_grid,
-    relief_starts,
-    sharing_model,
-    sharing_of_samples,
-    walked_shares,
-    with_tip_relief,
-)
-from femgear.design.basis import design_basis, relief_snippet, sun_torque
 from femgear.errors import CaseError, ContactError
-from femgear.gears.deviations import form_deviation
+from femgear.gears.modifications import form_deviation
+from femgear.study.linearised import design_basis, relief_snippet, sun_torque
+from femgear.study.relief import harris_map, optimise_relief, relief_grid, relief_starts, with_tip_relief
+from femgear.study.sharing import SharingModel, pin_samples, sharing_model, sharing_of_samples, walked_shares
 
 CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
 TORQUE = 100.0
@@ -32,7 +22,7 @@ ALPHA = math.radians(24.6)
 
 @pytest.fixture(scope="module")
 def basis():
-    from femgear import with_value
+    from femgear.case.case import with_value
 
     return design_basis(with_value(read_case(CASE), "static.flank_elements", 12))
 
@@ -193,7 +183,7 @@ def test_the_optimum_is_far_under_the_unmodified_pair_and_the_map_has_its_minimu
 
 def test_the_slopes_of_the_optimum_are_those_of_single_mesh_cycles(basis):
     """Same peaks as mesh cycles with the reliefs beside it; a search cut short says it is no minimum."""
-    from femgear.design import two_pair_length
+    from femgear.study.relief import two_pair_length
 
     gears, bodies = basis.gears, basis.bodies
     grid = relief_grid(
@@ -215,7 +205,7 @@ def test_the_slopes_of_the_optimum_are_those_of_single_mesh_cycles(basis):
 
 
 def test_the_optimum_is_marked_under_its_torque_alone():
-    from femgear.plots.design import relief_contours
+    from femgear.study.figures import relief_contours
 
     amounts, lengths = np.array([2e-6, 4e-6, 6e-6]), np.array([0.4, 0.8, 1.2])
     ratios = np.array([np.full((3, 3), 0.8), [[0.9, 0.6, 0.1], [0.7, 0.5, 0.4], [0.9, 0.8, 0.7]]])
@@ -239,7 +229,7 @@ def test_a_map_of_negative_torques_is_that_of_positive_ones(basis):
 
 
 def test_the_tables_for_the_case_file_mean_the_same_relief(basis, tmp_path):
-    from femgear.case import set_deviations
+    from femgear.case.case import set_deviations
 
     gears = basis.gears
     text = relief_snippet(gears, amount=4e-6, length=0.9, power=2.0, back=False)
@@ -257,8 +247,8 @@ def test_the_tables_for_the_case_file_mean_the_same_relief(basis, tmp_path):
 
 
 def test_supports_are_those_of_the_static_stage():
-    from femgear import with_value
-    from femgear.design.basis import case_supports
+    from femgear.case.case import with_value
+    from femgear.study.linearised import case_supports
 
     case = with_value(read_case(CASE), "planet.bearing_clearance", "3 um")
     assert case_supports(case) == Supports(sun=5e7, carrier=2e8, planet=3e8, planet_clearance=3e-6)

@@ -7,28 +7,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear import read_case, with_value
-from femgear.contact.mirrored import walk_either_flank
+from femgear.case.case import read_case, with_value
+from femgear.contact.cycle import walk_either_flank
 from femgear.contact.supports import RIGID, Supports
-from femgear.design import pin_samples, sharing_model, sharing_of_samples, with_tip_relief
-from femgear.design.basis import design_basis
-from femgear.design.derivatives import (
+from femgear.errors import CaseError
+from femgear.gears.deviations import no_deviations
+from femgear.gears.modifications import FlankForm, MeasuredProfile
+from femgear.study.linearised import design_basis
+from femgear.study.relief import (
+    pin_error,
+    relief_amount,
+    relief_length,
+    tooth_pitch_error,
+    two_pair_length,
+    with_tip_relief,
+)
+from femgear.study.sensitivity import (
     linearise,
     peak_to_peak_slopes,
     pin_sensitivities,
     sensitivity,
     sharing_factor_slopes,
 )
-from femgear.design.parameters import (
-    pin_error,
-    relief_amount,
-    relief_length,
-    tooth_pitch_error,
-    two_pair_length,
-)
-from femgear.errors import CaseError
-from femgear.gears.deviations import no_deviations
-from femgear.gears.modifications import FlankForm, MeasuredProfile
+from femgear.study.sharing import pin_samples, sharing_model, sharing_of_samples
 
 CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
 TORQUE = 100.0
@@ -122,7 +123,7 @@ def test_pitch_error_of_a_tooth_of_the_ring(basis):
 
 
 def test_a_pitch_error_is_that_of_the_case_file(basis):
-    from femgear.case import set_deviations
+    from femgear.case.case import set_deviations
 
     gears = basis.gears
     for gear, teeth, attributes in (

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear import planetary_set
-from femgear.case import parse_case, set_deviations
+from femgear.case.case import parse_case, planetary_set, set_deviations
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "drawing_to_ste.md").read_text(encoding="utf-8")

@@ -95,8 +95,8 @@ def heavy_after(code: str) -> set[str]:
     "code",
     [
         "import femgear",
-        "import femgear.case",
-        "import femgear.storage",
+        "import femgear.case.case",
+        "import femgear.storage.results",
         "from femgear.cli import main; main(['--help'])",
         "from femgear.cli import main; main(['--version'])",
     ],

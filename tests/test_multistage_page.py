@@ -31,7 +31,7 @@ def test_named_modules_exist():
 
 
 def test_range_of_mesh_stiffness_is_that_of_the_example():
-    from femgear.models.multistage_example import four_stage_train
+    from published.multistage_example import four_stage_train
 
     stiffness = [k for stage in four_stage_train().stages for k in stage.data.mesh_stiffness]
     low, high = (float(one) * 1e3 for one in re.findall(r"example have (\S+) to (\S+) N/mm", PAGE)[0])
@@ -40,9 +40,9 @@ def test_range_of_mesh_stiffness_is_that_of_the_example():
 
 def test_table_of_readings_is_what_the_published_data_give():
     import numpy as np
+    from published.multistage_example import published_train
 
-    from femgear.models.multistage_example import published_train
-    from femgear.models.multistage_modes import multistage_modes
+    from femgear.trains.multistage.stages import multistage_modes
 
     rows = re.findall(
         r"^\|[^|]*\| ([34]) \| (free|held) \| (\d) \| (\S+) \| (\S+) \|", PAGE, flags=re.MULTILINE
@@ -58,7 +58,7 @@ def test_table_of_readings_is_what_the_published_data_give():
 
 
 def test_page_prints_the_published_table():
-    from femgear.models.multistage_example import PUBLISHED
+    from published.multistage_example import PUBLISHED
 
     table = PAGE[PAGE.index("## A published table") : PAGE.index("`published_train` takes")]
     for values in PUBLISHED.values():

@@ -11,27 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear import planetary_set, read_case, with_value
+from femgear.case.case import planetary_set, read_case, with_value, with_values
 from femgear.errors import CaseError, ConvergenceError, StorageError
-from femgear.optimisation import (
-    Limit,
-    Problem,
-    Variable,
-    contact_ratio,
-    minimise,
-    pareto_front,
-    parse_over,
-    sweep,
-    sweep_into,
-    tip_thickness,
-    transmission_error,
-    with_values,
-)
-from femgear.optimisation.designs import Designs, Failure, open_designs
-from femgear.optimisation.journal import Journal
-from femgear.optimisation.minimax import _linear_program
-from femgear.optimisation.objectives import NUMBER, Quantity
-from femgear.optimisation.pareto import non_dominated
+from femgear.study.minimax import _linear_program
+from femgear.study.objectives import NUMBER, Quantity, contact_ratio, tip_thickness, transmission_error
+from femgear.study.problem import Designs, Failure, Limit, Problem, open_designs
+from femgear.study.search import minimise, non_dominated, pareto_front
+from femgear.study.sweep import parse_over, sweep, sweep_into
+from femgear.study.variables import Variable
+from femgear.study.variants import Journal
 
 CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
 # entries without consequences for the gears: numbers from 0 to 1 and masses
@@ -88,7 +76,7 @@ def test_a_limit_of_the_gears_is_met_exactly(case):
 
     from scipy.optimize import brentq
 
-    from femgear.gears import tooth_thickness
+    from femgear.gears.gear import tooth_thickness
 
     free = with_values(case, {"sun.profile_shift": None, "ring.profile_shift": None})
     shift, limit = Variable("planet.profile_shift", -0.05, 0.25), Limit(tip_thickness("planet"), low=0.72)
@@ -129,7 +117,7 @@ def grids(tmp_path_factory):
 @pytest.fixture(scope="module")
 def relief_problem(case):
     """One amount for the tips of sun and planets, starting at single-pair contact; coarse."""
-    from femgear.design import relief_starts
+    from femgear.study.relief import relief_starts
 
     gears = planetary_set(case)
     starts = relief_starts(gears, length=1.0)
@@ -155,8 +143,8 @@ def relief_problem(case):
 @pytest.mark.slow
 def test_descents_find_the_relief_that_a_scan_finds(relief_problem, grids, tmp_path):
     """Against whole contact problems of `harris_map`, which knows nothing of variants and journals."""
-    from femgear.design import harris_map, with_tip_relief
-    from femgear.design.basis import design_basis
+    from femgear.study.linearised import design_basis
+    from femgear.study.relief import harris_map, with_tip_relief
 
     options = {"samples": 1, "starts": 1, "journal": tmp_path / "journal.jsonl", "cache": grids}
     found = minimise(relief_problem, **options)
@@ -180,8 +168,8 @@ def test_descents_find_the_relief_that_a_scan_finds(relief_problem, grids, tmp_p
 
 
 def test_derivatives_are_differences(relief_problem, grids):
-    from femgear.optimisation.minimax import has_derivatives, signals
-    from femgear.optimisation.problem import evaluations
+    from femgear.study.minimax import has_derivatives, signals
+    from femgear.study.problem import evaluations
 
     assert has_derivatives(relief_problem)
     with evaluations(relief_problem, cache=grids) as run:
@@ -195,8 +183,8 @@ def test_derivatives_are_differences(relief_problem, grids):
 def test_what_has_no_derivatives(case, relief_problem):
     from dataclasses import replace
 
-    from femgear.optimisation import mesh_force
-    from femgear.optimisation.minimax import has_derivatives
+    from femgear.study.minimax import has_derivatives
+    from femgear.study.objectives import mesh_force
 
     force = mesh_force("1000 rpm", "2000 rpm")
     assert not has_derivatives(replace(relief_problem, objective=force))
@@ -435,7 +423,7 @@ def test_thousands_of_cases_say_how_long_they_take(case, capsys):
     quick = function("x", lambda x, y: x)
     over = {"dynamics.damping_ratio": [0.01 * n for n in range(1, 9)], "carrier.mass": ["1 kg"]}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys.modules["femgear.optimisation.sweep"], "MANY", 8)
+        patch.setattr(sys.modules["femgear.study.sweep"], "MANY", 8)
         sweep(case, over, [quick])
     assert "[W-SWEEP] 5 more cases of about" in capsys.readouterr().err
     sweep(case, over, [quick])

@@ -5,25 +5,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear import planetary_set, read_case, solve_dynamics, solve_housing, solve_modes, solve_static
-from femgear.casefile.units import SPEED
+from femgear.case.case import planetary_set, read_case, with_values
+from femgear.case.units import SPEED
 from femgear.errors import CaseError
-from femgear.optimisation import (
+from femgear.study.names import named_quantity, parse_limit, parse_variable, tip_reliefs
+from femgear.study.objectives import (
     contact_pressure,
     contact_ratio,
+    forces_over_time,
     housing_level,
     mesh_force,
-    named_quantity,
-    parse_limit,
-    parse_variable,
     root_stress,
     tip_thickness,
     transmission_error,
-    with_values,
 )
-from femgear.optimisation.objectives import forces_over_time
-from femgear.optimisation.reliefs import tip_reliefs
-from femgear.optimisation.variants import Shared, Variant, at_speeds
+from femgear.study.variants import Shared, Variant, at_speeds
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.static.stages import solve_static
 
 CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
 RANGE = (1000.0 * SPEED.scale, 3500.0 * SPEED.scale, 6)
@@ -75,7 +73,7 @@ def test_variants_are_what_the_pipeline_computes(reused, whole):
 
 
 def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
-    from femgear import solve_stress
+    from femgear.trains.static.stages import solve_stress
 
     variant, (case, static, dynamics, housing) = reused[1], whole
     data, forces = static.dataset(), dynamics.dataset()
@@ -124,7 +122,7 @@ def test_dynamic_part_and_peak_of_a_force():
 
 
 def test_other_geometry_gets_grids_and_models_of_its_own(coarse):
-    from femgear.optimisation.variants import grid_key, model_key
+    from femgear.study.variants import grid_key, model_key
 
     def keys(**changes):
         case = with_values(coarse, {k.replace("__", "."): v for k, v in changes.items()})

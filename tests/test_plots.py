@@ -11,10 +11,12 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.ndimage import maximum_filter1d
 
-from femgear import plots
 from femgear.errors import StorageError
-from femgear.plots.sensor import _highest
-from femgear.plots.style import COLOURS, distinct_lines
+from femgear.report import style
+from femgear.report.style import COLOURS, distinct_lines
+from femgear.trains.elastic import figures as elastic_figures
+from femgear.trains.elastic.figures import _highest
+from femgear.trains.static import figures as static_figures
 
 _HERE = Path(__file__).parent
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -30,24 +32,26 @@ def all_figures():
     gears = synthetic.planetary_set()
     unequal = synthetic.static(defect=0.2)
     return {
-        "ste": plots.static_transmission_error(static),
-        "ste unequal": plots.static_transmission_error(unequal),
-        "stiffness": plots.mesh_stiffness(static, face_width=synthetic.FACE_WIDTH),
-        "sharing": plots.load_sharing(static),
-        "sharing unequal": plots.load_sharing(unequal),
-        "teeth": plots.tooth_loads(static),
-        "shapes": plots.mode_shapes(modes, gears),
-        "frequencies": plots.natural_frequencies(modes, mesh_frequencies=[("mesh at 250 rpm", 90.0)]),
-        "dte": plots.transmission_error_period(dynamics, static),
-        "dte of four speeds": plots.transmission_error_period(
+        "ste": static_figures.static_transmission_error(static),
+        "ste unequal": static_figures.static_transmission_error(unequal),
+        "stiffness": static_figures.mesh_stiffness(static, face_width=synthetic.FACE_WIDTH),
+        "sharing": static_figures.load_sharing(static),
+        "sharing unequal": static_figures.load_sharing(unequal),
+        "teeth": static_figures.tooth_loads(static),
+        "shapes": elastic_figures.mode_shapes(modes, gears),
+        "frequencies": elastic_figures.natural_frequencies(
+            modes, mesh_frequencies=[("mesh at 250 rpm", 90.0)]
+        ),
+        "dte": elastic_figures.transmission_error_period(dynamics, static),
+        "dte of four speeds": elastic_figures.transmission_error_period(
             synthetic.dynamics(speeds=np.arange(500, 3000, 500))
         ),
-        "dte spectrum": plots.transmission_error_spectrum(dynamics),
-        "sweep": plots.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
-        "deflection": plots.ring_mean_deflection(dynamics, gears),
-        "signal": plots.housing_signal(housing, speed_index=1, ring_teeth=TEETH),
-        "orders": plots.order_spectrum(housing, speed_index=1, ring_teeth=TEETH),
-        "modulation": plots.modulation_polar(housing, speed_index=1, ring_teeth=TEETH),
+        "dte spectrum": elastic_figures.transmission_error_spectrum(dynamics),
+        "sweep": elastic_figures.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
+        "deflection": elastic_figures.ring_mean_deflection(dynamics, gears),
+        "signal": elastic_figures.housing_signal(housing, speed_index=1, ring_teeth=TEETH),
+        "orders": elastic_figures.order_spectrum(housing, speed_index=1, ring_teeth=TEETH),
+        "modulation": elastic_figures.modulation_polar(housing, speed_index=1, ring_teeth=TEETH),
     }
 
 
@@ -65,7 +69,7 @@ def drawn(figure):
 
 def test_every_figure_is_a_picture(figures):
     for name, figure in figures.items():
-        data = plots.png_bytes(figure)
+        data = style.png_bytes(figure)
         assert data.startswith(b"\x89PNG"), name
         assert 10_000 < len(data) < 600_000, name
 
@@ -168,7 +172,7 @@ def test_ring_deflection_of_two_nodal_diameters():
         dynamics[f"ring_{part}"].values[:] = 0
     n = dynamics["circumferential"].values
     dynamics["ring_real"].values[0, 0, np.abs(n) == 2] = 1e-6
-    figure = plots.ring_mean_deflection(dynamics, synthetic.planetary_set())
+    figure = elastic_figures.ring_mean_deflection(dynamics, synthetic.planetary_set())
     line = line_of(figure, "outer surface, outwards positive")
     np.testing.assert_allclose(line.get_ydata(), 2 * np.cos(2 * line.get_xdata()), atol=1e-12)
 
@@ -176,7 +180,7 @@ def test_ring_deflection_of_two_nodal_diameters():
 def test_ring_mode_of_three_nodal_diameters():
     modes = synthetic.modes()
     mode = int(np.flatnonzero(modes["nodal_diameter"].values == 3)[0])
-    figure = plots.mode_shapes(modes, synthetic.planetary_set(), shown=[mode], scale=0.1)
+    figure = elastic_figures.mode_shapes(modes, synthetic.planetary_set(), shown=[mode], scale=0.1)
     x, y = line_of(figure, "ring, outer surface").get_data()
     angle = np.arctan2(y, x)
     np.testing.assert_allclose(np.hypot(x, y), 0.1 * (1 + 0.1 * np.cos(3 * angle)), rtol=1e-12)
@@ -201,7 +205,7 @@ def modulated(depth: float, lobes: int):
 
 
 def test_polar_modulation_of_an_amplitude_modulated_signal():
-    figure = plots.modulation_polar(modulated(0.8, 4), ring_teeth=TEETH)
+    figure = elastic_figures.modulation_polar(modulated(0.8, 4), ring_teeth=TEETH)
     ax = figure.axes[1]
     assert "mesh harmonic 5: 4 lobes" in ax.get_title()
     line = ax.get_lines()[0]
@@ -209,7 +213,7 @@ def test_polar_modulation_of_an_amplitude_modulated_signal():
 
 
 def test_envelope_of_the_housing_signal():
-    figure = plots.housing_signal(modulated(0.5, 6), ring_teeth=TEETH, harmonics=[5])
+    figure = elastic_figures.housing_signal(modulated(0.5, 6), ring_teeth=TEETH, harmonics=[5])
     line = line_of(figure, "envelope")
     angle = 2 * np.pi * line.get_xdata()
     np.testing.assert_allclose(line.get_ydata(), 1 + 0.5 * np.cos(6 * angle), atol=1e-9)
@@ -219,7 +223,7 @@ def test_envelope_of_the_housing_signal():
 def test_sweep_marks_speeds_without_convergence():
     dynamics = synthetic.dynamics(speeds=np.linspace(100, 6000, 30))
     dynamics["converged"].values[[3, 7]] = False
-    line = line_of(plots.speed_sweep(dynamics), "not converged")
+    line = line_of(elastic_figures.speed_sweep(dynamics), "not converged")
     np.testing.assert_allclose(line.get_xdata(), dynamics["speed"].values[[3, 7]])
 
 
@@ -246,13 +250,13 @@ def test_colours_differ_for_deuteranopes():
 
 
 def test_a_figure_is_written_whole_or_not_at_all(tmp_path):
-    figure = plots.load_sharing(synthetic.static())
-    plots.save_figure(figure, tmp_path / "a.png")
-    plots.save_figure(figure, tmp_path / "b.png")
+    figure = static_figures.load_sharing(synthetic.static())
+    style.save_figure(figure, tmp_path / "a.png")
+    style.save_figure(figure, tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
     with pytest.raises(StorageError):
-        plots.save_figure(figure, tmp_path / "missing" / "a.png")
+        style.save_figure(figure, tmp_path / "missing" / "a.png")
 
 
 def test_figures_do_without_pyplot():
@@ -266,20 +270,24 @@ def test_unloaded_set_is_drawn_flat():
     for name in static.data_vars:
         static[name].values[:] = 0.0
     for draw in (
-        plots.static_transmission_error,
-        plots.mesh_stiffness,
-        plots.load_sharing,
-        plots.tooth_loads,
+        static_figures.static_transmission_error,
+        static_figures.mesh_stiffness,
+        static_figures.load_sharing,
+        static_figures.tooth_loads,
     ):
-        assert plots.png_bytes(draw(static)).startswith(b"\x89PNG")
+        assert style.png_bytes(draw(static)).startswith(b"\x89PNG")
 
 
 def test_silent_housing_is_drawn():
     housing = synthetic.housing()
     for name in ("acceleration", "order_amplitude", "order_amplitude_exact"):
         housing[name].values[:] = 0.0
-    for draw in (plots.housing_signal, plots.order_spectrum, plots.modulation_polar):
-        assert plots.png_bytes(draw(housing, ring_teeth=TEETH)).startswith(b"\x89PNG")
+    for draw in (
+        elastic_figures.housing_signal,
+        elastic_figures.order_spectrum,
+        elastic_figures.modulation_polar,
+    ):
+        assert style.png_bytes(draw(housing, ring_teeth=TEETH)).startswith(b"\x89PNG")
 
 
 def shifted(dataset, names):
@@ -314,16 +322,16 @@ def test_meshes_that_differ_have_lines_that_differ(planets):
     static = shifted(
         of_planets(synthetic.static(), planets), ("ste", "mesh_stiffness", "mesh_stiffness_secant")
     )
-    left = plots.static_transmission_error(static).axes[0]
+    left = static_figures.static_transmission_error(static).axes[0]
     assert len(set(looks(left.get_lines()))) == 2 * planets
-    figure = plots.mesh_stiffness(static)
+    figure = static_figures.mesh_stiffness(static)
     assert len(figure.axes) == 2
     drawn = [look for ax in figure.axes for look in looks(ax.get_lines())]
     assert len(set(drawn)) == len(drawn) == 4 * planets
     dynamics = of_planets(synthetic.dynamics(), planets)
     for row in range(2 * planets):
         dynamics["dte_real"].values[:, row] *= 1.0 + 0.05 * row
-    figure = plots.transmission_error_period(dynamics, static)
+    figure = elastic_figures.transmission_error_period(dynamics, static)
     for ax in figure.axes:
         dynamic = [one for one in ax.get_lines() if one.get_linewidth() == 2.0]
         assert len({look[:2] for look in looks(dynamic)}) == len(looks(dynamic)) == planets
@@ -351,7 +359,7 @@ def test_no_line_is_drawn_where_there_is_none(harmonics):
     dynamics = dynamics.drop_dims("harmonic").assign_coords(harmonic=h)
     dynamics["dte_real"] = (("speed", "mesh", "harmonic"), lines.real)
     dynamics["dte_imag"] = (("speed", "mesh", "harmonic"), lines.imag)
-    figure = plots.transmission_error_spectrum(dynamics)
+    figure = elastic_figures.transmission_error_spectrum(dynamics)
     for ax in figure.axes:
         low, high = ax.get_ylim()
         shown = {}
@@ -369,7 +377,7 @@ def test_no_line_is_drawn_where_there_is_none(harmonics):
             assert low < min(y for _, y in drawn_lines) and max(y for _, y in drawn_lines) < high
         left, right = ax.get_xlim()
         assert left < 1 and sun[-1][0] < right < sun[-1][0] + 1
-    assert len(plots.png_bytes(figure)) < 600_000
+    assert len(style.png_bytes(figure)) < 600_000
 
 
 def test_static_curve_has_the_harmonics_of_the_excitation():
@@ -380,7 +388,7 @@ def test_static_curve_has_the_harmonics_of_the_excitation():
     lines = np.fft.rfft(ste)[1:6] / len(ste) * 2.0
     for limit, expected in ((5.5, 5), (1.0, 1)):
         cut = dynamics.assign(excitation_limit=("speed", limit * frequency))
-        figure = plots.transmission_error_period(cut, static)
+        figure = elastic_figures.transmission_error_period(cut, static)
         thin = next(one for one in figure.axes[0].get_lines() if one.get_linewidth() == 0.9)
         tau = thin.get_xdata()
         wave = np.exp(2j * np.pi * np.outer(np.arange(1, expected + 1), tau))
@@ -397,7 +405,7 @@ def test_both_panels_hold_their_tooth_loads():
         static = synthetic.static()
         for name in ("tooth_load", "mesh_force"):
             static[name].values[larger] *= 3.0
-        for ax in plots.tooth_loads(static).axes:
+        for ax in static_figures.tooth_loads(static).axes:
             low, high = ax.get_ylim()
             for line in ax.get_lines():
                 assert low <= np.min(line.get_ydata()) and np.max(line.get_ydata()) < high
@@ -409,13 +417,13 @@ def test_a_tooth_pair_is_followed_through_several_mesh_periods():
     three = one.isel(position=np.tile(np.arange(64), 3)).assign_coords(position=np.arange(192) / 64)
     three.attrs["mesh_periods"] = 3
     three["tooth_load"] = three["tooth_load"] * (1.0 + np.arange(192) // 64)
-    for ax, row in zip(plots.tooth_loads(three).axes, (0, 3)):
+    for ax, row in zip(static_figures.tooth_loads(three).axes, (0, 3)):
         line = ax.get_lines()[0]
         # positions follow one another by 1/64 and the loads of places are those of their own periods
         assert np.diff(line.get_xdata()) == pytest.approx(1 / 64)
         load = one["tooth_load"].values[row] * (1.0 + np.arange(one.sizes["tooth"]) % 3)[:, None]
         assert np.max(line.get_ydata()) == pytest.approx(load.max())
-    ste = plots.static_transmission_error(three).axes[0].get_lines()[0].get_xdata()
+    ste = static_figures.static_transmission_error(three).axes[0].get_lines()[0].get_xdata()
     assert np.all(np.diff(ste) > 0) and ste[-1] == 3.0
 
 
@@ -424,7 +432,9 @@ def test_the_whole_signal_lies_between_its_extremes():
     housing = synthetic.housing()
     wave = housing["acceleration"].values
     wave[:] = np.maximum(wave, 0.2 * wave)
-    signal, high, low, *_ = plots.housing_signal(housing, speed_index=1, ring_teeth=TEETH).axes[0].get_lines()
+    signal, high, low, *_ = (
+        elastic_figures.housing_signal(housing, speed_index=1, ring_teeth=TEETH).axes[0].get_lines()
+    )
     assert np.max(high.get_ydata()) == np.max(wave[1]) and np.min(low.get_ydata()) == np.min(wave[1])
     assert np.all(high.get_ydata()[:-1] >= signal.get_ydata()) and np.all(
         low.get_ydata()[:-1] <= signal.get_ydata()
@@ -440,7 +450,7 @@ def test_spectra_of_hundreds_of_harmonics_stay_legible():
     housing = housing.drop_dims("order").assign_coords(order=order)
     for name in ("order_amplitude", "order_amplitude_exact"):
         housing[name] = (("speed", "order"), lines)
-    figure = plots.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    figure = elastic_figures.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
     renderer = drawn(figure)
     (top,) = figure.axes[0].child_axes
     boxes = [text.get_window_extent(renderer) for text in top.get_xticklabels()]
@@ -465,11 +475,12 @@ def test_order_spectrum_says_what_its_lines_are():
     """Exact lines are called so and drawn once; how far the excitation reaches stands above."""
     housing = synthetic.housing()
     names = [
-        text.get_text() for text in plots.order_spectrum(housing, ring_teeth=TEETH).legends[0].get_texts()
+        text.get_text()
+        for text in elastic_figures.order_spectrum(housing, ring_teeth=TEETH).legends[0].get_texts()
     ]
     assert names == ["Heaviside, linear interpolation", "exact circumferential Fourier"]
     housing["order_amplitude"] = housing["order_amplitude_exact"]
     housing["excitation_limit"] = ("speed", [1080.0, 2500.0])
-    figure = plots.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    figure = elastic_figures.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["exact circumferential Fourier"]
     assert not any(ax.get_lines() for ax in figure.axes) and "excited up to 2.5 kHz" in figure.get_suptitle()

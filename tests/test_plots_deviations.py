@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from femgear.gears import Gear, close_set, equal_planet_angles
-from femgear.gears.deviations import FlankForm, no_deviations
-from femgear.gears.modifications import MeasuredProfile, ProfileSlope, TipRelief
-from femgear.pictures import write_figures
-from femgear.plots import png_bytes
-from femgear.plots.deviations import active_rolls, has_pitches, has_profiles, pitch_chart, profile_chart
+from femgear.gears.deviations import no_deviations
+from femgear.gears.gear import Gear
+from femgear.gears.modifications import FlankForm, MeasuredProfile, ProfileSlope, TipRelief
+from femgear.gears.planetary import close_set, equal_planet_angles
+from femgear.report.draw import write_figures
+from femgear.report.style import png_bytes
+from femgear.trains.static.figures import active_rolls, has_pitches, has_profiles, pitch_chart, profile_chart
 
 ALPHA = math.radians(20.0)
 UM = 1e-6

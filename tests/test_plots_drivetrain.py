@@ -8,13 +8,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from femgear.case import read_case, with_value
-from femgear.pictures_drivetrain import mode_pictures
-from femgear.plots.drivetrain import backlash_forces, over_time, sensitivity, spectra, stiffness_series
-from femgear.plots.drivetrain_panels import band
-from femgear.plots.drivetrain_results import spectrum_figures, transient_figures
-from femgear.plots.style import png_bytes
-from femgear.report_captions import comparisons
+from femgear.case.case import read_case, with_value
+from femgear.report.html import comparisons
+from femgear.report.style import png_bytes
+from femgear.trains.drivetrain.figures import (
+    backlash_forces,
+    band,
+    mode_pictures,
+    over_time,
+    sensitivity,
+    spectra,
+    spectrum_figures,
+    stiffness_series,
+    transient_figures,
+)
 
 CASE = Path(__file__).parents[1] / "cases" / "own_chain.toml"
 
@@ -172,7 +179,7 @@ def test_captions_follow_the_contact():
 def test_picture_of_a_mode(tmp_path):
     import imageio.v3 as iio
 
-    from femgear.scene.drivetrain import ModeView, drivetrain_pictures
+    from femgear.trains.drivetrain.scene import ModeView, drivetrain_pictures
 
     wheels = [((0.0, 0.0, 0.0), 0.3, 0.1, 0), ((0.0, 0.0, 1.0), 0.2, 0.1, 1)]
     centres = np.array([w[0] for w in wheels])
@@ -198,8 +205,8 @@ def test_picture_of_a_mode(tmp_path):
 def test_modes_have_the_numbers_of_the_table(tmp_path, monkeypatch):
     import xarray as xr
 
-    from femgear.models.drivetrain_case import case_model
-    from femgear.scene import drivetrain as scene
+    from femgear.trains.drivetrain import scene
+    from femgear.trains.drivetrain.setup import case_model
 
     model, drawn = case_model(read_case(CASE)), []
     monkeypatch.setattr(scene, "drivetrain_pictures", lambda views, **_: drawn.extend(views))

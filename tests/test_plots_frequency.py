@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.plots import frequency as figures
-from femgear.plots.style import png_bytes
+from femgear.report import frequency as figures
+from femgear.report.style import png_bytes
 
 
 def responses():

@@ -4,14 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.helical import cases, kahraman_set
 
 from femgear.errors import CaseError
-from femgear.models.helical import free_motions, helical_system
-from femgear.models.helical_modes import helical_modes
-from femgear.models.helical_response import modal_error_response, phased_errors
-from femgear.plots import png_bytes
-from femgear.plots.helical import helical_mode_shapes, mesh_force_spectra
-from femgear.validation.helical import cases, kahraman_set
+from femgear.report.style import png_bytes
+from femgear.trains.helical.figures import helical_mode_shapes, mesh_force_spectra
+from femgear.trains.helical.model import (
+    free_motions,
+    helical_modes,
+    helical_system,
+    modal_error_response,
+    phased_errors,
+)
 
 
 def with_shape(data, dof, value):

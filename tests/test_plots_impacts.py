@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.colors import to_hex
 
-from femgear.plots import png_bytes
-from femgear.plots.impacts import (
+from femgear.report.style import png_bytes
+from femgear.trains.gear_pair.figures import (
     STATE_COLOURS,
     amplitude_and_mean,
     bifurcation_and_exponent,

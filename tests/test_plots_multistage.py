@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.plots.multistage import mesh_orders, stage_energy, stage_forces
+from femgear.trains.multistage.figures import mesh_orders, stage_energy, stage_forces
 
 FREQUENCY = np.array([0.0, 10.0, 20.0, 20.0, 30.0])
 KINDS = ("rigid", "rotational", "translational", "translational", "rotational")

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from femgear.gears.phasing import MeshPhasing
-from femgear.gears.phasing_tables import phasing_table
-from femgear.plots.phasing import mesh_force_spectra, phase_diagram, resultant_chart
+from femgear.gears.phasing import MeshPhasing, phasing_table
+from femgear.trains.static.figures import mesh_force_spectra, phase_diagram, resultant_chart
 
 
 def test_hands_of_the_dials_are_the_phases():

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from femgear.plots import png_bytes
-from femgear.plots.planar import (
+from femgear.report.style import png_bytes
+from femgear.trains.planar.figures import (
     bearing_forces,
     contact_map,
     contact_over_frequency,

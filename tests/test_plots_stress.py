@@ -6,15 +6,15 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from femgear.contact.root_stress import RootCycle
-from femgear.datasets_stress import root_stress_dataset
-from femgear.plots.stress import (
+from femgear.report.style import png_bytes
+from femgear.trains.static.figures import (
     contact_pressure,
     load_spectrum,
     planet_bending,
     root_stress_history,
     root_stress_profile,
 )
-from femgear.plots.style import png_bytes
+from femgear.trains.static.results import root_stress_dataset
 
 MESHES = ["sun-planet 1", "sun-planet 2", "planet 1-ring", "planet 2-ring"]
 P = 8

@@ -11,20 +11,14 @@ import numpy as np
 import pytest
 from random_sets import RandomSet, equal_planets, random_set, symmetry
 
-from femgear.analysis import (
-    DynamicsResult,
-    HousingResult,
-    ModesResult,
-    StaticResult,
-    solve_dynamics,
-    solve_housing,
-    solve_modes,
-    solve_static,
-)
-from femgear.case import with_value
-from femgear.gears import torques
-from femgear.housing import OrderSpectrum, symmetry_leakage
-from femgear.solvers.harmonics import harmonics_of, sample
+from femgear.case.case import with_value
+from femgear.gears.kinematics import torques
+from femgear.housing.orders import OrderSpectrum, symmetry_leakage
+from femgear.system.series import harmonics_of, sample
+from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.static.results import StaticResult
+from femgear.trains.static.stages import solve_static
 
 QUICK = range(20)
 SLOW = range(20, 320)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from femgear.casefile.sections import Case
+from femgear.case.sections import Case
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -124,7 +124,8 @@ def test_case_file_page_has_every_section():
 
 def test_results_page_names_every_variable():
     import femgear
-    from femgear.analysis import solve_dynamics, solve_housing, solve_modes, solve_static
+    from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+    from femgear.trains.static.stages import solve_static
 
     case = femgear.read_case(ROOT / "cases" / "planetary_27_40_108.toml")
     case = femgear.with_value(case, "static.flank_elements", 8)

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear import plots
-from femgear.case import read_case, with_value
+from femgear.case.case import read_case, with_value
 from femgear.errors import StorageError
-from femgear.report import write_report
-from femgear.storage import finish, prepare_output, write_dataset, write_text
+from femgear.report import style
+from femgear.report.html import write_report
+from femgear.storage.files import write_dataset, write_text
+from femgear.storage.results import finish, prepare_output
+from femgear.trains.static import figures as static_figures
 
 _HERE = Path(__file__).parent
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -67,8 +69,8 @@ def make_run(folder, *, case=None, stages=("static", "modes", "dynamics", "housi
             change(stage, data)
         write_dataset(data, folder / f"{stage}.nc")
         names.append(f"{stage}.nc")
-    plots.save_figure(plots.load_sharing(synthetic.static()), folder / "load_sharing.png")
-    plots.save_figure(plots.tooth_loads(synthetic.static()), folder / "tooth_loads.png")
+    style.save_figure(static_figures.load_sharing(synthetic.static()), folder / "load_sharing.png")
+    style.save_figure(static_figures.tooth_loads(synthetic.static()), folder / "tooth_loads.png")
     names += ["tooth_loads.png", "load_sharing.png"]
     finish(folder, names, timings={"static": 1.25}, convergence={})
     return folder

@@ -12,29 +12,26 @@ from pydantic import BaseModel
 from scipy.linalg import eigh
 
 from femgear import cli
-from femgear.analysis_drivetrain import (
-    BENDING,
-    TORSIONAL,
+from femgear.case.case import parse_case, read_case, with_value
+from femgear.errors import CaseError, ConvergenceError
+from femgear.report.summary import case_warnings
+from femgear.run import report_again, run_case
+from femgear.storage.results import open_results, run_folder
+from femgear.trains.drivetrain.figures import spectrum_figures
+from femgear.trains.drivetrain.model import balanced_torque
+from femgear.trains.drivetrain.multitone import settled_motion
+from femgear.trains.drivetrain.results import describe_drivetrain, describe_transient
+from femgear.trains.drivetrain.section import DrivetrainCase
+from femgear.trains.drivetrain.setup import BENDING, TORSIONAL, case_model, check_spectrum
+from femgear.trains.drivetrain.spectra import MeshLine, line_amplitudes, mesh_lines, resolved_lines
+from femgear.trains.drivetrain.stages import (
     _check_sense,
-    case_model,
     solve_drivetrain_modes,
     solve_spectrum,
     solve_transient_run,
 )
-from femgear.case import parse_case, read_case, with_value
-from femgear.casefile.drivetrain import DrivetrainCase
-from femgear.errors import CaseError, ConvergenceError
-from femgear.models.drivetrain import balanced_torque
-from femgear.models.drivetrain_balance import settled_motion
-from femgear.models.drivetrain_case import check_spectrum
-from femgear.models.drivetrain_lines import MeshLine, line_amplitudes, mesh_lines, resolved_lines
-from femgear.models.drivetrain_record import Decimator
-from femgear.plots.drivetrain_results import spectrum_figures
-from femgear.run import report_again, run_case
-from femgear.run_stages import stages_of
-from femgear.storage import open_results, run_folder
-from femgear.summary_drivetrain import describe_drivetrain, describe_transient
-from femgear.summary_warnings import case_warnings
+from femgear.trains.drivetrain.time import Decimator
+from femgear.trains.registry import stages_of
 
 ROOT = Path(__file__).parents[1]
 NAMES = ("wind_turbine_drivetrain", "grc_like_drivetrain", "own_chain")

@@ -6,22 +6,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from validation.helical import PHASINGS, TABLE_4
 
 from femgear import cli
-from femgear.analysis_helical import solve_helical_dynamics, solve_helical_modes, solve_helical_static
-from femgear.analysis_helical_section import normal_record, section_stiffness, shared_load
-from femgear.analysis_planar import solve_planar_modes
-from femgear.case import parse_case, planetary_set, read_case, to_toml, with_value
-from femgear.casefile import tomlfile
+from femgear.case import text as case_text
+from femgear.case.case import parse_case, planetary_set, read_case, to_toml, with_value
 from femgear.errors import CaseError
 from femgear.gears.iso6336 import mesh_stiffness_method_b
-from femgear.plots.helical_results import alike_lines, transmission_errors
 from femgear.run import grid_cache, run_case
-from femgear.run_stages import stages_of
-from femgear.storage import open_results, run_folder
-from femgear.summary_helical import describe_helical_static
-from femgear.system import MeshExcitation
-from femgear.validation.helical import PHASINGS, TABLE_4
+from femgear.storage.results import open_results, run_folder
+from femgear.system.system import MeshExcitation
+from femgear.trains.helical.figures import alike_lines, transmission_errors
+from femgear.trains.helical.results import describe_helical_static
+from femgear.trains.helical.stages import solve_helical_dynamics, solve_helical_modes, solve_helical_static
+from femgear.trains.helical.virtual_gears import normal_record, section_stiffness, shared_load
+from femgear.trains.planar.stages import solve_planar_modes
+from femgear.trains.registry import stages_of
 
 ROOT = Path(__file__).parents[1]
 GIVEN = {"sun_planet": "200e6 N/m", "planet_ring": "200e6 N/m"}
@@ -134,17 +134,17 @@ def test_shapes_are_motions_in_space(given):
 
 
 def test_a_vanishing_helix_gives_the_modes_of_the_planar_set(given):
-    data = tomlfile.parse(given.source, "")
+    data = case_text.parse(given.source, "")
     data["helical"] |= {"helix_angle": "0.01 deg", "contact_points": "pitch_point"}
     # normals that point out of the plane by 1e-4 rad strain axial supports
     data["rack"]["root_radius"] = 0.15
-    helical = parse_case(tomlfile.write(data))
+    helical = parse_case(case_text.write(data))
     space = data.pop("helical")
     ring = {key: space["ring"][key] for key in ("mass", "inertia", "support_stiffness")}
     data["planar"] = {
         "ring": ring, "mesh_stiffness": GIVEN, "torsion": {"ring": space["ring"]["torsional_stiffness"]}
     }  # fmt: skip
-    planar = solve_planar_modes(parse_case(tomlfile.write(data))).modes.frequency
+    planar = solve_planar_modes(parse_case(case_text.write(data))).modes.frequency
     found = solve_helical_modes(helical).modes.frequency
     away = np.abs(found[:, None] / np.where(planar > 0.0, planar, 1.0) - 1.0).min(axis=0)
     assert len(planar) == 21 and away[planar > 0.0].max() < 1e-6
@@ -219,12 +219,12 @@ def test_slow_turning_stiffly_held_gears_follow_their_static_transmission_error(
 
 
 def test_a_sun_that_turns_backwards_runs_through_the_record_backwards(coarse, static, modes, again):
-    data = tomlfile.parse(changed(coarse, STIFF).source, "")
+    data = case_text.parse(changed(coarse, STIFF).source, "")
     data["operation"] |= {"input": "ring", "fixed": "sun", "torque": "350 N m", "speeds": ["0.01 rpm"]}
     data["helical"]["sun"].pop("torsional_stiffness")
     data["helical"]["carrier"]["torsional_stiffness"] = "0 N m/rad"
     data["helical"]["ring"]["torsional_stiffness"] = "0 N m/rad"
-    case = parse_case(tomlfile.write(data))
+    case = parse_case(case_text.write(data))
     ours, theirs = again(case, static).dataset(), modes.dataset()
     back = -np.arange(16) % 16
     for name in ("helical_stiffness", "helical_ste"):

@@ -6,31 +6,32 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from published.wind_turbine import bearing_problem_a, gravity_problem_b
+from published.wind_turbine_response import member_rms, resonance, weight_branch
 
 from femgear import cli
-from femgear import run_stages as stages_module
-from femgear.analysis import solve_static
-from femgear.analysis_planar import planar_model, solve_branch, solve_planar_modes, solve_planar_response
-from femgear.case import planetary_set, read_case, to_toml, with_value
+from femgear.case.case import planetary_set, read_case, to_toml, with_value
 from femgear.errors import CaseError, ConvergenceError
-from femgear.models.planar import PlanarTorque, planar_system
-from femgear.models.planar_response import TAIL_LIMIT, judged_branch, merged_folds, motion_lines
-from femgear.models.wind_turbine import bearing_problem_a, gravity_problem_b
-from femgear.models.wind_turbine_response import member_rms, resonance, weight_branch
-from femgear.plots.planar_results import (
+from femgear.report.html import comparisons, doubts
+from femgear.run import run_case
+from femgear.solvers.periodic.solution import open_verdict
+from femgear.solvers.stability.floquet import floquet_verdicts
+from femgear.solvers.time.transient import solve_transient
+from femgear.storage.results import open_results, run_folder
+from femgear.system.assembler import planar_system
+from femgear.system.lumped import PlanarTorque
+from femgear.trains import registry
+from femgear.trains.planar.figures import (
     branch_figures,
     contact_over_branch,
     response_mesh_forces,
     weight_response,
 )
-from femgear.report_captions import comparisons, doubts
-from femgear.run import run_case
-from femgear.run_stages import stages_of
-from femgear.solvers.hill import floquet_verdicts
-from femgear.solvers.transient import solve_transient
-from femgear.solvers.verdict import open_verdict
-from femgear.storage import open_results, run_folder
-from femgear.summary_planar import describe_branch, planar_verdicts, tail_warnings
+from femgear.trains.planar.model import TAIL_LIMIT, judged_branch, merged_folds, motion_lines
+from femgear.trains.planar.results import describe_branch, planar_verdicts, tail_warnings
+from femgear.trains.planar.stages import planar_model, solve_branch, solve_planar_modes, solve_planar_response
+from femgear.trains.registry import stages_of
+from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ("weight_response", "carrier_orbit", "planet_bearing_forces", "tooth_contact", "wedged_teeth")
@@ -198,7 +199,7 @@ def test_an_interrupted_run_keeps_its_finished_stages(tmp_path, pgb, monkeypatch
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    table = stages_module.PLANAR
+    table = registry.PLANAR
     monkeypatch.setitem(table, "branch", replace(table["branch"], compute=interrupt))
     with pytest.raises(KeyboardInterrupt), run_folder(tmp_path / "out") as out:
         run_case(pgb, out, pictures=False)
@@ -352,7 +353,7 @@ def test_a_branch_ends_before_motions_that_are_not_small(pgb):
 
 
 def test_a_response_that_does_not_converge_is_a_numerical_failure(pgb, monkeypatch, tmp_path, capsys):
-    from femgear.solvers import harmonic_balance
+    from femgear.solvers.periodic import harmonic_balance
 
     honest = harmonic_balance.solve_harmonic_balance
 

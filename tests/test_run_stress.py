@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from femgear.analysis import solve_static
-from femgear.analysis_stress import solve_stress
-from femgear.case import planetary_set, read_case, with_value
-from femgear.pictures import write_figures
-from femgear.report import page
+from femgear.case.case import planetary_set, read_case, with_value
+from femgear.report.draw import write_figures
+from femgear.report.html import page
+from femgear.report.summary import describe_results
 from femgear.run import _stages, run_case
-from femgear.storage import open_results, run_folder
-from femgear.summary import describe_results
+from femgear.storage.results import open_results, run_folder
+from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).parents[1]
 ONLY_LONG = {"tooth_root_maximum", "tooth_root_minimum"}
@@ -145,7 +144,7 @@ def test_report_has_the_section_with_its_figures(tmp_path, case, library, result
         f"{name}.png"
         for name in ("root_stress", "root_profile", "contact_pressure", "load_spectrum", "planet_bending")
     }
-    from femgear.report_captions import caption_of
+    from femgear.report.html import caption_of
 
     assert {caption_of(name.removesuffix(".png"))[1] for name in figures} == {"Stresses"}
     text = page(results)

@@ -8,12 +8,12 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from matplotlib.path import Path as Polygon
+from validation.planetary import reference_set
 
-from femgear import scene
 from femgear.errors import CaseError, FemgearError, StorageError
 from femgear.gears.gear import half_thickness_angle
-from femgear.scene import animation, library
-from femgear.validation.planetary import reference_set
+from femgear.report import scene
+from femgear.report import scene as report_scene
 
 _HERE = Path(__file__).parent
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -136,8 +136,8 @@ def test_picture_of_a_deformed_grid(tmp_path):
 
 
 def test_missing_opengl_library_is_named(monkeypatch):
-    monkeypatch.setattr(library.sys, "platform", "linux")
-    monkeypatch.setattr(library, "_loads", lambda name: False)
+    monkeypatch.setattr(report_scene.sys, "platform", "linux")
+    monkeypatch.setattr(report_scene, "_loads", lambda name: False)
     with pytest.raises(FemgearError, match=r"libEGL\.so\.1") as caught:
         scene.load_pyvista()
     assert caught.value.code == "E-SYSTEM-LIBRARY"
@@ -156,7 +156,7 @@ def test_stroboscope_shows_the_mesh_in_slow_motion(teeth, wished):
 def field_of(h, n, value, *, turn=1.0):
     radial = np.zeros((7, 9), complex)
     radial[h, 4 + n] = value
-    return animation._Field(radial, 0 * radial, turn, 108, True)
+    return report_scene._Field(radial, 0 * radial, turn, 108, True)
 
 
 @pytest.mark.parametrize("turn", [1.0, -1.0])
@@ -176,7 +176,7 @@ def test_a_fixed_point_hears_order_h_z_minus_n(h, n, turn):
 def test_field_is_the_double_sum():
     rng = np.random.default_rng(4)
     radial, tangential = rng.normal(size=(2, 4, 7)) + 1j * rng.normal(size=(2, 4, 7))
-    field = animation._Field(radial, tangential, 1.0, 36, False)
+    field = report_scene._Field(radial, tangential, 1.0, 36, False)
     phi_world, carrier = 1.1, 0.7
     for component, got in zip((radial, tangential), field.at(np.array([phi_world]), carrier)):
         expected = sum(
@@ -195,7 +195,7 @@ def gears():
 def test_drawn_teeth_are_the_exact_ones(gears):
     """Tip and root circles, and between them involute flanks of the right thickness."""
     for gear in (gears.sun, gears.planet, gears.ring):
-        outline = animation.gear_outline(gear)
+        outline = report_scene.gear_outline(gear)
         radius, angle = np.abs(outline), np.angle(outline)
         ends = sorted((gear.tip_radius, gear.root_radius))
         assert [radius.min(), radius.max()] == pytest.approx(ends, rel=1e-9)
@@ -211,20 +211,20 @@ def test_drawn_teeth_are_the_exact_ones(gears):
 
 @pytest.mark.parametrize("carrier", [0.0, 0.123, 2.9])
 def test_drawn_teeth_mesh_and_do_not_cross(gears, carrier):
-    (sun, sun_turn), *planets = animation._places(gears, carrier)
-    ring = animation._ring_corners(gears)[:, 0]
+    (sun, sun_turn), *planets = report_scene._places(gears, carrier)
+    ring = report_scene._ring_corners(gears)[:, 0]
 
     def inside(points, polygon):
         return Polygon(np.column_stack([polygon.real, polygon.imag])).contains_points(
             np.column_stack([points.real, points.imag]), radius=0.0
         )
 
-    sun = sun + animation.gear_outline(gears.sun) * np.exp(1j * sun_turn)
+    sun = sun + report_scene.gear_outline(gears.sun) * np.exp(1j * sun_turn)
     assert len(planets) == 3
     for n, (centre, turn) in enumerate(planets):
         at = gears.planet_angles[n] + carrier
         assert centre == pytest.approx(gears.centre_distance * np.exp(1j * at), rel=1e-12)
-        planet = centre + animation.gear_outline(gears.planet) * np.exp(1j * turn)
+        planet = centre + report_scene.gear_outline(gears.planet) * np.exp(1j * turn)
         # smaller by 10 um, less than a hundredth of a module: chords between points cut into round flanks
         shrunk = centre + (planet - centre) * (1.0 - 10e-6 / gears.planet.tip_radius)
         smaller = sun * (1.0 - 10e-6 / gears.sun.tip_radius)

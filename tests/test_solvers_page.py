@@ -69,12 +69,12 @@ def test_named_functions_exist():
 
 
 def test_options_that_the_page_names_exist():
-    from femgear.solvers.branches import Branch, frequency_response_curve
-    from femgear.solvers.hill import FloquetVerdict, floquet_verdict
-    from femgear.solvers.periodic import PeriodicSolution
-    from femgear.solvers.periodic_response import PeriodicResponse
-    from femgear.solvers.shooting import solve_shooting
-    from femgear.solvers.transient import METHODS, solve_transient
+    from femgear.solvers.continuation.branches import Branch, frequency_response_curve
+    from femgear.solvers.periodic.harmonic_balance import PeriodicResponse
+    from femgear.solvers.periodic.shooting import solve_shooting
+    from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
+    from femgear.solvers.stability.floquet import floquet_verdict
+    from femgear.solvers.time.transient import METHODS, solve_transient
 
     def options(function):
         return set(inspect.signature(function).parameters)

@@ -12,23 +12,21 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from femgear import files
 from femgear.errors import StorageError
-from femgear.storage import (
+from femgear.storage import files
+from femgear.storage.files import read_dataset, write_dataset, write_text
+from femgear.storage.results import (
     MANIFEST,
     Manifest,
     finish,
     folder_lock,
     open_results,
     prepare_output,
-    read_dataset,
     read_manifest,
     record,
     run_folder,
     verify,
-    write_dataset,
     write_manifest,
-    write_text,
 )
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
@@ -426,7 +424,7 @@ def test_two_runs_cannot_write_into_one_folder(tmp_path):
 
 def test_the_lock_of_a_killed_process_is_free(tmp_path):
     code = (
-        "import os, sys\nfrom femgear.files import exclusive_lock\n"
+        "import os, sys\nfrom femgear.storage.files import exclusive_lock\n"
         "with exclusive_lock(sys.argv[1]):\n    print('held', flush=True)\n    sys.stdin.read()\n"
     )
     command = [sys.executable, "-c", code, str(tmp_path / ".lock")]

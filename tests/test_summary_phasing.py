@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case import planetary_set, read_case, with_value
-from femgear.summary_phasing import describe_phasing
+from femgear.case.case import planetary_set, read_case, with_value
+from femgear.trains.static.description import describe_phasing
 
 CASES = Path(__file__).resolve().parents[1] / "cases"
 

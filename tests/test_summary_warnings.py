@@ -7,12 +7,10 @@ import pytest
 import xarray as xr
 
 from femgear import cli
-from femgear.case import read_case, with_value
-from femgear.storage import open_results
-from femgear.summary import describe
-from femgear.summary_drivetrain import describe_transient
-from femgear.summary_transient import transient_warnings
-from femgear.summary_warnings import case_warnings, result_warnings
+from femgear.case.case import read_case, with_value
+from femgear.report.summary import case_warnings, describe, result_warnings
+from femgear.storage.results import open_results
+from femgear.trains.drivetrain.results import describe_transient, transient_warnings
 
 CASES = Path(__file__).parents[1] / "cases"
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case import parse_case, read_case
-from femgear.casefile.torque_series import read_torques
+from femgear.case.case import parse_case, read_case
 from femgear.errors import CaseError
+from femgear.trains.drivetrain.section import read_torques
 
 OWN = Path(__file__).parents[1] / "cases" / "own_chain.toml"
 

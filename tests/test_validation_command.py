@@ -4,13 +4,13 @@ import re
 from pathlib import Path
 
 import pytest
+from validation import themes as validation_themes
+from validation.page import markdown, summary, write_page
+from validation.rows import at_most, counted, information, printed, within
+from validation.run import Theme, run_validation
 
 from femgear.cli import main
 from femgear.errors import GridError, StorageError
-from femgear.validation import themes as registry
-from femgear.validation.page import markdown, summary, write_page
-from femgear.validation.rows import at_most, counted, information, printed, within
-from femgear.validation.run import Theme, run_validation
 
 
 def validation(*rows, quick=False):
@@ -98,7 +98,7 @@ def test_progress_counts_the_parts():
 
 @pytest.mark.parametrize(("row", "code"), [(GOOD, 0), (BAD, 3)])
 def test_exit_code_and_page_of_the_command(tmp_path, monkeypatch, capsys, row, code):
-    monkeypatch.setattr(registry, "THEMES", (Theme("sample", "Sample", "", (lambda: (row,),)),))
+    monkeypatch.setattr(validation_themes, "THEMES", (Theme("sample", "Sample", "", (lambda: (row,),)),))
     page = tmp_path / "new" / "validation.md"
     assert main(["validate", "-o", str(page)]) == code
     assert row.quantity in page.read_text(encoding="utf-8")
@@ -112,7 +112,7 @@ def test_one_theme_prints_its_rows_and_writes_no_page(tmp_path, monkeypatch, cap
     themes = tuple(
         Theme(name, name, "", (lambda row=row: (row,),)) for name, row in (("a", GOOD), ("b", BAD))
     )
-    monkeypatch.setattr(registry, "THEMES", themes)
+    monkeypatch.setattr(validation_themes, "THEMES", themes)
     assert main(["validate", "--theme", "a"]) == 0
     out = capsys.readouterr().out
     assert f"passes {GOOD.case}: {GOOD.quantity}" in out and BAD.quantity not in out
@@ -131,8 +131,8 @@ def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path):
     assert blocked.read_text() == "old"
 
 
-PARTS = [(theme, part) for theme in registry.THEMES for part in theme.parts]
-SLOW = [(theme, part) for theme in registry.THEMES for part in theme.slow_parts]
+PARTS = [(theme, part) for theme in validation_themes.THEMES for part in theme.parts]
+SLOW = [(theme, part) for theme in validation_themes.THEMES for part in theme.slow_parts]
 
 
 def _name(value):
@@ -160,4 +160,4 @@ def test_slow_rows_pass(theme, part):
 def test_the_page_in_the_repository_belongs_to_these_themes():
     page = Path(__file__).parents[1] / "docs" / "validation.md"
     titles = re.findall(r"^## (.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    assert titles == [theme.title for theme in registry.THEMES]
+    assert titles == [theme.title for theme in validation_themes.THEMES]

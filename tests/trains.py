@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.models.multistage_data import Stage, in_series
-from femgear.models.planar_data import PlanarBody, PlanarSet
+from femgear.system.lumped import PlanarBody, PlanarSet
+from femgear.trains.multistage.model import Stage, in_series
 
 EVEN = 2.0 * np.pi * np.arange(3) / 3
 

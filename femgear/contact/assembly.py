@@ -13,19 +13,20 @@ from femgear.contact.candidates import (
     cell_centres,
     cell_edges,
     flank_pair,
+    pair_separations,
+    profile_form,
     window_polynomials,
     windows,
 )
-from femgear.contact.flank_sides import BACK, DRIVE, flank_side, side_teeth
 from femgear.contact.flanks import LEFT, RIGHT, FlankCompliance, station_weights
 from femgear.contact.halfplane import hertz_line, surface_displacement
-from femgear.contact.separations import pair_separations, profile_form
+from femgear.contact.sides import BACK, DRIVE, flank_side, side_teeth
 
 if TYPE_CHECKING:
     from femgear.contact.supports import MovingMembers
     from femgear.fe.elasticity import Material
-    from femgear.gears import PlanetarySet
     from femgear.gears.deviations import SetDeviations
+    from femgear.gears.planetary import PlanetarySet
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from femgear.contact.solve import ContactState, solve_contact
 if TYPE_CHECKING:
     from femgear.contact.assembly import ContactProblem
     from femgear.contact.supports import MovingMembers, Supports
-    from femgear.gears import PlanetarySet
+    from femgear.gears.planetary import PlanetarySet
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from femgear.errors import CaseError
 if TYPE_CHECKING:
     from femgear.fe.compliance import SectorSchur
     from femgear.fe.elasticity import Material
-    from femgear.fe.meshing import Grid
+    from femgear.fe.grid import Grid
     from femgear.fe.stress import BoundaryStress
     from femgear.gears.gear import Gear
 

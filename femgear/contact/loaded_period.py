@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.mirrored import walk_either_flank
+from femgear.contact.cycle import walk_either_flank
 from femgear.contact.supports import RIGID, Supports
 
 if TYPE_CHECKING:
     from femgear.contact.assembly import Bodies
-    from femgear.contact.record import MeshCycle
-    from femgear.gears import PlanetarySet
+    from femgear.contact.cycle import MeshCycle
     from femgear.gears.deviations import SetDeviations
+    from femgear.gears.planetary import PlanetarySet
 
 SHORTEST = 2.0**-13
 """Mesh periods in which a jump is enclosed."""

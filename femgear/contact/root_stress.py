@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
     from femgear.fe.elasticity import Material
     from femgear.fe.grid import Grid
-    from femgear.gears import Gear, PlanetarySet
+    from femgear.gears.gear import Gear
+    from femgear.gears.planetary import PlanetarySet
 
 LOADED, BACK = 0, 1
 

@@ -15,7 +15,7 @@ import numpy as np
 from femgear.errors import ContactError
 
 if TYPE_CHECKING:
-    from femgear.gears import PlanetarySet
+    from femgear.gears.planetary import PlanetarySet
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def moving_members(
     ContactError
         E-MECHANISM: members float that the planets cannot hold.
     """
-    from femgear.gears.floating import unheld_members
+    from femgear.gears.checks import unheld_members
 
     floating = [name for name in ("sun", "carrier", "ring") if getattr(supports, name) == 0.0]
     loose = unheld_members(planetary_set, floating, both_flanks=both_flanks)

@@ -16,36 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from femgear.errors import GridError, StorageError
-from femgear.fe.grid import (
-    Grid,
-    check_grid,
-    copy_nodes,
-    jacobian_bounds,
-    mirror,
-    ordered_nodes,
-    quality,
-    rotated_copies,
-)
-from femgear.fe.grid_files import read_grid, write_grid
-from femgear.fe.outline import Outline, check_outline, estimate_elements
-
-__all__ = [
-    "Grid",
-    "Outline",
-    "check_grid",
-    "check_outline",
-    "copy_nodes",
-    "estimate_elements",
-    "jacobian_bounds",
-    "mesh_outline",
-    "mesh_outlines",
-    "mirror",
-    "ordered_nodes",
-    "quality",
-    "read_grid",
-    "rotated_copies",
-    "write_grid",
-]
+from femgear.fe.grid import Grid, check_grid, read_grid, write_grid
+from femgear.fe.outline import check_outline, estimate_elements
 
 FORMAT = "1"  # raise when the way grids are made changes, so that cached ones are not reused
 WORKER = Path(__file__).with_name("_gmsh_worker.py")

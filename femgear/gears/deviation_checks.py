@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.deviations import (
+from femgear.gears.deviations import body_separation, common_period, profile_separation
+from femgear.gears.gear import GeometryWarning
+from femgear.gears.modifications import (
+    LARGEST_DEVIATION,
     FlankForm,
-    body_separation,
-    common_period,
+    MeasuredProfile,
+    check_form,
     form_deviation,
-    profile_separation,
+    modification_range,
 )
-from femgear.gears.limits import GeometryWarning
-from femgear.gears.modifications import LARGEST_DEVIATION, MeasuredProfile, check_form, modification_range
 
 if TYPE_CHECKING:
     from femgear.gears.deviations import SetDeviations

@@ -13,14 +13,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.gears.involute import arcinv, inv, pressure_angle_at, roll
-
-if TYPE_CHECKING:
-    from femgear.gears.gear import Gear
+from femgear.gears.involute import inv, pressure_angle_at, roll
 
 
 @dataclass(frozen=True)
@@ -98,84 +94,6 @@ class CutterTip:
 def default_cutter(teeth: int) -> PinionCutter:
     """Cutter used when none is named: 30 unshifted teeth, or 12 fewer than the gear's if that is less."""
     return PinionCutter(teeth=max(5, min(30, teeth - 12)))
-
-
-def cutter_of(gear: Gear) -> PinionCutter:
-    """Pinion cutter of an internal gear, its own or the default one."""
-    return gear.cutter if gear.cutter is not None else default_cutter(gear.teeth)
-
-
-def generating_tool(gear: Gear, *, rounding: float | None = None) -> RackTip | CutterTip:
-    """Tool tip that cuts the flank and the root circle of a gear.
-
-    Parameters
-    ----------
-    gear : Gear
-    rounding : float, optional
-        Tip rounding [modules]; None takes that of the gear's rack or cutter.
-
-    Raises
-    ------
-    GeometryError
-        No working pressure angle exists between the gear and its cutter (E-INVOLUTE).
-    """
-    if rounding is None:
-        rounding = gear.rack.root_radius
-        if gear.internal and cutter_of(gear).tip_radius is not None:
-            rounding = cutter_of(gear).tip_radius
-    if gear.internal:
-        return _cutter_tip(gear, cutter_of(gear), rounding * gear.module)
-    return _rack_tip(gear, rounding * gear.module)
-
-
-def _rack_tip(gear: Gear, rounding: float) -> RackTip:
-    """Rack of ISO 53, thickened by the allowance and as deep as the root circle asks; lengths in m."""
-    reference = gear.reference_radius
-    # depth of the rounding's centre under the tool's datum line
-    depth = reference + gear.profile_shift * gear.module - gear.root_radius - rounding
-    half_thickness = 0.25 * math.pi * gear.module + 0.5 * gear.thickness_allowance
-    alpha = gear.pressure_angle
-    return RackTip(
-        pitch_radius=reference,
-        centre_depth=reference - gear.root_radius - rounding,
-        centre_offset=half_thickness - depth * math.tan(alpha) - rounding / math.cos(alpha),
-        rounding=rounding,
-        gap_angle=math.pi / gear.teeth,
-        end_angle=0.5 * math.pi - alpha,
-    )
-
-
-def _cutter_tip(gear: Gear, cutter: PinionCutter, rounding: float) -> CutterTip:
-    """Cutter at the centre distance that leaves it no play in the finished gap; lengths in m.
-
-    Its shift and that distance give the flank its thickness; its tip radius follows from the root circle.
-    """
-    alpha, module = gear.pressure_angle, gear.module
-    tangent = math.tan(alpha)
-    # a thinner tooth is a wider gap: the cutter is fed in as if the flank were shifted further out
-    flank_shift = gear.profile_shift + 0.5 * gear.thickness_allowance / (module * tangent)
-    shift = flank_shift - cutter.profile_shift
-    working = arcinv(inv(alpha) + 2.0 * tangent * shift / (gear.teeth - cutter.teeth))
-    base = 0.5 * module * cutter.teeth * math.cos(alpha)
-    pitch, cutter_pitch = gear.base_radius / math.cos(working), base / math.cos(working)
-    tip = gear.root_radius - (pitch - cutter_pitch)
-    centre_radius = tip - rounding
-    base_half = (0.5 * math.pi + 2.0 * cutter.profile_shift * tangent) / cutter.teeth + inv(alpha)
-    # the parallel of an involute is an involute of the same base circle, begun rounding/rb further in
-    centre_angle = base_half - rounding / base - inv(pressure_angle_at(centre_radius, base))
-    return CutterTip(
-        cutter_teeth=cutter.teeth,
-        pitch_radius=pitch,
-        cutter_pitch_radius=cutter_pitch,
-        cutter_base_radius=base,
-        cutter_tip_radius=tip,
-        centre_distance=pitch - cutter_pitch,
-        centre_radius=centre_radius,
-        centre_angle=centre_angle,
-        rounding=rounding,
-        gap_angle=math.pi / gear.teeth,
-        end_angle=0.5 * math.pi - working,
-    )
 
 
 def fillet_point(tool: RackTip | CutterTip, theta):

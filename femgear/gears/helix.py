@@ -6,7 +6,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from femgear.gears.gear import BasicRack, Gear
+from femgear.gears.fillet import BasicRack
+from femgear.gears.gear import Gear
 from femgear.gears.involute import transverse_angle
 from femgear.gears.planetary import close_set
 

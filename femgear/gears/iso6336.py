@@ -1,10 +1,25 @@
-"""Mesh stiffness after ISO 6336-1, method B: a check of computed stiffness, not an input to it."""
+"""Mesh stiffness after ISO 6336-1, method B: a check of computed stiffness, not an input to it.
+
+Nominal stresses after ISO 6336 for orientation: sigma_H0 (part 2) and sigma_F0 (part 3, method B).
+
+Spur gears with tooth contact factors only: no application, dynamic or face load factors. Formulas are those
+of ISO 6336-2:2006 and ISO 6336-3:2006; for contact ratios of two and above the later factor f_eps of
+ISO 6336-3:2019 is not applied. In the formulas here teeth and diameters of internal gears are negative and
+profile shifts have the sign of the standard, which for internal gears is minus that of `gear.Gear`.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from femgear.errors import GeometryError
+from femgear.gears.gear import cutter_of
+from femgear.gears.involute import inv
+
+if TYPE_CHECKING:
+    from femgear.gears.gear import Gear
 
 # coefficients C1 .. C9 of the minimum flexibility q', ISO 6336-1:2019, eq. 82 (gears of one module depth)
 _C = (0.04723, 0.15551, 0.25791, -0.00635, -0.11654, -0.00193, -0.24188, 0.00529, 0.00182)
@@ -125,3 +140,264 @@ def mesh_stiffness_method_b(
     material = youngs_modulus / STEEL_MODULUS
     single = solid * THEORETICAL_CORRECTION * blank_factor * rack * math.cos(helix_angle) * material
     return single, single * (0.75 * contact_ratio + 0.25)
+
+
+@dataclass(frozen=True)
+class FlankStress:
+    """Nominal contact stress of a pair and its factors.
+
+    Parameters
+    ----------
+    stress : float
+        sigma_H0 [Pa].
+    zone : float
+        Z_H.
+    elasticity : float
+        Z_E [Pa^0.5].
+    contact_ratio : float
+        Z_eps.
+    """
+
+    stress: float
+    zone: float
+    elasticity: float
+    contact_ratio: float
+
+
+@dataclass(frozen=True)
+class NominalRootStress:
+    """Nominal root stress of one gear of a pair, its factors and the critical section.
+
+    Parameters
+    ----------
+    stress : float
+        sigma_F0 [Pa].
+    form : float
+        Y_F.
+    correction : float
+        Y_S.
+    arm : float
+        Bending moment arm h_Fe [m].
+    chord : float
+        Thickness of the tooth at the critical section s_Fn [m].
+    fillet_radius : float
+        rho_F at the critical section [m].
+    load_angle : float
+        alpha_Fen [rad]: angle of the load against the normal of the centreline.
+    load_radius : float
+        Radius of the outer point of single pair contact, at which the load acts [m].
+    """
+
+    stress: float
+    form: float
+    correction: float
+    arm: float
+    chord: float
+    fillet_radius: float
+    load_angle: float
+    load_radius: float
+
+
+def zone_factor(pressure_angle: float, working_angle: float) -> float:
+    """Z_H = ``sqrt(2 cos(alpha_w) / (cos^2(alpha) sin(alpha_w)))`` of spur gears (ISO 6336-2, section 6)."""
+    return math.sqrt(2.0 / math.tan(working_angle)) / math.cos(pressure_angle)
+
+
+def elasticity_factor(youngs_modulus: float, poisson_ratio: float) -> float:
+    """Z_E = ``sqrt(E / (2 pi (1 - nu^2)))`` [Pa^0.5] of two gears of one material (ISO 6336-2, section 7)."""
+    return math.sqrt(youngs_modulus / (2.0 * math.pi * (1.0 - poisson_ratio**2)))
+
+
+def contact_ratio_factor(contact_ratio: float) -> float:
+    """Z_eps = ``sqrt((4 - eps_alpha)/3)`` of spur gears (ISO 6336-2, section 8)."""
+    _check_contact_ratio(contact_ratio)
+    return math.sqrt((4.0 - contact_ratio) / 3.0)
+
+
+def nominal_contact_stress(
+    gear_1: Gear,
+    gear_2: Gear,
+    *,
+    working_angle: float,
+    contact_ratio: float,
+    tangential_force: float,
+    youngs_modulus: float,
+    poisson_ratio: float,
+) -> FlankStress:
+    """Contact stress sigma_H0 = ``Z_H Z_E Z_eps sqrt(F_t/(d_1 b) (u + 1)/u)`` (ISO 6336-2, section 5).
+
+    Parameters
+    ----------
+    gear_1 : Gear
+        The external gear; of two, that with fewer teeth.
+    gear_2 : Gear
+        For an internal gear u is negative.
+    working_angle : float
+        Working pressure angle of the pair [rad].
+    contact_ratio : float
+        Transverse contact ratio, 1 to 2.5.
+    tangential_force : float
+        F_t at the reference circle [N]: torque over reference radius.
+    youngs_modulus, poisson_ratio : float
+        Of both gears [Pa, 1].
+
+    Raises
+    ------
+    GeometryError
+        Contact ratio outside the range of the method, negative force or gear 1 internal (E-ISO6336).
+    """
+    _check_force(tangential_force)
+    if gear_1.internal:
+        raise GeometryError("gear 1 of the pair is internal", code="E-ISO6336", limit="external")
+    zone = zone_factor(gear_1.pressure_angle, working_angle)
+    elasticity = elasticity_factor(youngs_modulus, poisson_ratio)
+    ratio = contact_ratio_factor(contact_ratio)
+    u = (-gear_2.teeth if gear_2.internal else gear_2.teeth) / gear_1.teeth
+    width = min(gear_1.face_width, gear_2.face_width)
+    line = tangential_force / (2.0 * gear_1.reference_radius * width) * (u + 1.0) / u
+    return FlankStress(zone * elasticity * ratio * math.sqrt(line), zone, elasticity, ratio)
+
+
+def nominal_root_stress(gear: Gear, *, contact_ratio: float, tangential_force: float) -> NominalRootStress:
+    """Root stress sigma_F0 = ``F_t/(b m) Y_F Y_S`` with the load at the outer point of single pair contact.
+
+    Rim, deep-tooth and helix factors are 1. The critical section is where the tangent of the fillet stands at
+    30 deg (internal gears 60 deg) to the centreline of the tooth; the fillet of an internal gear enters
+    through the equivalent rack radius rho_fPv of its pinion cutter (ISO 6336-3, section 6.2).
+
+    Parameters
+    ----------
+    gear : Gear
+    contact_ratio : float
+        Transverse contact ratio with its mate, 1 to 2.5.
+    tangential_force : float
+        F_t at the reference circle [N].
+
+    Raises
+    ------
+    GeometryError
+        Contact ratio outside the range of the method, a negative force, or a tooth that has no such
+        section (E-ISO6336).
+    """
+    _check_contact_ratio(contact_ratio)
+    _check_force(tangential_force)
+    chord, fillet, (theta, G, rounding) = _critical_section(gear)
+    arm, angle, radius = _load(gear, contact_ratio, theta, G, rounding)
+    if not (chord > 0.0 and arm > 0.0 and fillet > 0.0):
+        raise GeometryError(
+            "the tooth has no critical section: "
+            f"chord {chord:.4g}, arm {arm:.4g}, fillet radius {fillet:.4g} modules",
+            code="E-ISO6336",
+            limit="all > 0",
+            remedy="the root of this tooth is outside the range of method B",
+        )
+    form = 6.0 * arm * math.cos(angle) / (chord**2 * math.cos(gear.pressure_angle))
+    correction = stress_correction(chord / arm, 0.5 * chord / fillet)
+    m = gear.module
+    nominal = tangential_force / (gear.face_width * m)
+    return NominalRootStress(
+        stress=nominal * form * correction,
+        form=form,
+        correction=correction,
+        arm=arm * m,
+        chord=chord * m,
+        fillet_radius=fillet * m,
+        load_angle=angle,
+        load_radius=radius,
+    )
+
+
+def stress_correction(slenderness: float, notch: float) -> float:
+    """Y_S = ``(1.2 + 0.13 L) q_s^(1/(1.21 + 2.3/L))`` of ISO 6336-3, made for 1 <= q_s < 8.
+
+    ``slenderness`` is L = s_Fn/h_Fe, ``notch`` is q_s = s_Fn/(2 rho_F).
+    """
+    return (1.2 + 0.13 * slenderness) * notch ** (1.0 / (1.21 + 2.3 / slenderness))
+
+
+def _standard_signs(gear: Gear) -> tuple[float, float, float]:
+    """Teeth, profile shift and dedendum of the rack [modules] as the standard counts them."""
+    sign = -1.0 if gear.internal else 1.0
+    depth = sign * (gear.reference_radius - gear.root_radius) / gear.module
+    shift = sign * gear.profile_shift
+    return sign * gear.teeth, shift, depth + shift
+
+
+def _critical_section(gear: Gear):
+    """Chord s_Fn, radius rho_F [modules]; auxiliaries theta, G, rho_fPv (ISO 6336-3, section 6.2)."""
+    z, shift, dedendum = _standard_signs(gear)
+    alpha, rounding, limit = gear.pressure_angle, gear.rack.root_radius, math.pi / 3.0
+    if gear.internal:
+        cutter, limit = cutter_of(gear), math.pi / 6.0
+        tip = rounding if cutter.tip_radius is None else cutter.tip_radius
+        grown = (cutter.profile_shift + dedendum - tip) ** 1.95 / (3.156 * 1.036**cutter.teeth)
+        rounding = tip + grown
+    E = 0.25 * math.pi - dedendum * math.tan(alpha) - (1.0 - math.sin(alpha)) * rounding / math.cos(alpha)
+    G = rounding - dedendum + shift
+    theta = _solve_theta(z, G, 2.0 / z * (0.5 * math.pi - E) - limit, limit)
+    offset = G / math.cos(theta) - rounding
+    if gear.internal:
+        chord = z * math.sin(limit - theta) + offset
+    else:
+        chord = z * math.sin(limit - theta) + math.sqrt(3.0) * offset
+    # published calculations after the corrected text of 2007 take the teeth of internal gears as positive in
+    # this term alone, which makes the radius larger than that of the generated fillet
+    growth = 2.0 * G**2 / (math.cos(theta) * (abs(z) * math.cos(theta) ** 2 - 2.0 * G))
+    return chord, rounding + growth, (theta, G, rounding)
+
+
+def _solve_theta(z: float, G: float, H: float, start: float) -> float:
+    """Root of ``theta = 2 G/z tan(theta) - H`` by Newton's method (ISO 6336-3, section 6.2)."""
+    theta = start
+    for _ in range(50):
+        value = 2.0 * G / z * math.tan(theta) - H - theta
+        step = value / (2.0 * G / (z * math.cos(theta) ** 2) - 1.0)
+        theta -= step
+        if abs(step) < 1e-14:
+            return theta
+    raise GeometryError(
+        "the critical section of the tooth root cannot be found",
+        code="E-ISO6336",
+        remedy="the profile shift or the rack is outside the range of method B",
+    )
+
+
+def _load(gear: Gear, contact_ratio: float, theta: float, G: float, rounding: float):
+    """Arm h_Fe [modules], load angle alpha_Fen and radius [m] of the outer single contact."""
+    z, shift, _ = _standard_signs(gear)
+    sign = math.copysign(1.0, z)
+    roll = gear.tip_roll - sign * gear.base_pitch * (contact_ratio - 1.0)
+    radius = math.hypot(roll, gear.base_radius)
+    alpha = math.acos(gear.base_radius / radius)
+    half = (0.5 * math.pi + 2.0 * shift * math.tan(gear.pressure_angle)) / z
+    gamma = half + inv(gear.pressure_angle) - inv(alpha)
+    angle = alpha - gamma
+    offset = G / math.cos(theta) - rounding
+    reach = (math.cos(gamma) - math.sin(gamma) * math.tan(angle)) * sign * 2.0 * radius / gear.module
+    if gear.internal:
+        arm = 0.5 * (reach - z * math.cos(math.pi / 6.0 - theta) - math.sqrt(3.0) * offset)
+    else:
+        arm = 0.5 * (reach - z * math.cos(math.pi / 3.0 - theta) - offset)
+    return arm, angle, radius
+
+
+def _check_contact_ratio(contact_ratio: float) -> None:
+    if not 1.0 <= contact_ratio < 2.5:
+        raise GeometryError(
+            f"nominal stresses for a contact ratio of {contact_ratio:.4g}",
+            code="E-ISO6336",
+            value=contact_ratio,
+            limit="1 .. 2.5",
+            remedy="change tip diameters or profile shifts",
+        )
+
+
+def _check_force(force: float) -> None:
+    if not (math.isfinite(force) and force >= 0.0):
+        raise GeometryError(
+            f"nominal stresses for a tangential force of {force} N",
+            code="E-ISO6336",
+            value=force,
+            limit=">= 0 N",
+            remedy="give the magnitude; both flanks are alike",
+        )

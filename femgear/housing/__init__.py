@@ -1,13 +1,5 @@
 """Housing: from the carrier frame to a fixed sensor, and what its order spectrum tells."""
 
-from femgear.housing.hanning import hanning_model, phased_harmonics
-from femgear.housing.modulation import (
-    HousingSignal,
-    SensorLines,
-    fixed_sensor_lines,
-    fixed_sensor_signal,
-    heaviside_linear_lines,
-)
 from femgear.housing.orders import (
     BandAnalysis,
     Line,
@@ -24,7 +16,19 @@ from femgear.housing.orders import (
     order_spectrum,
     symmetry_leakage,
 )
-from femgear.housing.points import heaviside_linear, passages, point_signals, unresolved_share
+from femgear.housing.sensor import (
+    HousingSignal,
+    SensorLines,
+    fixed_sensor_lines,
+    fixed_sensor_signal,
+    hanning_model,
+    heaviside_linear,
+    heaviside_linear_lines,
+    passages,
+    phased_harmonics,
+    point_signals,
+    unresolved_share,
+)
 
 __all__ = [
     "BandAnalysis",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.housing.checks import check_teeth, read_only
+from femgear.housing.sensor import check_teeth, read_only
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.planetary import reference_set
 
 from femgear.contact.assembly import mesh_pairs, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.candidates import tooth_zero_angles
 from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.flank_sides import BACK, DRIVE, flank_side, side_teeth
+from femgear.contact.sides import BACK, DRIVE, flank_side, side_teeth
 from femgear.contact.supports import Supports
-from femgear.contact.teeth import tooth_zero_angles
 from femgear.fe.elasticity import Material
-from femgear.gears import half_thickness_angle
-from femgear.validation.planetary import reference_set
+from femgear.gears.gear import half_thickness_angle
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.contact.candidates import admissible_arcs, flank_pair, separation, windows
-from femgear.gears import Gear
+from femgear.gears.gear import Gear
 
 ALPHA = np.deg2rad(20)
 

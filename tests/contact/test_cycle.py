@@ -7,12 +7,12 @@ import pytest
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.mirrored import walk_either_flank
+from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
 from femgear.contact.solve import mesh_tangent_matrix, solve_contact, tangent_stiffness
 from femgear.fe.elasticity import Material
-from femgear.gears import Gear, PlanetarySet, close_set, equal_planet_angles
+from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import mesh_stiffness_method_b
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 
 STEEL = Material(206e9, 0.3, 7850.0)
 ALPHA = np.deg2rad(20)

@@ -4,16 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.planetary import reference_set
 
 from femgear.contact.assembly import mesh_pairs
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.mirrored import walk_either_flank
+from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import Runout, common_period, no_deviations
 from femgear.gears.modifications import FlankForm, TipRelief
-from femgear.validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from validation.planetary import reference_set
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bearings import bearing_springs, solve_position
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.mirrored import mirrored_set, walk_either_flank
+from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
+from femgear.contact.sides import mirrored_set
 from femgear.contact.supports import Supports, moving_members
 from femgear.fe.elasticity import Material
-from femgear.gears.deviations import no_deviations
-from femgear.gears.mirrored_deviations import mirrored_deviations
-from femgear.validation.planetary import reference_set
+from femgear.gears.deviations import mirrored_deviations, no_deviations
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.cycle import walk_either_flank
 from femgear.contact.loaded_period import SHORTEST, loaded_period, planet_symmetry
-from femgear.contact.mirrored import walk_either_flank
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
-from femgear.gears import Gear, PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.deviations import no_deviations
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 150.0

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.mirrored import walk_either_flank
+from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
 from femgear.fe.elasticity import Material
-from femgear.gears import Gear, PlanetarySet
 from femgear.gears.deviations import no_deviations
-from femgear.validation.planetary import reference_set
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import PlanetarySet
 
 STEEL = Material(206e9, 0.3, 7850.0)
 WIDTH = 0.02

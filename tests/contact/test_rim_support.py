@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from validation.planetary import reference_set
+from validation.reference.rim_support import rim_support_stiffness
+from validation.reference.support_stiffness import annulus_support_stiffness
 
 from femgear.contact.bodies import RING_STATE, Sector
-from femgear.contact.rim_support import rim_support_stiffness
 from femgear.errors import GridError
 from femgear.fe.elasticity import Material, foundation, stiffness
 from femgear.fe.grid import mirror
 from femgear.fe.meshing import mesh_outline
-from femgear.fe.support_stiffness import annulus_support_stiffness
 from femgear.gears.tooth import half_sector
-from femgear.validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 

@@ -6,12 +6,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from validation.planetary import reference_set
 
-from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.deformed import deformed_set
+from femgear.contact.bodies import deformed_set, make_bodies, make_sectors
+from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
 from femgear.contact.flanks import flank_compliance, flank_stations
-from femgear.contact.mirrored import walk_either_flank
 from femgear.contact.root_stress import (
     BACK,
     LOADED,
@@ -27,10 +26,10 @@ from femgear.fe.elasticity import Material, foundation, stiffness, stress
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
 from femgear.fe.meshing import mesh_outline
 from femgear.fe.stress import tangential_stress
-from femgear.gears import Gear, half_sector
 from femgear.gears.deviations import no_deviations
-from femgear.gears.iso6336_stress import nominal_root_stress
-from femgear.validation.planetary import reference_set
+from femgear.gears.gear import Gear
+from femgear.gears.iso6336 import nominal_root_stress
+from femgear.gears.tooth import half_sector
 
 STEEL = Material(206e9, 0.3, 7850.0)
 ALPHA = math.radians(20)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import daqp
 import numpy as np
 import pytest
+from validation.reference.closed_form import share_load
 
-from femgear.contact.closed_form import share_load
 from femgear.contact.halfplane import surface_relative_to_depth
 from femgear.contact.solve import mesh_tangent_matrix, solve_contact, tangent_stiffness
 from femgear.errors import ContactError

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.supports import Supports, force_directions, moving_members
 from femgear.errors import ContactError
 from femgear.fe.elasticity import Material
-from femgear.gears import equal_planet_angles
-from femgear.validation.planetary import reference_set
+from femgear.gears.planetary import equal_planet_angles
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0

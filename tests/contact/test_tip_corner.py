@@ -4,19 +4,9 @@ import math
 
 import numpy as np
 import pytest
-
-from femgear.contact.candidates import cell_centres, cell_edges, equal_cells
-from femgear.contact.flanks import held_sector_compliance, station_weights
-from femgear.contact.graded_teeth import graded_sector
-from femgear.contact.halfplane import surface_displacement
-from femgear.contact.tip_corner import TipCorner, _excess, apex_excess, tip_corner
-from femgear.fe.compliance import symmetric_factor
-from femgear.fe.elasticity import Material, stiffness
-from femgear.fe.grid import mirror, ordered_nodes
-from femgear.fe.meshing import mesh_outline
-from femgear.gears.tooth import half_sector
-from femgear.validation.planetary import reference_set
-from femgear.validation.torque_rotation import (
+from validation.planetary import reference_set
+from validation.reference.graded_teeth import graded_sector
+from validation.torque_rotation import (
     PLANET_RING,
     corner_bodies,
     corner_by_rotation,
@@ -24,6 +14,16 @@ from femgear.validation.torque_rotation import (
     corner_set,
     mesh_alone,
 )
+
+from femgear.contact.candidates import cell_centres, cell_edges, equal_cells
+from femgear.contact.flanks import held_sector_compliance, station_weights
+from femgear.contact.halfplane import surface_displacement
+from femgear.contact.tip_corner import TipCorner, _excess, apex_excess, tip_corner
+from femgear.fe.compliance import symmetric_factor
+from femgear.fe.elasticity import Material, stiffness
+from femgear.fe.grid import mirror, ordered_nodes
+from femgear.fe.meshing import mesh_outline
+from femgear.gears.tooth import half_sector
 
 STEEL = Material(206e9, 0.3, 7850.0)
 SET = reference_set()

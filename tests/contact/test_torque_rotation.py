@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
+from validation.planetary import reference_set
+from validation.reference.flank_mortar import PlacedFlank, flank_contact, opposite, smallest_separation
+from validation.reference.graded_teeth import flank_curve, graded_sector
+from validation.reference.torque_balance import balanced_loads
+from validation.reference.torque_rotation import GearPair, torque_rotation
+from validation.torque_rotation import SUN_PLANET, by_compliance, depth_compliance
 
-from femgear.contact.flank_mortar import PlacedFlank, flank_contact, opposite, smallest_separation
-from femgear.contact.graded_teeth import flank_curve, graded_sector
-from femgear.contact.torque_balance import balanced_loads
-from femgear.contact.torque_rotation import GearPair, torque_rotation
 from femgear.errors import ContactError
 from femgear.fe.elasticity import Material
 from femgear.fe.outline import check_outline
 from femgear.gears.tooth import half_sector
-from femgear.validation.planetary import reference_set
-from femgear.validation.torque_rotation import SUN_PLANET, by_compliance, depth_compliance
 
 STEEL = Material(206e9, 0.3, 7850.0)
 SET = reference_set()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from femgear import read_case, solve_static
-from femgear.case import with_value
+from femgear.case.case import read_case, with_value
+from femgear.trains.static.stages import solve_static
 
 TANGENTIAL = [{"planet": 1, "tangential": "0.12 mm"}]
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import jv, jvp, yv, yvp
+from validation.reference.annulus import annulus_frequencies
 
 from femgear.errors import GeometryError
-from femgear.fe.annulus import annulus_frequencies
 from femgear.fe.elasticity import Material
 
 STEEL = Material(200e9, 0.3, 8000.0)

@@ -18,7 +18,8 @@ from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
 from femgear.fe.meshing import mesh_outline
 from femgear.fe.reduction import cyclic_modes, sector_basis
-from femgear.gears import Gear, half_sector
+from femgear.gears.gear import Gear
+from femgear.gears.tooth import half_sector
 
 STEEL = Material(206e9, 0.3, 7850.0)
 THICKNESS = 0.02
@@ -197,7 +198,7 @@ def test_reduced_ring_is_statically_complete(gear, sector):
 
 def test_displacement_field_of_the_whole_gear(gear, sector, whole):
     """Loads on three teeth: the field from one sector is that of the whole gear."""
-    from femgear.fe.field import cyclic_displacement
+    from femgear.fe.stress import cyclic_displacement
 
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
     columns = flank_load_columns(sector, flank_stations(sector, gear))

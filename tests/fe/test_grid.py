@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from femgear.errors import GridError, StorageError
-from femgear.fe.meshing import (
+from femgear.fe.grid import (
     Grid,
-    Outline,
     check_grid,
     copy_nodes,
     jacobian_bounds,
-    mesh_outline,
     mirror,
     ordered_nodes,
     quality,
@@ -18,6 +16,8 @@ from femgear.fe.meshing import (
     rotated_copies,
     write_grid,
 )
+from femgear.fe.meshing import mesh_outline
+from femgear.fe.outline import Outline
 
 COUNT = 9
 ANGLE = np.pi / COUNT

@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 from femgear.errors import GridError
-from femgear.fe import grid_files, meshing
-from femgear.fe.meshing import Outline, check_outline, estimate_elements, mesh_outline, mesh_outlines, quality
+from femgear.fe import grid as fe_grid
+from femgear.fe import meshing
+from femgear.fe.grid import quality
+from femgear.fe.meshing import mesh_outline, mesh_outlines
+from femgear.fe.outline import Outline, check_outline, estimate_elements
 
 
 def polygon(corners, *, name="edge", divide=1):
@@ -103,7 +106,7 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(grid_files.os, "replace", full)
+    monkeypatch.setattr(fe_grid.os, "replace", full)
     with pytest.warns(UserWarning, match="No space left"):
         mesh_outline(outline, cache=tmp_path / "meshes")
     assert list((tmp_path / "meshes").iterdir()) == []

@@ -17,7 +17,9 @@ from femgear.fe.elasticity import (
     stress,
     to_skfem,
 )
-from femgear.fe.meshing import Grid, Outline, mesh_outline
+from femgear.fe.grid import Grid
+from femgear.fe.meshing import mesh_outline
+from femgear.fe.outline import Outline
 
 STEEL = Material(206e9, 0.3, 7850.0)
 

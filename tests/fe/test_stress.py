@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from validation.mapped import mapped_grid
 
 from femgear.errors import GridError
 from femgear.fe.elasticity import Material, checked_solve, edge_load, stiffness
 from femgear.fe.meshing import mesh_outline
 from femgear.fe.outline import Outline
 from femgear.fe.stress import plane_modulus, tangential_stress
-from femgear.validation.mapped import mapped_grid
 
 STEEL = Material(206e9, 0.3, 7850.0)
 

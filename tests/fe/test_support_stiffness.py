@@ -2,22 +2,17 @@
 
 import numpy as np
 import pytest
-
-from femgear.errors import GeometryError, GridError
-from femgear.fe.elasticity import Material, foundation, stiffness
-from femgear.fe.shaft_body import (
-    ShaftStep,
-    shaft_flexibility,
-    shaft_support_stiffness,
-    timoshenko_flexibility,
-)
-from femgear.fe.support_stiffness import (
+from validation.mapped import mapped_grid, ring_mapping
+from validation.reference.support_stiffness import (
     annulus_support_stiffness,
     centre_node_stiffness,
     cyclic_support_stiffness,
 )
-from femgear.validation.mapped import mapped_grid, ring_mapping
-from femgear.validation.support_stiffness import annulus_sector
+from validation.support_stiffness import annulus_sector
+
+from femgear.errors import GeometryError, GridError
+from femgear.fe.elasticity import Material, foundation, stiffness
+from femgear.fe.shaft import ShaftStep, shaft_flexibility, shaft_support_stiffness, timoshenko_flexibility
 
 STEEL = Material(206e9, 0.3, 7850.0)
 STATES = ("plane stress", "plane strain")

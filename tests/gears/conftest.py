@@ -9,7 +9,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from femgear.gears import half_sector, orientations
+from femgear.gears.kinematics import orientations
+from femgear.gears.tooth import half_sector
 
 
 @lru_cache(maxsize=64)

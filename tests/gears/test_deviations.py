@@ -9,12 +9,10 @@ from deviation_sets import ALPHA, PLAY, SET, UM, make_set
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from femgear.contact.teeth import tooth_numbers
+from femgear.contact.candidates import tooth_numbers
 from femgear.errors import GeometryError
-from femgear.gears import orientations
 from femgear.gears.deviation_checks import check_deviations, least_play
 from femgear.gears.deviations import (
-    FlankForm,
     Ovality,
     Runout,
     body_separation,
@@ -25,7 +23,8 @@ from femgear.gears.deviations import (
     tooth_displacements,
     tooth_separation,
 )
-from femgear.gears.modifications import ProfileSlope, TipRelief
+from femgear.gears.kinematics import orientations
+from femgear.gears.modifications import FlankForm, ProfileSlope, TipRelief
 
 
 def test_profiles_of_both_flanks_add_up():

@@ -7,7 +7,6 @@ import pytest
 from deviation_sets import PLAY, SET, UM
 from scipy.optimize import brentq
 
-from femgear.gears import orientations
 from femgear.gears.deviations import (
     Runout,
     body_separation,
@@ -16,6 +15,7 @@ from femgear.gears.deviations import (
     tooth_separation,
 )
 from femgear.gears.gear import flank_points
+from femgear.gears.kinematics import orientations
 
 
 def curve(gear, angle, centre, side):

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femgear.gears.fillet import cutter_of, fillet_point
-from femgear.gears.gear import BasicRack, Gear, PinionCutter, flank_points
+from femgear.gears.fillet import BasicRack, PinionCutter, fillet_point
+from femgear.gears.gear import Gear, cutter_of, flank_points
 from femgear.gears.involute import arcinv, inv
 
 ALPHA = math.radians(20.0)

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from validation.planetary import reference_set
 
+from femgear.gears.checks import unheld_members
 from femgear.gears.deviations import mesh_normals
-from femgear.gears.floating import unheld_members
-from femgear.validation.planetary import reference_set
 
 MEMBERS = ("sun", "carrier", "ring")
 

@@ -7,15 +7,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import (
-    BasicRack,
-    Gear,
-    PinionCutter,
-    flank_points,
-    half_thickness_angle,
-    roll_length,
-    tooth_thickness,
-)
+from femgear.gears.fillet import BasicRack, PinionCutter
+from femgear.gears.gear import Gear, flank_points, half_thickness_angle, roll_length, tooth_thickness
 from femgear.gears.involute import inv
 
 ALPHA = math.radians(20.0)

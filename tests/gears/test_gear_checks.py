@@ -7,10 +7,17 @@ import numpy as np
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears import BasicRack, Gear, PlanetarySet, check_set, close_set, equal_planet_angles
-from femgear.gears.checks import feasible_angles, neighbour_limit, tip_clearances
-from femgear.gears.interference import check_passing_tips
+from femgear.gears.checks import (
+    check_passing_tips,
+    check_set,
+    feasible_angles,
+    neighbour_limit,
+    tip_clearances,
+)
+from femgear.gears.fillet import BasicRack
+from femgear.gears.gear import Gear
 from femgear.gears.involute import trochoid_interference
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 
 ALPHA = math.radians(20.0)
 

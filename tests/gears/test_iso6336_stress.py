@@ -8,10 +8,11 @@ import math
 
 import numpy as np
 import pytest
+from validation.planetary import nrel_set
 
 from femgear.errors import GeometryError
-from femgear.gears import Gear
-from femgear.gears.iso6336_stress import (
+from femgear.gears.gear import Gear
+from femgear.gears.iso6336 import (
     contact_ratio_factor,
     elasticity_factor,
     nominal_contact_stress,
@@ -19,7 +20,6 @@ from femgear.gears.iso6336_stress import (
     stress_correction,
     zone_factor,
 )
-from femgear.validation.planetary import nrel_set
 
 FORCE = 285900.438
 STEEL = {"youngs_modulus": 206e9, "poisson_ratio": 0.3}

@@ -7,19 +7,18 @@ import numpy as np
 import pytest
 from deviation_sets import ALPHA, UM, make_set
 
-from femgear.contact.mirrored import mirrored_set
-from femgear.contact.teeth import tooth_numbers
-from femgear.gears import orientations
+from femgear.contact.candidates import tooth_numbers
+from femgear.contact.sides import mirrored_set
 from femgear.gears.deviations import (
-    FlankForm,
     Ovality,
     Runout,
     body_separation,
+    mirrored_deviations,
     no_deviations,
     tooth_separation,
 )
-from femgear.gears.mirrored_deviations import mirrored_deviations
-from femgear.gears.modifications import ProfileSlope
+from femgear.gears.kinematics import orientations
+from femgear.gears.modifications import FlankForm, ProfileSlope
 
 
 def random_deviations(s, seed=3):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from femgear.errors import GeometryError
-from femgear.gears import Gear
+from femgear.gears.gear import Gear
 from femgear.gears.modifications import (
     FlankForm,
     MeasuredProfile,

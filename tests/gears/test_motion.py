@@ -5,7 +5,9 @@ import math
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears import Gear, PlanetarySet, close_set, equal_planet_angles, orientations, speeds, torques
+from femgear.gears.gear import Gear
+from femgear.gears.kinematics import orientations, speeds, torques
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 
 ALPHA = math.radians(20.0)
 RPM = math.pi / 30.0

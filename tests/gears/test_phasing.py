@@ -6,18 +6,21 @@ from itertools import product
 import numpy as np
 import pytest
 
-from femgear.contact.flank_sides import flank_side
+from femgear.contact.sides import flank_side
 from femgear.errors import GeometryError
-from femgear.gears import Gear, close_set, equal_planet_angles, orientations
+from femgear.gears.gear import Gear
+from femgear.gears.kinematics import orientations
 from femgear.gears.phasing import (
     MeshPhasing,
     cyclic_harmonic,
+    cyclic_shares,
     mesh_phasing,
     phase_factors,
     phasing_of_set,
+    phasing_table,
     standard_lag,
 )
-from femgear.gears.phasing_tables import cyclic_shares, phasing_table
+from femgear.gears.planetary import close_set, equal_planet_angles
 
 
 def geared(sun, planet, ring, angles, /, **shifts):

@@ -3,19 +3,17 @@
 import numpy as np
 import pytest
 
-from femgear.gears import equal_planet_angles
 from femgear.gears.checks import feasible_angles
-from femgear.gears.phasing import mesh_phasing
-from femgear.gears.phasing_tables import MEMBERS, mesh_loads, phasing_table
-from femgear.models.helical import (
-    HelicalBody,
+from femgear.gears.phasing import MEMBERS, mesh_loads, mesh_phasing, phasing_table
+from femgear.gears.planetary import equal_planet_angles
+from femgear.system.lumped import HelicalBody, HelicalSupport
+from femgear.trains.helical.model import (
     HelicalSet,
-    HelicalSupport,
+    helical_modes,
     helical_system,
     mesh_directions,
     pin_directions,
 )
-from femgear.models.helical_modes import helical_modes
 
 HARMONICS = np.arange(1, 7)
 KIND = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}

@@ -3,20 +3,21 @@
 import numpy as np
 import pytest
 
-from femgear.gears import equal_planet_angles
 from femgear.gears.checks import feasible_angles
-from femgear.gears.phasing import mesh_phasing, phase_factors
-from femgear.gears.phasing_tables import MEMBERS, cyclic_shares, mesh_loads, phasing_table
-from femgear.models.kinds import equally_spaced, phase_basis, phase_shares
-from femgear.models.planar import (
-    PlanarBody,
-    PlanarSet,
-    mesh_directions,
-    pin_directions,
-    planar_system,
+from femgear.gears.phasing import (
+    MEMBERS,
+    cyclic_shares,
+    mesh_loads,
+    mesh_phasing,
+    phase_factors,
+    phasing_table,
 )
-from femgear.models.planar_modes import planar_modes, planar_motions
-from femgear.solvers.frequency_response import mesh_error_response
+from femgear.gears.planetary import equal_planet_angles
+from femgear.solvers.linear.frequency_response import mesh_error_response
+from femgear.system.assembler import mesh_directions, pin_directions, planar_system
+from femgear.system.lumped import PlanarBody, PlanarSet
+from femgear.system.mode_kinds import equally_spaced, phase_basis, phase_shares, planar_motions
+from femgear.trains.planar.model import planar_modes
 
 ALPHA = np.radians(21.0), np.radians(20.0)
 HARMONICS = np.arange(1, 8)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears.fillet import fillet_point
-from femgear.gears.gear import BasicRack, Gear, flank_points, half_thickness_angle
+from femgear.gears.fillet import BasicRack, fillet_point
+from femgear.gears.gear import Gear, flank_points, half_thickness_angle
 from femgear.gears.tooth import half_sector
 
 ALPHA = math.radians(20.0)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears import equal_planet_angles
 from femgear.gears.checks import feasible_angles, neighbour_limit
-from femgear.gears.phasing import KINDS, MeshPhasing, mesh_phasing
-from femgear.gears.phasing_tables import phasing_table
-from femgear.gears.tooth_choice import check_teeth, neighbouring_teeth
+from femgear.gears.phasing import KINDS, MeshPhasing, mesh_phasing, phasing_table
+from femgear.gears.planetary import equal_planet_angles
+from femgear.gears.teeth_numbers import check_teeth, neighbouring_teeth
 
 
 @pytest.mark.parametrize(("wanted", "planets"), [((30, 20, 70), 4), ((27, 40, 108), 3), ((29, 16, 61), 5)])

@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.housing import (
-    OrderSpectrum,
-    fixed_sensor_lines,
-    fixed_sensor_signal,
-    heaviside_linear_lines,
-    order_spectrum,
-    symmetry_leakage,
-)
+from femgear.housing.orders import OrderSpectrum, order_spectrum, symmetry_leakage
+from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, heaviside_linear_lines
 
 Z_RING, SENSOR, SPEED = 108, 0.7, 5.2
 

@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.housing import (
-    OrderSpectrum,
-    analyse_band,
-    fixed_sensor_lines,
-    fixed_sensor_signal,
-    hanning_model,
-    phased_harmonics,
-)
+from femgear.housing.orders import OrderSpectrum, analyse_band
+from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, hanning_model, phased_harmonics
 
 
 def windowed_sum(theta, harmonics, planet_angles, width, sensor, z_ring, direction):

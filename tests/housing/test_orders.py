@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.housing import (
+from femgear.housing.orders import (
     OrderSpectrum,
     analyse_band,
     analytic_signal,
@@ -12,11 +12,11 @@ from femgear.housing import (
     count_lobes,
     dominant_lines,
     envelope,
-    fixed_sensor_lines,
     line_sources,
     order_spectrum,
     symmetry_leakage,
 )
+from femgear.housing.sensor import fixed_sensor_lines
 
 THETA = 2 * np.pi * np.arange(2048) / 2048
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.housing import (
+from femgear.housing.sensor import (
     fixed_sensor_lines,
     heaviside_linear,
     heaviside_linear_lines,

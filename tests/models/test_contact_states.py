@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.models.contact_states import (
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.system.elements import GearMeshes
+from femgear.system.series import FourierSeries, constant
+from femgear.trains.gear_pair.model import (
     STATE_NAMES,
     UNKNOWN,
     contact_states,
+    example_pair,
     level_crossings,
     range_states,
     solution_states,
     state_regions,
 )
-from femgear.models.impact_pair import example_pair
-from femgear.solvers.elements import GearMeshes
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.series import FourierSeries, constant
 
 MESHES = GearMeshes([2, 0, 1], constant([2.0, 2.0, 2.0]), deflection=constant([1.0, 1.0, 1.0]), backlash=2.0)
 

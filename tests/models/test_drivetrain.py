@@ -5,14 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.wind_turbine_drivetrain import (
+    PRINTED,
+    RADII_TEETH,
+    line_teeth,
+    paper_torques,
+    ratio_of_radii,
+    wind_turbine_drivetrain,
+)
 from scipy.linalg import eigh
 
 from femgear.errors import CaseError
-from femgear.models.drivetrain import (
-    drivetrain_model,
-)
-from femgear.models.drivetrain_balance import settled_motion
-from femgear.models.drivetrain_data import (
+from femgear.solvers.linear.modal import solve_modes
+from femgear.system.assembler import planar_system
+from femgear.system.shaft import ShaftSection
+from femgear.trains.drivetrain.data import (
     ChainBearing,
     ChainBody,
     ChainShaft,
@@ -21,21 +28,18 @@ from femgear.models.drivetrain_data import (
     ParallelStage,
     PlanetaryStage,
 )
-from femgear.models.drivetrain_march import march_drivetrain
-from femgear.models.drivetrain_meshes import gibbs_overshoot, planar_of, rectangular_series, stiffness_levels
-from femgear.models.drivetrain_spectra import averaged_spectrum
-from femgear.models.drivetrain_torsional import torsional_matrices, torsional_model
-from femgear.models.planar import planar_system
-from femgear.models.shaft import ShaftSection
-from femgear.models.wind_turbine_drivetrain import (
-    PRINTED,
-    RADII_TEETH,
-    line_teeth,
-    paper_torques,
-    ratio_of_radii,
-    wind_turbine_drivetrain,
+from femgear.trains.drivetrain.model import (
+    drivetrain_model,
+    gibbs_overshoot,
+    planar_of,
+    rectangular_series,
+    stiffness_levels,
+    torsional_matrices,
+    torsional_model,
 )
-from femgear.solvers.modal import solve_modes
+from femgear.trains.drivetrain.multitone import settled_motion
+from femgear.trains.drivetrain.spectra import averaged_spectrum
+from femgear.trains.drivetrain.time import march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 SHORT_CUT = ChainShaft("rotor", "generator", 3.0, 1e6, 1e6)

@@ -5,21 +5,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 from scipy.optimize import brentq
 from scipy.special import mathieu_a
 
-from femgear.case import read_case
+from femgear.case.case import read_case
 from femgear.errors import CaseError, ConvergenceError
-from femgear.models.drivetrain import balanced_torque, drivetrain_model
-from femgear.models.drivetrain_balance import drivetrain_lines, settled_motion
-from femgear.models.drivetrain_case import case_model
-from femgear.models.drivetrain_data import ChainBody, Drivetrain, MeshWave, ParallelStage
-from femgear.models.drivetrain_lattice import LineCodes, beside, line_codes, mirrored_codes
-from femgear.models.drivetrain_march import march_drivetrain
-from femgear.models.drivetrain_torque import constant_torques
-from femgear.models.drivetrain_torsional import torsional_model
-from femgear.models.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
-from femgear.solvers.modal import solve_modes
+from femgear.solvers.linear.modal import solve_modes
+from femgear.trains.drivetrain.data import ChainBody, Drivetrain, MeshWave, ParallelStage, constant_torques
+from femgear.trains.drivetrain.model import balanced_torque, drivetrain_model, torsional_model
+from femgear.trains.drivetrain.multitone import (
+    LineCodes,
+    beside,
+    drivetrain_lines,
+    line_codes,
+    mirrored_codes,
+    settled_motion,
+)
+from femgear.trains.drivetrain.setup import case_model
+from femgear.trains.drivetrain.time import march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 

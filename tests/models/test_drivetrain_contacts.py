@@ -5,14 +5,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivetrain
 
-from femgear.models.drivetrain import balanced_torque, drivetrain_model, drivetrain_problem
-from femgear.models.drivetrain_data import ChainBearing, ChainBody, Drivetrain, MeshWave, ParallelStage
-from femgear.models.drivetrain_march import march_drivetrain
-from femgear.models.drivetrain_torque import TorqueHistory, constant_torques
-from femgear.models.drivetrain_torsional import torsional_model
-from femgear.models.wind_turbine_drivetrain import paper_torques, wind_turbine_drivetrain
-from femgear.solvers.transient import solve_transient
+from femgear.solvers.time.transient import solve_transient
+from femgear.trains.drivetrain.data import (
+    ChainBearing,
+    ChainBody,
+    Drivetrain,
+    MeshWave,
+    ParallelStage,
+    TorqueHistory,
+    constant_torques,
+)
+from femgear.trains.drivetrain.model import (
+    balanced_torque,
+    drivetrain_model,
+    drivetrain_problem,
+    torsional_model,
+)
+from femgear.trains.drivetrain.time import march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 ALPHA, RADIUS = math.radians(20.0), 0.0345

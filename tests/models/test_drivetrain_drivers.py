@@ -6,25 +6,30 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivetrain
 
-from femgear.case import read_case, with_value
+from femgear.case.case import read_case, with_value
 from femgear.errors import CaseError
-from femgear.models.drivetrain import balanced_torque, drivetrain_model
-from femgear.models.drivetrain_case import BENDING, TORSIONAL, case_model, drivetrain_of
-from femgear.models.drivetrain_data import (
+from femgear.solvers.linear.modal import solve_modes
+from femgear.trains.drivetrain.checks import mean_torque, speed_ratios, with_drivers
+from femgear.trains.drivetrain.data import (
     ChainBearing,
     ChainBody,
     ChainShaft,
     Drivetrain,
     MeshWave,
     ParallelStage,
+    TorqueHistory,
+    constant_torques,
 )
-from femgear.models.drivetrain_drivers import mean_torque, speed_ratios, with_drivers
-from femgear.models.drivetrain_march import march_drivetrain
-from femgear.models.drivetrain_torque import TorqueHistory, constant_torques
-from femgear.models.drivetrain_torsional import torsional_matrices, torsional_model
-from femgear.models.wind_turbine_drivetrain import paper_torques, wind_turbine_drivetrain
-from femgear.solvers.modal import solve_modes
+from femgear.trains.drivetrain.model import (
+    balanced_torque,
+    drivetrain_model,
+    torsional_matrices,
+    torsional_model,
+)
+from femgear.trains.drivetrain.setup import BENDING, TORSIONAL, case_model, drivetrain_of
+from femgear.trains.drivetrain.time import march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 ALPHA = math.radians(20.0)

@@ -6,21 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.models.drivetrain import balanced_torque, drivetrain_model
-from femgear.models.drivetrain_data import ChainBearing, ChainBody, Drivetrain, MeshWave, ParallelStage
-from femgear.models.drivetrain_growth import PIECE, FreeMotion
-from femgear.models.drivetrain_march import march_drivetrain
-from femgear.models.drivetrain_torque import constant_torques
-from femgear.models.drivetrain_torsional import torsional_model
-from femgear.models.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
-from femgear.solvers.floquet import floquet_multipliers
-from femgear.solvers.modal import solve_modes
-from femgear.system import MeshExcitation
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.stability.floquet import floquet_multipliers
+from femgear.system.system import MeshExcitation
+from femgear.trains.drivetrain.data import (
+    ChainBearing,
+    ChainBody,
+    Drivetrain,
+    MeshWave,
+    ParallelStage,
+    constant_torques,
+)
+from femgear.trains.drivetrain.model import balanced_torque, drivetrain_model, torsional_model
+from femgear.trains.drivetrain.time import PIECE, FreeMotion, march_drivetrain
 
 TEETH, HARMONICS = 20, 3
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from published.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
 
-from femgear.models.drivetrain import drivetrain_model
-from femgear.models.drivetrain_data import ChainBearing, ChainBody, ChainShaft, Drivetrain
-from femgear.models.drivetrain_layout import beam_shape, drivetrain_layout, layout_motion, shaft_lines
-from femgear.models.shaft import ShaftSection
-from femgear.models.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
+from femgear.system.shaft import ShaftSection
+from femgear.trains.drivetrain.data import ChainBearing, ChainBody, ChainShaft, Drivetrain
+from femgear.trains.drivetrain.figures import beam_shape, drivetrain_layout, layout_motion, shaft_lines
+from femgear.trains.drivetrain.model import drivetrain_model
 
 TRAIN = wind_turbine_drivetrain()
 MODEL, LAYOUT = drivetrain_model(TRAIN), drivetrain_layout(TRAIN)

@@ -5,28 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 
-from femgear.models.drivetrain import (
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.time.transient import solve_transient
+from femgear.trains.drivetrain.data import ChainBearing, Drivetrain, TorqueHistory, constant_torques
+from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
     drivetrain_problem,
+    torsional_model,
 )
-from femgear.models.drivetrain_balance import drivetrain_lines, settled_motion
-from femgear.models.drivetrain_data import (
-    ChainBearing,
-    Drivetrain,
-)
-from femgear.models.drivetrain_march import march_drivetrain
-from femgear.models.drivetrain_spectra import averaged_spectrum, order_spectrum
-from femgear.models.drivetrain_torque import TorqueHistory, constant_torques
-from femgear.models.drivetrain_torsional import torsional_model
-from femgear.models.wind_turbine_drivetrain import (
-    PRINTED,
-    paper_torques,
-    wind_turbine_drivetrain,
-)
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.transient import solve_transient
+from femgear.trains.drivetrain.multitone import drivetrain_lines, settled_motion
+from femgear.trains.drivetrain.spectra import averaged_spectrum, order_spectrum
+from femgear.trains.drivetrain.time import march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 
@@ -153,7 +145,7 @@ def test_backlash_takes_the_pulling_forces_away():
         problem = drivetrain_problem(model, torques=paper_torques(), separates=separates)
         run = solve_transient(problem, model.frequencies(0.6), times, start=(zero, zero), step=2e-4)
         assert run.converged
-        from femgear.models.drivetrain_meshes import mesh_force
+        from femgear.trains.drivetrain.model import mesh_force
 
         stage = problem.elements[1]
         x = (run.deflection[:, stage.columns] * stage.fixed).sum(axis=-1)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from femgear.analysis_drivetrain import BENDING, solve_transient_run
-from femgear.case import parse_case
-from femgear.models.drivetrain_case import case_model
-from femgear.models.drivetrain_names import numbered
-from femgear.plots.drivetrain_results import chosen_meshes, stiffness_figure
+from femgear.case.case import parse_case
+from femgear.trains.drivetrain.data import numbered
+from femgear.trains.drivetrain.figures import stiffness_figure
+from femgear.trains.drivetrain.results import chosen_meshes
+from femgear.trains.drivetrain.setup import BENDING, case_model
+from femgear.trains.drivetrain.stages import solve_transient_run
 
 TEXT = """
     model = "drivetrain"

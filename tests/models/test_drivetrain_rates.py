@@ -6,20 +6,27 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from femgear.case import read_case
-from femgear.models.drivetrain import drivetrain_model
-from femgear.models.drivetrain_case import case_model
-from femgear.models.drivetrain_data import ChainBearing, ChainBody, Drivetrain, MeshWave, ParallelStage
-from femgear.models.drivetrain_march import march_drivetrain
-from femgear.models.drivetrain_rates import (
+from femgear.case.case import read_case
+from femgear.trains.drivetrain.data import (
+    ChainBearing,
+    ChainBody,
+    Drivetrain,
+    MeshWave,
+    ParallelStage,
+    TorqueHistory,
+    constant_torques,
+)
+from femgear.trains.drivetrain.model import drivetrain_model
+from femgear.trains.drivetrain.setup import case_model
+from femgear.trains.drivetrain.time import (
     default_record_rate,
     frequency_shift,
     highest_mesh,
+    march_drivetrain,
     mesh_mode,
     shift_rate,
     speed_range,
 )
-from femgear.models.drivetrain_torque import TorqueHistory, constant_torques
 
 CASES = Path(__file__).parents[2] / "cases"
 

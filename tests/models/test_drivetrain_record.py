@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.models.drivetrain_record import Decimator
+from femgear.trains.drivetrain.time import Decimator
 
 EVERY, COUNT = 20, 6000
 

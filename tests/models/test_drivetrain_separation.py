@@ -5,21 +5,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 
 from femgear.errors import CaseError
-from femgear.models.drivetrain import balanced_torque, drivetrain_model, drivetrain_problem
-from femgear.models.drivetrain_data import ChainBearing, ChainBody, Drivetrain, MeshWave, ParallelStage
-from femgear.models.drivetrain_march import march_drivetrain
-from femgear.models.drivetrain_meshes import mesh_force
-from femgear.models.drivetrain_separation import (
-    _across_borders,
-    one_sided,
-    solve_contact,
+from femgear.solvers.time.transient import solve_transient
+from femgear.trains.drivetrain.data import (
+    ChainBearing,
+    ChainBody,
+    Drivetrain,
+    MeshWave,
+    ParallelStage,
+    TorqueHistory,
+    constant_torques,
 )
-from femgear.models.drivetrain_torque import TorqueHistory, constant_torques
-from femgear.models.drivetrain_torsional import torsional_model
-from femgear.models.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
-from femgear.solvers.transient import solve_transient
+from femgear.trains.drivetrain.model import (
+    balanced_torque,
+    drivetrain_model,
+    drivetrain_problem,
+    mesh_force,
+    torsional_model,
+)
+from femgear.trains.drivetrain.time import _across_borders, march_drivetrain, one_sided, solve_contact
 
 K, BACKLASH = 2e8, 1e-4
 
@@ -163,7 +169,7 @@ def test_adaptive_integrator_and_order():
 
 
 def forces_of(model, speed, times, q):
-    from femgear.solvers.series import FourierSeries
+    from femgear.system.series import FourierSeries
 
     theta = times[:, None] * model.frequencies(speed)
     x = np.einsum("tmj,tm->tj", model.geometry.selection(theta[:, :2:2]), q @ model.geometry.basic)

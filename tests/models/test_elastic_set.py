@@ -13,23 +13,27 @@ from femgear.errors import CaseError, ContactError
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.fe.reduction import CyclicModes
-from femgear.gears import Gear, PlanetarySet, equal_planet_angles
 from femgear.gears.checks import feasible_angles
-from femgear.models.elastic import (
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import PlanetarySet, equal_planet_angles
+from femgear.solvers.linear.modal import complex_modes, solve_modes
+from femgear.system.assembler import planar_system
+from femgear.system.lumped import PlanarBody, planar_from_set
+from femgear.trains.elastic.model import (
+    RADIAL,
+    TANGENTIAL,
     BodyData,
+    RingModel,
     ShaftData,
     elastic_set,
     mesh_excitation,
     ring_displacement,
     ring_field,
     ring_mesh_compliance,
+    ring_model,
     ring_wave_shares,
     turning_system,
 )
-from femgear.models.planar import PlanarBody, planar_from_set, planar_system
-from femgear.models.ring import RADIAL, TANGENTIAL, RingModel, ring_model
-from femgear.solvers.complex_modes import complex_modes
-from femgear.solvers.modal import solve_modes
 
 STEEL = Material(206e9, 0.3, 7850.0)
 SUN, CARRIER = BodyData(0.22, 1e-4, 5e7), BodyData(3.0, 6e-3, 2e8)
@@ -346,9 +350,11 @@ def test_meshes_that_cannot_be_linearised_are_refused():
 
 def test_motor_and_brake_follow_the_driven_member():
     """With the carrier driven the motor hangs on the carrier and the brake on the sun."""
-    from femgear.analysis import solve_modes, solve_static
-    from femgear.case import with_value
-    from femgear.validation.reference import reference_case
+    from validation.cases import reference_case
+
+    from femgear.case.case import with_value
+    from femgear.trains.elastic.stages import solve_modes
+    from femgear.trains.static.stages import solve_static
 
     case = with_value(reference_case(), "operation.input", "carrier")
     case = with_value(case, "static.positions", 16)
@@ -571,7 +577,7 @@ def test_wave_shares_tell_standing_from_travelling_waves(ring):
 
 def test_highest_mesh_mode_is_not_that_of_a_stiff_bearing():
     """Sun and planets in torsion: the reference set's 14 to 17 kHz, whatever the bearings are."""
-    from femgear.models.elastic import BodyData, highest_mesh_mode
+    from femgear.trains.elastic.model import BodyData, highest_mesh_mode
 
     gears, stiffness = gear_set(), np.repeat([5e8, 6.8e8], 3)
     found = [

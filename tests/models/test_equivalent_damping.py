@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import linalg
+from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError
-from femgear.models.equivalent_damping import (
+from femgear.system.assembler import planar_system
+from femgear.system.lumped import torsional_set
+from femgear.system.transmission_errors import (
     equivalent_damping,
     mesh_dampers,
     planar_mesh_dampers,
     support_dampers,
 )
-from femgear.models.planar import planar_system
-from femgear.models.planar_data import torsional_set
-from femgear.validation.planar import lin_parker_set
 
 
 def ratios(M, C, K):

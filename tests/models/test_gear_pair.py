@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.models.gear_pair import equivalent_mass, gear_pair
-from femgear.solvers.elements import GearMeshes
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import NonlinearSystem
-from femgear.solvers.series import FourierSeries
-from femgear.solvers.shooting import solve_shooting
-from femgear.system import MechanicalSystem
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.shooting import solve_shooting
+from femgear.system.elements import GearMeshes
+from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.series import FourierSeries
+from femgear.system.system import MechanicalSystem
+from femgear.trains.gear_pair.model import equivalent_mass, gear_pair
 
 INERTIA, RADIUS = (1.2e-3, 4.5e-3), (0.04, 0.07)
 STIFFNESS, TORQUE = 3e8, 120.0

@@ -8,13 +8,19 @@ import pytest
 from scipy.linalg import eigh, null_space
 from scipy.optimize import root
 from uneven_set import ANGLES, UNEVEN
+from validation import helical
+from validation.helical import kahraman_set, rigid_motions
+from validation.planar import lin_parker_set
+from validation.planetary import nrel_set
 
 from femgear.errors import CaseError
-from femgear.models.helical import (
-    HelicalBody,
+from femgear.solvers.linear.modal import solve_modes
+from femgear.system.assembler import planar_system
+from femgear.system.lumped import HelicalBody, HelicalSupport, PlanarTorque
+from femgear.trains.helical.model import (
     HelicalSet,
-    HelicalSupport,
-    PlanarTorque,
+    body_masses,
+    contact_ratios,
     free_motions,
     helical_dofs,
     helical_from_set,
@@ -22,13 +28,6 @@ from femgear.models.helical import (
     mesh_directions,
     pin_directions,
 )
-from femgear.models.helical_data import body_masses, contact_ratios
-from femgear.models.planar import planar_system
-from femgear.solvers.modal import solve_modes
-from femgear.validation import helical
-from femgear.validation.helical import kahraman_set, rigid_motions
-from femgear.validation.planar import lin_parker_set
-from femgear.validation.planetary import nrel_set
 
 
 def uneven(**changes):

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.helical import kahraman_set
 
 from femgear.errors import CaseError
-from femgear.models.helical import CENTRAL, HelicalBody, HelicalSupport, PlanarTorque, helical_system
-from femgear.validation.helical import kahraman_set
+from femgear.system.lumped import CENTRAL, HelicalBody, HelicalSupport, PlanarTorque
+from femgear.trains.helical.model import helical_system
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from validation.helical import kahraman_set
 
-from femgear.contact.record import cycle_without_load
+from femgear.contact.cycle import cycle_without_load
 from femgear.errors import CaseError
 from femgear.gears import involute
 from femgear.gears.iso6336 import theoretical_single_stiffness
-from femgear.models.helical_excitation import contact_line_width, helical_excitation, slice_phases
-from femgear.system import MeshExcitation
-from femgear.validation.helical import kahraman_set
+from femgear.system.system import MeshExcitation
+from femgear.trains.helical.model import contact_line_width, helical_excitation, slice_phases
 
 TAU = np.arange(128) / 128
 MEAN, LINES = 4e8, np.array([0.2, 0.1j, 0.05 - 0.03j, 0.02])

@@ -4,13 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.helical import kahraman_set
 
 from femgear.errors import CaseError
-from femgear.models.helical import HelicalSupport, helical_system
-from femgear.models.helical_modes import helical_kinds, helical_modes, helical_motions, helical_springs
-from femgear.models.kinds import phase_basis, phasing
-from femgear.solvers.mode_energy import stiffness_of, strain_shares
-from femgear.validation.helical import kahraman_set
+from femgear.solvers.linear.tracking import stiffness_of, strain_shares
+from femgear.system.lumped import HelicalSupport
+from femgear.system.mode_kinds import phase_basis, phasing
+from femgear.trains.helical.model import (
+    helical_kinds,
+    helical_modes,
+    helical_motions,
+    helical_springs,
+    helical_system,
+)
 
 
 def equal(planets, **changes):

@@ -5,25 +5,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.helical import cases, kahraman_set
+from validation.planar import lin_parker_set
+from validation.routes import state_of
 
 from femgear.errors import CaseError
-from femgear.models.helical import HelicalBody, HelicalSet, HelicalSupport, PlanarTorque
-from femgear.models.helical_excitation import helical_excitation
-from femgear.models.helical_modes import helical_modes
-from femgear.models.helical_problem import helical_meshes, helical_problem
-from femgear.models.helical_response import modal_error_response, phased_errors
-from femgear.models.planar import planar_system
-from femgear.models.planar_modes import planar_modes
-from femgear.models.planar_problem import phased_series, planar_meshes, planar_problem
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import element_forces
-from femgear.solvers.shooting import solve_shooting
-from femgear.solvers.spectral import solve_spectral
-from femgear.system import MeshExcitation
-from femgear.validation.helical import cases, kahraman_set
-from femgear.validation.planar import lin_parker_set
-from femgear.validation.routes import state_of
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.shooting import solve_shooting
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.system.assembler import planar_meshes, planar_system
+from femgear.system.lumped import HelicalBody, HelicalSupport, PlanarTorque
+from femgear.system.nonlinear import element_forces
+from femgear.system.system import MeshExcitation
+from femgear.trains.helical.model import (
+    HelicalSet,
+    helical_excitation,
+    helical_meshes,
+    helical_modes,
+    helical_problem,
+    modal_error_response,
+    phased_errors,
+)
+from femgear.trains.planar.model import phased_series, planar_modes, planar_problem
 
 TORQUE = PlanarTorque(300.0)
 PHASES = -np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])

@@ -4,16 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.helical import TABLE_2, cases, kahraman_set
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears.phasing import MeshPhasing, mesh_phasing, phase_factors
-from femgear.models.helical import free_motions, helical_system
-from femgear.models.helical_data import body_masses
-from femgear.models.helical_modes import helical_modes, helical_motions, helical_springs
-from femgear.models.helical_response import modal_error_response, phased_errors, spring_loads
-from femgear.models.kinds import phase_shares
-from femgear.solvers.frequency_response import mesh_error_response
-from femgear.validation.helical import TABLE_2, cases, kahraman_set
+from femgear.solvers.linear.frequency_response import mesh_error_response
+from femgear.system.mode_kinds import phase_shares
+from femgear.trains.helical.model import (
+    body_masses,
+    free_motions,
+    helical_modes,
+    helical_motions,
+    helical_springs,
+    helical_system,
+    modal_error_response,
+    phased_errors,
+    spring_loads,
+)
 
 HERTZ = np.linspace(60.0, 15e3, 150)
 AMPLITUDES = np.array([1.0, 0.5j, -0.25, 0.1 + 0.1j]) * 1e-6

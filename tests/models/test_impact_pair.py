@@ -7,23 +7,22 @@ import pytest
 from scipy.optimize import fsolve
 
 from femgear.errors import CaseError
-from femgear.models.contact_states import level_crossings, range_states
-from femgear.models.impact_pair import (
+from femgear.solvers.continuation.branches import parameter_curve
+from femgear.solvers.continuation.sweep import sweep_response
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.system.elements import GearMeshes
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries, SummedSeries, constant, harmonic_lines
+from femgear.system.system import MechanicalSystem
+from femgear.trains.gear_pair.model import (
     ImpactPair,
     PairBearings,
     example_pair,
+    level_crossings,
     pair_scales,
+    range_states,
     separation_ratios,
 )
-from femgear.solvers.branches import parameter_curve
-from femgear.solvers.elements import GearMeshes
-from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.lines import harmonic_lines
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.series import FourierSeries, constant
-from femgear.solvers.summed_series import SummedSeries
-from femgear.solvers.sweep_response import sweep_response
-from femgear.system import MechanicalSystem
 
 
 def describing_functions(mean, amplitude):

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError
-from femgear.models.kinds import (
+from femgear.system.assembler import planar_system
+from femgear.system.mode_kinds import (
     class_energies,
     mode_kinds,
     motion_planes,
@@ -13,9 +15,7 @@ from femgear.models.kinds import (
     phasing,
     set_motions,
 )
-from femgear.models.planar import planar_system
-from femgear.models.planar_modes import class_shares, planar_modes
-from femgear.validation.planar import lin_parker_set
+from femgear.trains.planar.model import class_shares, planar_modes
 
 
 def rigid_ring_set(planets, *, spread=0.0):

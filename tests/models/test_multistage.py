@@ -7,39 +7,33 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from published.multistage_example import PUBLISHED, four_stage_train, published_train
 from scipy.linalg import eigh
 from trains import closed_set, stage, two_stages
+from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError
-from femgear.models.multistage import (
-    joined_motions,
-    mean_mesh_stiffness,
-    multistage_springs,
-    multistage_system,
-    stage_slices,
-)
-from femgear.models.multistage_data import (
+from femgear.solvers.linear.tracking import stiffness_of, strain_shares
+from femgear.system.assembler import planar_meshes, planar_system
+from femgear.system.lumped import CENTRAL
+from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
     Stage,
     StageCoupling,
     in_series,
+    joined_motions,
+    mean_mesh_stiffness,
+    multistage_springs,
+    multistage_system,
     shaft_stiffness,
+    speed_ratio,
+    stage_slices,
+    train_speeds,
+    train_torques,
 )
-from femgear.models.multistage_example import PUBLISHED, four_stage_train, published_train
-from femgear.models.multistage_modes import multistage_modes
-from femgear.models.multistage_motion import speed_ratio, train_speeds, train_torques
-from femgear.models.multistage_response import (
-    error_response,
-    multistage_problem,
-    stage_error,
-)
-from femgear.models.planar import planar_system
-from femgear.models.planar_data import CENTRAL
-from femgear.models.planar_modes import planar_modes
-from femgear.models.planar_problem import planar_meshes
-from femgear.solvers.mode_energy import stiffness_of, strain_shares
-from femgear.validation.planar import lin_parker_set
+from femgear.trains.multistage.stages import error_response, multistage_modes, multistage_problem, stage_error
+from femgear.trains.planar.model import planar_modes
 
 # --- speeds and torques -------------------------------------------------------------------------------
 

@@ -4,35 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.multistage_example import DESIGNS, SPEED, TORQUE, example_gears, four_stage_train
 from trains import two_stages
 
 from femgear.errors import CaseError
-from femgear.models.multistage import (
+from femgear.solvers.linear.frequency_response import mesh_error_response
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.assembler import planar_meshes
+from femgear.system.lumped import PlanarTorque
+from femgear.system.series import FourierSeries, distinct_lines, harmonic_lines
+from femgear.trains.multistage.model import (
+    Member,
+    MultistageSet,
     mean_mesh_stiffness,
     mesh_columns,
     multistage_system,
     stage_slices,
+    train_speeds,
+    train_torques,
     turning_couplings,
 )
-from femgear.models.multistage_data import (
-    Member,
-    MultistageSet,
-)
-from femgear.models.multistage_example import DESIGNS, SPEED, TORQUE, example_gears, four_stage_train
-from femgear.models.multistage_motion import train_speeds, train_torques
-from femgear.models.multistage_response import (
-    base_frequencies,
-    error_response,
-    multistage_problem,
-    stage_error,
-)
-from femgear.models.planar_data import PlanarTorque
-from femgear.models.planar_problem import phased_series, planar_meshes, planar_problem
-from femgear.solvers.frequency_response import mesh_error_response
-from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.lines import distinct_lines, harmonic_lines
-from femgear.solvers.series import FourierSeries
-from femgear.solvers.transient import solve_transient
+from femgear.trains.multistage.stages import base_frequencies, error_response, multistage_problem, stage_error
+from femgear.trains.planar.model import phased_series, planar_problem
 
 
 def test_load_bends_the_train_as_the_torques_say():

@@ -7,26 +7,28 @@ import numpy as np
 import pytest
 from scipy.linalg import eig, eigh
 from uneven_set import ANGLES, UNEVEN
+from validation.planar import lin_parker_set
+from validation.planetary import nrel_set
 
 from femgear.errors import CaseError
-from femgear.gears import torques
-from femgear.models.planar import (
-    CENTRAL,
-    PlanarBody,
-    PlanarTorque,
+from femgear.gears.kinematics import torques
+from femgear.solvers.linear.modal import solve_modes
+from femgear.system.assembler import (
     column_groups,
     free_motions,
     mesh_directions,
     pin_directions,
     planar_dofs,
-    planar_from_set,
     planar_system,
+)
+from femgear.system.lumped import (
+    CENTRAL,
+    PlanarBody,
+    PlanarTorque,
+    planar_from_set,
     torque_shares,
     torsional_set,
 )
-from femgear.solvers.modal import solve_modes
-from femgear.validation.planar import lin_parker_set
-from femgear.validation.planetary import nrel_set
 
 
 def uneven(**changes):

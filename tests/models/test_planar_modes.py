@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.wind_turbine import wind_turbine_b
+from validation.planar import by_kind, lin_parker_set, torsional
 
 from femgear.errors import CaseError
-from femgear.models.planar_modes import class_shares, planar_kinds, planar_modes
-from femgear.models.wind_turbine import wind_turbine_b
-from femgear.validation.planar import by_kind, lin_parker_set, torsional
+from femgear.trains.planar.model import class_shares, planar_kinds, planar_modes
 
 # the matrices of Lin and Parker (1999) set up elsewhere and solved in double precision [Hz]
 PLANET = (1808.18088204, 5963.76002161, 6981.70516704)

@@ -5,29 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation import planar
+from validation.planar import lin_parker_set, sharing_set, static_mesh_forces, sun_forces
 
 from femgear.errors import CaseError
-from femgear.models.planar import (
-    PlanarTorque,
+from femgear.system.assembler import (
     column_groups,
     mesh_directions,
     pin_directions,
-    planar_system,
-    torque_shares,
-)
-from femgear.models.planar_problem import (
-    Clearances,
-    Gravity,
-    phased_series,
-    pin_deflections,
     planar_meshes,
-    planar_problem,
+    planar_system,
 )
-from femgear.solvers.nonlinear import element_forces, external_force
-from femgear.solvers.series import FourierSeries, StepSeries, constant
-from femgear.system import MeshExcitation
-from femgear.validation import planar
-from femgear.validation.planar import lin_parker_set, sharing_set, static_mesh_forces, sun_forces
+from femgear.system.lumped import PlanarTorque, torque_shares
+from femgear.system.nonlinear import element_forces, external_force
+from femgear.system.series import FourierSeries, StepSeries, constant
+from femgear.system.system import MeshExcitation
+from femgear.trains.planar.model import Clearances, Gravity, phased_series, pin_deflections, planar_problem
 
 ANGLES = np.array([0.3, 1.9, 4.1])
 

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 from scipy.linalg import eigh, eigvals
+from validation.timoshenko import free_bending
 
 from femgear.errors import CaseError
-from femgear.models.shaft import (
+from femgear.system.shaft import (
     Disc,
     ShaftSection,
     Support,
@@ -16,7 +17,6 @@ from femgear.models.shaft import (
     joint_springs,
     shaft_system,
 )
-from femgear.validation.timoshenko import free_bending
 
 SECTION = ShaftSection(0.1, 0.02)
 LENGTH, COUNT = 1.0, 24
@@ -198,7 +198,7 @@ def test_shafts_of_the_printed_springs_are_those_of_the_page():
     import re
     from pathlib import Path
 
-    from femgear.models.wind_turbine_drivetrain import PRINTED
+    from published.wind_turbine_drivetrain import PRINTED
 
     page = (Path(__file__).parents[2] / "docs" / "drivetrain.md").read_text(encoding="utf-8")
     springs = (PRINTED.low_speed, PRINTED.intermediate, PRINTED.high_speed)

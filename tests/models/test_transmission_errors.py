@@ -4,23 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError
-from femgear.models.equivalent_damping import equivalent_damping, planar_mesh_dampers
-from femgear.models.planar import planar_system
-from femgear.models.planar_data import PlanarTorque
-from femgear.models.planar_problem import planar_meshes, planar_problem
-from femgear.models.transmission_errors import (
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.assembler import planar_meshes, planar_system
+from femgear.system.lumped import PlanarTorque
+from femgear.system.series import series_spectrum
+from femgear.system.transmission_errors import (
     Eccentricity,
     TransmissionErrors,
     carrier_pins,
+    equivalent_damping,
+    planar_mesh_dampers,
     tooth_lines,
     with_errors,
 )
-from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.summed_series import series_spectrum
-from femgear.solvers.transient import solve_transient
-from femgear.validation.planar import lin_parker_set
+from femgear.trains.planar.model import planar_problem
 
 DATA = lin_parker_set(3)
 TEETH = {"sun": 28, "planet": 36, "ring": 101}

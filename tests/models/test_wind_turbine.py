@@ -4,17 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from femgear.errors import CaseError
-from femgear.models.planar_modes import planar_modes
-from femgear.models.wind_turbine import (
+from published.wind_turbine import (
     bearing_problem_a,
     drive_reduction,
     gravity_problem_b,
     wind_turbine_a,
     wind_turbine_b,
 )
-from femgear.models.wind_turbine_response import (
+from published.wind_turbine_response import (
     bearing_history,
     contact_shares,
     member_rms,
@@ -24,9 +21,12 @@ from femgear.models.wind_turbine_response import (
     wedging_onset,
     weight_branch,
 )
-from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.sweep_response import sweep_response
-from femgear.validation import nrel
+from validation import nrel
+
+from femgear.errors import CaseError
+from femgear.solvers.continuation.sweep import sweep_response
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.trains.planar.model import planar_modes
 
 
 def solved(problem, hertz, harmonics=9, **options):

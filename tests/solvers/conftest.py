@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.system import MechanicalSystem, MeshExcitation
+from femgear.system.system import MechanicalSystem, MeshExcitation
 
 
 @pytest.fixture

@@ -6,19 +6,20 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.errors import CaseError
-from femgear.solvers.branches import (
+from femgear.solvers.continuation.arclength import StepOptions
+from femgear.solvers.continuation.branches import (
     branch_maximum,
     crossing_branches,
     frequency_response_curve,
     parameter_curve,
 )
-from femgear.solvers.continuation import StepOptions
-from femgear.solvers.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, gear_meshes
-from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, modal_damping
-from femgear.solvers.series import FourierSeries
-from femgear.solvers.stability_chart import stability_boundary
-from femgear.system import MechanicalSystem
+from femgear.solvers.linear.modal import modal_damping
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.stability.chart import stability_boundary
+from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, gear_meshes
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries
+from femgear.system.system import MechanicalSystem
 
 ONE = np.ones((1, 1))
 

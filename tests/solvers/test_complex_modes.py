@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.models.kinds import motion_planes
-from femgear.models.planar import planar_system
-from femgear.solvers.complex_modes import complex_modes, damping_matrix, whirl
-from femgear.solvers.modal import solve_modes
-from femgear.system import MechanicalSystem
-from femgear.validation.planar import lin_parker_set
+from femgear.solvers.linear.modal import complex_modes, damping_matrix, solve_modes, whirl
+from femgear.system.assembler import planar_system
+from femgear.system.mode_kinds import motion_planes
+from femgear.system.system import MechanicalSystem
 
 NO_MESH = np.zeros(0)
 

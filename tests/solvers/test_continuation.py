@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.continuation import (
+from femgear.solvers.continuation.arclength import (
     StepOptions,
     continue_curve,
     curve_points,

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from validation.reference.force_history import solve_force_history
 
 from femgear.errors import CaseError
-from femgear.solvers.duhamel import modal_history, state_history, step_matrices
-from femgear.solvers.force_history import solve_force_history
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import modal_damping
-from femgear.system import MechanicalSystem
+from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.time.convolution import modal_history, state_history, step_matrices
+from femgear.system.system import MechanicalSystem
 
 NATURAL = np.array([0.0, 0.4, 3.0, 3.0, 3.0, 40.0])
 RATIO = np.array([0.0, 0.05, 0.2, 1.0, 1.7, 0.01])

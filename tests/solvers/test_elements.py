@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from femgear.errors import CaseError
-from femgear.solvers.elements import (
+from femgear.system.elements import (
     GearMeshes,
     PiecewiseSprings,
     PolynomialSprings,
@@ -15,9 +15,8 @@ from femgear.solvers.elements import (
     gear_meshes,
     positive_part,
 )
-from femgear.solvers.harmonics import harmonics_of
-from femgear.solvers.series import FourierSeries, StepSeries, constant
-from femgear.system import MeshExcitation
+from femgear.system.series import FourierSeries, StepSeries, constant, harmonics_of
+from femgear.system.system import MeshExcitation
 
 RNG = np.random.default_rng(4)
 THETA = RNG.uniform(0.0, 6.0, (200, 1))

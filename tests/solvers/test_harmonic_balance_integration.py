@@ -6,17 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from validation.planar import lin_parker_set
 
-from femgear.models.planar_data import PlanarTorque
-from femgear.models.planar_problem import Clearances, planar_meshes, planar_problem
-from femgear.solvers.elements import GearMeshes, PolynomialSprings, RadialBearings
-from femgear.solvers.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.harmonics import harmonics_of
-from femgear.solvers.lines import harmonic_lines
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, element_forces, external_force
-from femgear.solvers.series import FourierSeries
-from femgear.system import MechanicalSystem
-from femgear.validation.planar import lin_parker_set
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.system.assembler import planar_meshes
+from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
+from femgear.system.lumped import PlanarTorque
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces, external_force
+from femgear.system.series import FourierSeries, harmonic_lines, harmonics_of
+from femgear.system.system import MechanicalSystem
+from femgear.trains.planar.model import Clearances, planar_problem
 
 
 def state_of(problem, solution):

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from femgear.solvers import harmonic_krylov, harmonic_newton
-from femgear.solvers.elements import GearMeshes, RadialBearings
-from femgear.solvers.harmonic_balance import harmonic_balance, solve_harmonic_balance
-from femgear.solvers.lines import side_bands
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.series import FourierSeries
-from femgear.system import MechanicalSystem
+from femgear.solvers.periodic import equations
+from femgear.solvers.periodic import harmonic_balance as solvers_periodic_harmonic_balance
+from femgear.solvers.periodic.equations import harmonic_balance
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.system.elements import GearMeshes, RadialBearings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries, side_bands
+from femgear.system.system import MechanicalSystem
 
 
 def two_masses(load=1.0):
@@ -31,7 +32,7 @@ def balance():
 
 def test_products_are_those_of_the_matrix(balance):
     y, receptance = balance.linear_start([0.21, 1.3]), balance.receptance([0.21, 1.3])[0]
-    error, tangent = harmonic_krylov.linearised(balance, receptance, y)
+    error, tangent = equations.linearised(balance, receptance, y)
     residual, matrix, _ = balance.evaluate(y, [0.21, 1.3])
     np.testing.assert_allclose(error, residual, atol=1e-13 * abs(residual).max())
     change = np.random.default_rng(1).standard_normal(balance.size)
@@ -43,11 +44,9 @@ def test_products_are_those_of_the_matrix(balance):
 
 def test_radius_is_that_of_the_matrix(balance):
     y, receptance = balance.linear_start([0.21, 1.3]), balance.receptance([0.21, 1.3])[0]
-    tangent = harmonic_krylov.linearised(balance, receptance, y)[1]
+    tangent = equations.linearised(balance, receptance, y)[1]
     matrix = balance.evaluate(y, [0.21, 1.3])[1] - np.eye(balance.size)
-    assert harmonic_krylov.krylov_radius(tangent) == pytest.approx(
-        abs(np.linalg.eigvals(matrix)).max(), rel=0.01
-    )
+    assert equations.krylov_radius(tangent) == pytest.approx(abs(np.linalg.eigvals(matrix)).max(), rel=0.01)
 
 
 @pytest.mark.parametrize("load", [1.0, 0.05])
@@ -55,7 +54,7 @@ def test_either_way_gives_the_same_solution(load, monkeypatch):
     """With the small load the mesh separates and meets its other side."""
     orders, problem = side_bands(4, 3, 2), two_masses(load)
     direct = solve_harmonic_balance(problem, [0.21, 1.3], orders=orders)
-    monkeypatch.setattr(harmonic_newton, "MANY", 0)
+    monkeypatch.setattr(solvers_periodic_harmonic_balance, "MANY", 0)
     products = solve_harmonic_balance(problem, [0.21, 1.3], orders=orders)
     assert direct.converged and products.converged
     np.testing.assert_allclose(
@@ -65,8 +64,8 @@ def test_either_way_gives_the_same_solution(load, monkeypatch):
 
 def test_the_matrix_helps_where_products_do_not_suffice(balance, monkeypatch):
     y, receptance = balance.linear_start([0.21, 1.3]), balance.receptance([0.21, 1.3])[0]
-    error, tangent = harmonic_krylov.linearised(balance, receptance, y)
-    monkeypatch.setattr(harmonic_krylov, "_PRODUCTS", 2)
+    error, tangent = equations.linearised(balance, receptance, y)
+    monkeypatch.setattr(equations, "_PRODUCTS", 2)
     assert tangent.solve(error) is None
-    step = harmonic_newton._newton_step(balance, receptance, y, error, tangent)
+    step = solvers_periodic_harmonic_balance._newton_step(balance, receptance, y, error, tangent)
     np.testing.assert_allclose(balance.evaluate(y, [0.21, 1.3])[1] @ step, error, atol=1e-12)

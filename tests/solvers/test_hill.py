@@ -5,18 +5,22 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from validation.parametric import RATIO, SOFT, mathieu_monodromy, rectangular_monodromy
 
 from femgear.errors import CaseError
-from femgear.solvers.elements import GearMeshes, PolynomialSprings, gear_meshes
-from femgear.solvers.floquet import floquet_multipliers
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.hill import floquet_verdict, floquet_verdicts, loss_of, tangents_of
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, modal_damping
-from femgear.solvers.series import FourierSeries, StepSeries, constant
-from femgear.solvers.tangent_jumps import tangent_jumps
-from femgear.system import MechanicalSystem
-from femgear.validation.parametric import RATIO, SOFT, mathieu_monodromy, rectangular_monodromy
+from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.solution import loss_of
+from femgear.solvers.stability.floquet import (
+    floquet_multipliers,
+    floquet_verdict,
+    floquet_verdicts,
+    tangents_of,
+)
+from femgear.system.elements import GearMeshes, PolynomialSprings, gear_meshes, tangent_jumps
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries, StepSeries, constant
+from femgear.system.system import MechanicalSystem
 
 ONE = np.ones((1, 1))
 MEAN = RATIO + (1.0 - RATIO) * SOFT

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.models.impact_pair import example_pair, lightly_loaded_pair
-from femgear.solvers.elements import GearMeshes, PolynomialSprings
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.lyapunov import lyapunov_exponents
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.series import FourierSeries, constant
-from femgear.solvers.transient import solve_transient
-from femgear.system import MechanicalSystem
+from femgear.solvers.chaos.lyapunov import lyapunov_exponents
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries, constant
+from femgear.system.system import MechanicalSystem
+from femgear.trains.gear_pair.model import example_pair, lightly_loaded_pair
 
 
 def oscillator(element, damping, force=0.0):

@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 
 from femgear.errors import ConvergenceError
-from femgear.models.gear_pair import gear_pair
-from femgear.solvers.branches import frequency_response_curve
-from femgear.solvers.elements import GearMeshes, PolynomialSprings
-from femgear.solvers.harmonic_balance import adapt_harmonics, solve_harmonic_balance
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.periodic_response import periodic_response
-from femgear.solvers.series import FourierSeries
-from femgear.system import MechanicalSystem
+from femgear.solvers.continuation.branches import frequency_response_curve
+from femgear.solvers.periodic.harmonic_balance import (
+    adapt_harmonics,
+    periodic_response,
+    solve_harmonic_balance,
+)
+from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries
+from femgear.system.system import MechanicalSystem
+from femgear.trains.gear_pair.model import gear_pair
 
 NOTE = "nothing carries the mean load of column 1 (mesh 1)"
 

@@ -2,13 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.models.planar import planar_system
-from femgear.solvers.modal import output_load, output_response, residual_output, solve_modes
-from femgear.solvers.spectral import solve_spectral
-from femgear.system import MechanicalSystem
-from femgear.validation.planar import lin_parker_set
+from femgear.solvers.linear.modal import output_load, output_response, residual_output, solve_modes
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.system.assembler import planar_system
+from femgear.system.system import MechanicalSystem
 
 
 def pair(m1=2.0, m2=3.0, load=(5.0, 5.0)):

@@ -6,18 +6,26 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
+from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.models.kinds import motion_planes
-from femgear.models.planar import planar_system
-from femgear.models.planar_modes import planar_kinds, planar_modes, planar_springs
-from femgear.solvers.campbell import campbell_data
-from femgear.solvers.complex_modes import complex_modes
-from femgear.solvers.mode_energy import body_groups, kinetic_shares, stiffness_of, strain_shares
-from femgear.solvers.mode_tracking import mac, oscillating, track_modes
-from femgear.solvers.veering import approaches, coupling_factor
-from femgear.system import MechanicalSystem
-from femgear.validation.planar import lin_parker_set
+from femgear.solvers.linear.campbell import campbell_data
+from femgear.solvers.linear.modal import complex_modes
+from femgear.solvers.linear.tracking import (
+    approaches,
+    body_groups,
+    coupling_factor,
+    kinetic_shares,
+    mac,
+    oscillating,
+    stiffness_of,
+    strain_shares,
+    track_modes,
+)
+from femgear.system.assembler import planar_system
+from femgear.system.mode_kinds import motion_planes
+from femgear.system.system import MechanicalSystem
+from femgear.trains.planar.model import planar_kinds, planar_modes, planar_springs
 
 # two masses 1 on springs 1 + p and 2 - p, joined by kc: eigenvalues 1.5 + kc -+ sqrt((p - 1/2)^2 + kc^2)
 SPLIT = np.diag([1.0, -1.0])

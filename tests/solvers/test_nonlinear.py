@@ -4,18 +4,12 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.elements import GearMeshes, PolynomialSprings, RadialBearings
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import (
-    HarmonicForce,
-    NonlinearSystem,
-    element_forces,
-    external_force,
-    modal_damping,
-)
-from femgear.solvers.periodic import PeriodicSolution
-from femgear.solvers.series import FourierSeries
-from femgear.system import MechanicalSystem
+from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.periodic.solution import PeriodicSolution
+from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces, external_force
+from femgear.system.series import FourierSeries
+from femgear.system.system import MechanicalSystem
 
 
 def problem_of(system, **changes):

@@ -4,22 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.parametric import NATURAL, one_pair, rectangular_monodromy
 
 from femgear.errors import CaseError
-from femgear.solvers import hill
-from femgear.solvers.branches import frequency_response_curve, parameter_curve
-from femgear.solvers.elements import GearMeshes, PolynomialSprings, gear_meshes
-from femgear.solvers.harmonic_balance import harmonic_balance, solve_harmonic_balance
-from femgear.solvers.harmonic_equations import largest_modulus
-from femgear.solvers.harmonics import harmonics_of
-from femgear.solvers.hill import floquet_verdict, floquet_verdicts
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, modal_damping
-from femgear.solvers.periodic_response import periodic_response
-from femgear.solvers.series import FourierSeries
-from femgear.solvers.spectral import solve_spectral
-from femgear.system import MechanicalSystem
-from femgear.validation.parametric import NATURAL, one_pair, rectangular_monodromy
+from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
+from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.periodic.equations import harmonic_balance, largest_modulus
+from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_harmonic_balance
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.stability import floquet
+from femgear.solvers.stability.floquet import floquet_verdict, floquet_verdicts
+from femgear.system.elements import GearMeshes, PolynomialSprings, gear_meshes
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries, harmonics_of
+from femgear.system.system import MechanicalSystem
 
 ONE = np.ones((1, 1))
 
@@ -163,7 +161,7 @@ def test_long_period_within_the_bound_has_its_verdict():
 def test_portions_of_long_periods_change_no_verdict(monkeypatch):
     solutions = [solve_harmonic_balance(duffing(), f, harmonics=7) for f in (1.8, 0.2, 1.6, 0.3)]
     together = floquet_verdicts(duffing(), solutions)
-    monkeypatch.setattr(hill, "_MOST_ENTRIES", 40)
+    monkeypatch.setattr(floquet, "_MOST_ENTRIES", 40)
     apart = floquet_verdicts(duffing(), solutions)
     for one, other in zip(together, apart):
         np.testing.assert_allclose(one.multipliers, other.multipliers, atol=1e-7)

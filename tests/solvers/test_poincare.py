@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.elements import PiecewiseSprings, PolynomialSprings
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.poincare import bifurcation_diagram, stroboscopic_section, surface_section
-from femgear.system import MechanicalSystem
+from femgear.solvers.chaos.poincare import bifurcation_diagram, stroboscopic_section, surface_section
+from femgear.system.elements import PiecewiseSprings, PolynomialSprings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.system import MechanicalSystem
 
 
 def oscillator(c, k, *elements, force=None):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError, FemgearError
-from femgear.solvers.elements import PolynomialSprings
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.receptance import reduce_problem, respond, source_columns
-from femgear.system import MechanicalSystem
+from femgear.solvers.periodic.receptance import reduce_problem, respond, source_columns
+from femgear.system.elements import PolynomialSprings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.system import MechanicalSystem
 
 OMEGA = np.array([0.3, 0.9, 1.7, 4.0])
 

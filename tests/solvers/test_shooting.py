@@ -8,20 +8,21 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from femgear.errors import CaseError
-from femgear.solvers.elements import (
+from femgear.solvers.linear.modal import modal_damping
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.stability.floquet import monodromy
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.elements import (
     GearMeshes,
     PiecewiseSprings,
     PolynomialSprings,
     RadialBearings,
     gear_meshes,
 )
-from femgear.solvers.floquet import monodromy
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, modal_damping
-from femgear.solvers.series import FourierSeries, StepSeries, constant
-from femgear.solvers.shooting import solve_free_vibration, solve_shooting
-from femgear.solvers.transient import solve_transient
-from femgear.system import MechanicalSystem
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries, StepSeries, constant
+from femgear.system.system import MechanicalSystem
 
 # Omega = 1.2 of NLvib example 01 (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019)
 DUFFING = {

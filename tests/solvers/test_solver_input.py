@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.campbell import campbell_data
-from femgear.solvers.continuation import continue_curve
-from femgear.solvers.elements import PolynomialSprings
-from femgear.solvers.frequency_response import direct_response, modal_response
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.poincare import bifurcation_diagram, stroboscopic_section, surface_section
-from femgear.solvers.shooting import solve_free_vibration, solve_shooting
-from femgear.solvers.sweep_response import sweep_response
-from femgear.solvers.transient import solve_transient
-from femgear.system import MechanicalSystem
+from femgear.solvers.chaos.poincare import bifurcation_diagram, stroboscopic_section, surface_section
+from femgear.solvers.continuation.arclength import continue_curve
+from femgear.solvers.continuation.sweep import sweep_response
+from femgear.solvers.linear.campbell import campbell_data
+from femgear.solvers.linear.frequency_response import direct_response, modal_response
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.elements import PolynomialSprings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.system import MechanicalSystem
 
 STARTS = (([np.nan], [0.0]), ([0.0, 0.0], [0.0]), ([0.0],), (0.0, 0.0), "ab")
 

@@ -5,11 +5,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers import operator
-from femgear.solvers.harmonics import harmonics_of, multiply, pad, product_matrix, sample
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.spectral import solve_spectral
-from femgear.system import MechanicalSystem, MeshExcitation
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.periodic import spectral
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.system.series import harmonics_of, multiply, pad, product_matrix, sample
+from femgear.system.system import MechanicalSystem, MeshExcitation
 
 
 def series(amplitudes, angle):
@@ -182,7 +182,7 @@ def full_problem(modes, excitation, frequency):
     receptance = np.einsum("ik,jk,shk->ijsh", r, r, modal) + modes.residual[:, :, None, None]
     source = -np.einsum("ijsh,jh->ish", receptance, forcing)
     source[..., 0] += modes.load_deflection[:, None]
-    return operator.HarmonicProblem(receptance, product_matrix(k, 12), source)
+    return spectral.HarmonicProblem(receptance, product_matrix(k, 12), source)
 
 
 @pytest.mark.parametrize("spoiled", [False, True])
@@ -197,10 +197,10 @@ def test_reduction_to_one_planet_equals_the_full_equations(planet_set, planet_ex
     modes = solve_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
     frequency = np.linspace(0.05, 0.5, 5)
     problem = full_problem(modes, excitation, frequency)
-    twins = operator.find_twins((pad(harmonics_of(excitation.stiffness, 6), 12),))
+    twins = spectral.find_twins((pad(harmonics_of(excitation.stiffness, 6), 12),))
     assert len(twins.leaders) == 2
-    assert (operator.reduce_twins(problem, twins) is None) is spoiled
-    exact = operator.solve_direct(problem).transpose(1, 0, 2)
+    assert (spectral.reduce_twins(problem, twins) is None) is spoiled
+    exact = spectral.solve_direct(problem).transpose(1, 0, 2)
     for method in ("direct", "auto"):
         response = solve_spectral(modes, excitation, frequency, method=method, tolerance=1e-12)
         np.testing.assert_allclose(response.deflection, exact, atol=1e-10 * np.abs(exact).max())
@@ -224,8 +224,8 @@ def test_arnoldi_finds_the_spectral_radius(planet_set, planet_excitation):
     excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
     modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
     problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
-    exact = operator.spectral_radius(problem, exact_limit=np.inf)
-    np.testing.assert_allclose(operator.spectral_radius(problem, exact_limit=0.0), exact, rtol=0.02)
+    exact = spectral.spectral_radius(problem, exact_limit=np.inf)
+    np.testing.assert_allclose(spectral.spectral_radius(problem, exact_limit=0.0), exact, rtol=0.02)
 
 
 def test_many_speeds_equal_one_at_a_time(geared_chain, chain_excitation):

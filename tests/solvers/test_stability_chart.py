@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
 from scipy.special import mathieu_a, mathieu_b
+from validation.parametric import NATURAL, RATIO, SOFT, rectangular_monodromy
 
 from femgear.errors import CaseError
-from femgear.solvers.floquet import floquet_multipliers
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.nonlinear import NonlinearSystem
-from femgear.solvers.series import FourierSeries, StepSeries
-from femgear.solvers.stability_chart import stability_boundary, stability_chart
-from femgear.system import MechanicalSystem
-from femgear.validation.parametric import NATURAL, RATIO, SOFT, rectangular_monodromy
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.stability.chart import stability_boundary, stability_chart
+from femgear.solvers.stability.floquet import floquet_multipliers
+from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.series import FourierSeries, StepSeries
+from femgear.system.system import MechanicalSystem
 
 ONE = np.ones((1, 1))
 RECTANGLE = StepSeries([[1.0, SOFT]], [0.0, RATIO])

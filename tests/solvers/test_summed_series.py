@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.elements import GearMeshes
-from femgear.solvers.series import FourierSeries, constant
-from femgear.solvers.summed_series import SummedSeries, series_spectrum
+from femgear.system.elements import GearMeshes
+from femgear.system.series import FourierSeries, SummedSeries, constant, series_spectrum
 
 ONE = FourierSeries([[1.0, 2.0 - 1j, 0.5]], (1,))
 OTHER = FourierSeries([[0.5, 3j]], (0, 1))

@@ -4,15 +4,9 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.elements import (
-    GearMeshes,
-    PiecewiseSprings,
-    PolynomialSprings,
-    RadialBearings,
-    gear_meshes,
-)
-from femgear.solvers.floquet import monodromy
-from femgear.solvers.newmark import (
+from femgear.solvers.linear.modal import modal_damping
+from femgear.solvers.stability.floquet import monodromy
+from femgear.solvers.time.newmark import (
     AVERAGE_ACCELERATION,
     CENTRAL_DIFFERENCE,
     FOX_GOODWIN,
@@ -23,11 +17,17 @@ from femgear.solvers.newmark import (
     period_error,
     stability_limit,
 )
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem, element_forces, modal_damping
-from femgear.solvers.series import FourierSeries, StepSeries, constant
-from femgear.solvers.tabulated import tabulated_law
-from femgear.solvers.transient import solve_transient
-from femgear.system import MechanicalSystem
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.elements import (
+    GearMeshes,
+    PiecewiseSprings,
+    PolynomialSprings,
+    RadialBearings,
+    gear_meshes,
+)
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces, tabulated_law
+from femgear.system.series import FourierSeries, StepSeries, constant
+from femgear.system.system import MechanicalSystem
 
 RATIOS = np.array([0.01, 0.05, 0.1, 0.2])
 FIXED = (

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.elements import GearMeshes, PolynomialSprings
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.series import FourierSeries
-from femgear.solvers.shooting import solve_shooting
-from femgear.solvers.sweep_response import sweep_response, sweep_up_and_down
-from femgear.system import MechanicalSystem
+from femgear.solvers.continuation.sweep import sweep_response, sweep_up_and_down
+from femgear.solvers.periodic.shooting import solve_shooting
+from femgear.system.elements import GearMeshes, PolynomialSprings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries
+from femgear.system.system import MechanicalSystem
 
 
 def oscillator(c, k, *elements, force=None, load=0.0):

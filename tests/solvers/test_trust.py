@@ -4,26 +4,37 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.parametric import NATURAL, one_pair, rectangular_monodromy
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers import harmonic_balance as balance_module
-from femgear.solvers.aft import sample_counts
-from femgear.solvers.branches import branch_maximum, frequency_response_curve, parameter_curve
-from femgear.solvers.elements import GearMeshes, PolynomialSprings, RadialBearings
-from femgear.solvers.floquet import stability
-from femgear.solvers.harmonic_balance import HarmonicBalance, adapt_harmonics, solve_harmonic_balance
-from femgear.solvers.harmonics import harmonics_of
-from femgear.solvers.hill import floquet_verdict
-from femgear.solvers.lines import coinciding_lines, harmonic_lines, line_tail, side_bands
-from femgear.solvers.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.solvers.periodic_response import periodic_response
-from femgear.solvers.receptance import reduce_problem
-from femgear.solvers.series import FourierSeries, StepSeries, constant
-from femgear.solvers.shooting import solve_free_vibration, solve_shooting
-from femgear.solvers.spectral import solve_spectral
-from femgear.solvers.transient import solve_transient
-from femgear.system import MechanicalSystem
-from femgear.validation.parametric import NATURAL, one_pair, rectangular_monodromy
+from femgear.solvers.continuation.branches import branch_maximum, frequency_response_curve, parameter_curve
+from femgear.solvers.periodic import harmonic_balance
+from femgear.solvers.periodic.aft import sample_counts
+from femgear.solvers.periodic.equations import HarmonicBalance
+from femgear.solvers.periodic.harmonic_balance import (
+    adapt_harmonics,
+    periodic_response,
+    solve_harmonic_balance,
+)
+from femgear.solvers.periodic.receptance import reduce_problem
+from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.stability import floquet
+from femgear.solvers.stability.floquet import floquet_verdict, stability
+from femgear.solvers.time.transient import solve_transient
+from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import (
+    FourierSeries,
+    StepSeries,
+    coinciding_lines,
+    constant,
+    harmonic_lines,
+    harmonics_of,
+    line_tail,
+    side_bands,
+)
+from femgear.system.system import MechanicalSystem
 
 ONE = np.ones((1, 1))
 
@@ -87,7 +98,7 @@ def test_verdict_where_the_fixed_point_converges_to_an_unstable_motion(ratio, ra
 
 def test_loops_do_without_and_say_so(monkeypatch):
     counted = {"radius": 0, "verdict": 0}
-    radius, judged = HarmonicBalance.spectral_radius, balance_module.judged
+    radius, judged = HarmonicBalance.spectral_radius, floquet.judged
 
     def counted_radius(self, *arguments):
         counted["radius"] += 1
@@ -98,7 +109,7 @@ def test_loops_do_without_and_say_so(monkeypatch):
         return judged(*arguments, **options)
 
     monkeypatch.setattr(HarmonicBalance, "spectral_radius", counted_radius)
-    monkeypatch.setattr(balance_module, "judged", counted_judged)
+    monkeypatch.setattr(harmonic_balance, "judged", counted_judged)
     found = adapt_harmonics(duffing(), 1.6, tail=1e-7)
     assert len(found.orders) >= 9 and counted == {"radius": 1, "verdict": 1}
     bare = [
@@ -128,12 +139,12 @@ def test_what_has_no_verdict_says_why():
 
 
 def test_modes_that_do_not_carry_the_motion_leave_the_verdict_open(monkeypatch):
-    from femgear.solvers import hill
+    from femgear.solvers.stability import floquet
 
     def refuse(*_, **__):
         raise ConvergenceError("too few modes", code="E-RESIDUAL")
 
-    monkeypatch.setattr(hill, "frame_of", refuse)
+    monkeypatch.setattr(floquet, "frame_of", refuse)
     found = solve_harmonic_balance(duffing(), 1.6, harmonics=5)
     assert found.converged and found.stable is None
     assert found.verdict.message == "not determined: too few modes"

@@ -13,7 +13,9 @@ from femgear.fe.elasticity import (
     stiffness,
     stress,
 )
-from femgear.fe.meshing import Grid, Outline, mesh_outline
+from femgear.fe.grid import Grid
+from femgear.fe.meshing import mesh_outline
+from femgear.fe.outline import Outline
 
 
 def curve(function, k, *, start=0.0, end=1.0):

@@ -9,18 +9,13 @@ import math
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears import (
-    BasicRack,
-    Gear,
-    PlanetarySet,
-    check_set,
-    equal_planet_angles,
-    tooth_thickness,
-    torques,
-)
 from femgear.gears import involute as iv
-from femgear.gears.checks import feasible_angles, neighbour_limit
+from femgear.gears.checks import check_set, feasible_angles, neighbour_limit
+from femgear.gears.fillet import BasicRack
+from femgear.gears.gear import Gear, tooth_thickness
 from femgear.gears.iso6336 import mesh_stiffness_method_b, theoretical_single_stiffness
+from femgear.gears.kinematics import torques
+from femgear.gears.planetary import PlanetarySet, equal_planet_angles
 
 A20, A25 = math.radians(20.0), math.radians(25.0)
 

@@ -5,15 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from femgear.validation import independent
-from femgear.validation.independent import PLANAR, half_unit, kahraman, lin_parker, sun_forces
-from femgear.validation.independent_weight import (
-    DAMPING_B,
-    Balance,
-    branch,
-    peak_without_wedging,
-    weighed,
-)
+from validation import independent
+from validation.independent import PLANAR, half_unit, kahraman, lin_parker, sun_forces
+from validation.independent_weight import DAMPING_B, Balance, branch, peak_without_wedging, weighed
 
 
 def test_only_femgear_names_of_its_own():
@@ -22,7 +16,7 @@ def test_only_femgear_names_of_its_own():
         path = independent.__file__.replace("independent.py", f"{name}.py")
         with open(path, encoding="utf-8") as file:
             imports = [line for line in file if line.lstrip().startswith(("import femgear", "from femgear"))]
-        assert all("femgear.validation.independent " in line for line in imports)
+        assert all("validation.independent " in line for line in imports)
 
 
 @pytest.mark.parametrize("planets", [3, 4, 5])

@@ -4,15 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from femgear.housing import (
-    OrderSpectrum,
-    analyse_band,
-    fixed_sensor_lines,
-    hanning_model,
-    heaviside_linear_lines,
-    order_spectrum,
-    phased_harmonics,
-)
+from femgear.housing.orders import OrderSpectrum, analyse_band, order_spectrum
+from femgear.housing.sensor import fixed_sensor_lines, hanning_model, heaviside_linear_lines, phased_harmonics
 
 THETA = 2 * np.pi * np.arange(4096) / 4096
 

@@ -3,16 +3,8 @@
 import numpy as np
 import pytest
 
-from femgear.validation.moving_force import (
-    DAMPING,
-    DIAMETERS,
-    ELEMENTS,
-    FORCE,
-    HARMONICS,
-    moving_force,
-    run,
-)
-from femgear.validation.planetary import reference_set
+from validation.moving_force import DAMPING, DIAMETERS, ELEMENTS, FORCE, HARMONICS, moving_force, run
+from validation.planetary import reference_set
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +15,7 @@ def case():
 @pytest.fixture(scope="module")
 def points():
     """Nodes in the order of the degrees of freedom."""
-    from femgear.validation.mapped import mapped_grid, ring_mapping
+    from validation.mapped import mapped_grid, ring_mapping
 
     ring = reference_set().ring
     return mapped_grid(ring_mapping(ring.root_radius, ring.rim_radius), 1, ELEMENTS, closed=True).points

@@ -5,10 +5,10 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
-from femgear.solvers.floquet import floquet_multipliers, monodromy
-from femgear.solvers.modal import solve_modes
-from femgear.solvers.spectral import solve_spectral
-from femgear.system import MechanicalSystem, MeshExcitation
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.stability.floquet import floquet_multipliers, monodromy
+from femgear.system.system import MechanicalSystem, MeshExcitation
 
 # Gauss nodes of the fourth-order Magnus integrator (Iserles et al., Acta Numerica 9, 2000, Eq. 5.6)
 GAUSS = 0.5 + np.array([-1.0, 1.0]) * np.sqrt(3) / 6

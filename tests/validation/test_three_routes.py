@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from femgear.solvers.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.harmonics import harmonics_of
-from femgear.solvers.shooting import solve_shooting
-from femgear.validation import routes
-from femgear.validation.routes import GATE, difference
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.shooting import solve_shooting
+from femgear.system.series import harmonics_of
+from validation import nonlinear, routes
+from validation.routes import GATE, difference
 
 PAIR = {False: (0.92, 0.3, 1.0), True: (0.9, 0.5, 0.1)}
 
@@ -35,7 +35,7 @@ def mesh_force(omega, depth, backlash):
 
 def test_duffing_against_an_integration_without_femgear():
     found, run = routes.duffing_motion()
-    line = routes.one_harmonic(2.5091975811, 1.2)
+    line = nonlinear.one_harmonic(2.5091975811, 1.2)
     lines = unit_mass(
         1.2, lambda x, t: x + 0.1 * x**3, drive=0.18, damping=0.05, periods=110,
         start=(line.real, -1.2 * line.imag),

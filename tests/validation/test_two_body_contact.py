@@ -7,10 +7,10 @@ import pytest
 
 from femgear.errors import ContactError
 from femgear.fe.elasticity import Material
-from femgear.validation import two_body
-from femgear.validation.mapped import mapped_grid
-from femgear.validation.mortar import boundary_dofs, make_surface, mortar_contact
-from femgear.validation.planetary import reference_set
+from validation import two_body
+from validation.mapped import mapped_grid
+from validation.mortar import boundary_dofs, make_surface, mortar_contact
+from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 

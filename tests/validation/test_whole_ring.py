@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femgear.validation.reference import reference_static
-from femgear.validation.ring import _sector_modes
-from femgear.validation.whole_ring import free_modes, whole_grid
+from validation.cases import reference_static
+from validation.ring import _sector_modes
+from validation.whole_ring import free_modes, whole_grid
 
 PLANE = {"tooth": "plane stress", "body": "plane stress"}
 DIAMETERS = (2, 3, 4, 0, 5)

@@ -1,0 +1,595 @@
+"""The case file: every entry checked, every unit converted, every mistake reported at once.
+
+Modifications of a case as forms of the flanks of its gears.
+
+Support stiffness of the members that a case gives a shaft: K = F/X of the shaft by finite elements.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from femgear.case import text as case_text
+from femgear.case.checks import check_floating, cross_check
+from femgear.case.deviations import CarrierErrors, GearErrors
+from femgear.case.problems import added_material, combine, in_terms_of_the_case, notices, rack_at, translate
+from femgear.case.sections import FORMAT, Case, PlanetSection, RingSection, SunSection, without_uncomputed
+from femgear.case.tables import embed_profiles
+from femgear.case.text import text_with_points
+from femgear.errors import CaseError, FemgearError, GeometryError
+from femgear.gears.checks import check_set
+from femgear.gears.deviation_checks import check_deviations
+from femgear.gears.deviations import Ovality, Runout, SetDeviations, no_deviations, tooth_displacements
+from femgear.gears.fillet import BasicRack, PinionCutter
+from femgear.gears.gear import Gear
+from femgear.gears.helix import transverse_rack, transverse_tool
+from femgear.gears.modifications import (
+    FlankForm,
+    MeasuredProfile,
+    Modification,
+    ProfileCrowning,
+    ProfileSlope,
+    RootRelief,
+    TipRelief,
+    check_form,
+    roll_at,
+)
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
+from femgear.trains.drivetrain.section import (
+    DrivetrainCase,
+    build_drivetrain,
+    is_drivetrain,
+    refuse_drivetrain,
+)
+
+if TYPE_CHECKING:
+    from femgear.case.deviations import ModificationSection
+
+
+def flank_form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
+    """Form of a flank of a gear; planets have one on the side of the sun and one on that of the ring.
+
+    Parameters
+    ----------
+    case : Case
+    gear : Gear
+    side : str
+        Flank of a planet, "sun side" or "ring side"; sun and ring have "both" alike.
+
+    Returns
+    -------
+    FlankForm
+
+    Raises
+    ------
+    GeometryError
+        E-MODIFICATION, with key, file and line: what the flank cannot have.
+    """
+    found = []
+    for i, section in enumerate(getattr(case, gear.name).modifications):
+        if getattr(section, "flank", "both") not in (side, "both"):
+            continue
+        try:
+            found.append(_modification(section, gear))
+            check_form(FlankForm((found[-1],)), gear)
+            if isinstance(found[-1], MeasuredProfile):
+                _check_reach(case, found[-1], gear, f"{gear.name}.modifications[{i}]")
+        except GeometryError as error:
+            error.key = f"{gear.name}.modifications[{i}]"
+            error.file = case.location(error.key)
+            raise
+    return FlankForm(tuple(found))
+
+
+def _modification(section: ModificationSection, gear: Gear) -> Modification:
+    if section.kind == "measured profile":
+        angles, diameters = section.roll_angles or (), section.diameters or ()
+        rolls = [roll_at(gear, roll_angle=a) for a in angles] + [roll_at(gear, diameter=d) for d in diameters]
+        points = sorted(zip(rolls, section.deviations, strict=True))
+        return MeasuredProfile(tuple(r for r, _ in points), tuple(-e for _, e in points))
+    start, end = (
+        roll_at(
+            gear,
+            diameter=getattr(section, f"{name}_diameter"),
+            roll_angle=getattr(section, f"{name}_roll_angle"),
+            length=getattr(section, f"{name}_roll_length"),
+        )
+        for name in ("start", "end")
+    )
+    match section.kind:
+        case "tip relief":
+            return TipRelief(section.amount, start, end, section.exponent)
+        case "root relief":
+            return RootRelief(section.amount, start, end, section.exponent)
+        case "profile slope":
+            return ProfileSlope(section.amount, start, end)
+        case _:
+            return ProfileCrowning(section.amount, start, end)
+
+
+def _check_reach(case: Case, profile: MeasuredProfile, gear: Gear, key: str) -> None:
+    """Refuse a measured profile that lies beside the flank.
+
+    Raises
+    ------
+    GeometryError
+        E-MODIFICATION, with the file of the profile and both ranges.
+    """
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    if profile.roll[-1] >= low and profile.roll[0] <= high:
+        return
+    source = case.profile_files.get(key)
+    named = f"the measured profile {source}" if source else "the measured profile"
+    raise GeometryError(
+        f"{gear.name}: no part of {named} lies on the flank",
+        code="E-MODIFICATION",
+        key=key,
+        value=_range(gear, *profile.roll[:: len(profile.roll) - 1]),
+        limit=f"points within {_range(gear, low, high)}",
+        remedy="check the unit of its first column and that it belongs to this gear",
+    )
+
+
+def _range(gear: Gear, low: float, high: float) -> str:
+    angles = (math.degrees(roll / gear.base_radius) for roll in (low, high))
+    diameters = (2e3 * math.hypot(roll, gear.base_radius) for roll in (low, high))
+    return "roll angles {:.4g} to {:.4g} deg, diameters {:.6g} to {:.6g} mm".format(*angles, *diameters)
+
+
+MEMBERS = ("sun", "carrier")
+
+
+def with_shafts(case: Case) -> Case:
+    """The case with the support stiffness of its shafts, held at one end and coupled at the other.
+
+    The member stands on the free end of a stepped cantilever, its face rigidly coupled to the axis, which
+    may tilt: ``K = F/X``, see `femgear.fe.shaft.shaft_support_stiffness`. The shaft is of the material
+    of the gears.
+
+    Raises
+    ------
+    GeometryError
+        Parts that make no shaft (E-SHAFT), with file and line.
+    """
+    found = {}
+    for name in MEMBERS:
+        section = getattr(case, name)
+        if not section.support_shaft:
+            continue
+        parts = tuple((one.length, one.outer_diameter, one.inner_diameter) for one in section.support_shaft)
+        material = case.material
+        try:
+            stiffness = _stiffness(parts, material.youngs_modulus, material.poisson_ratio, material.density)
+        except FemgearError as error:
+            error.key = f"{name}.support_shaft"
+            error.file = case.location(error.key)
+            raise
+        found[name] = section.model_copy(update={"support_stiffness": stiffness})
+    return case.model_copy(update=found) if found else case
+
+
+def shaft_lines(case: Case) -> tuple[str, ...]:
+    """What the shafts of a case hold, in sentences, with the beam of Timoshenko beside."""
+    from femgear.fe.elasticity import Material
+    from femgear.fe.shaft import ShaftStep, timoshenko_flexibility
+
+    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    lines = []
+    for name in MEMBERS:
+        section = getattr(case, name)
+        if section.support_shaft:
+            steps = [
+                ShaftStep(one.length, one.outer_diameter, one.inner_diameter) for one in section.support_shaft
+            ]
+            beam = 1.0 / timoshenko_flexibility(steps, material)[0, 0]
+            lines.append(
+                f"support of the {name} from its shaft: {section.support_stiffness * 1e-6:.4g} N/um "
+                f"(as a beam {beam * 1e-6:.4g})"
+            )
+    return tuple(lines)
+
+
+@lru_cache(maxsize=64)
+def _stiffness(parts: tuple, youngs_modulus: float, poisson_ratio: float, density: float) -> float:
+    from femgear.fe.elasticity import Material
+    from femgear.fe.shaft import ShaftStep, shaft_support_stiffness
+
+    steps = [ShaftStep(*part) for part in parts]
+    return shaft_support_stiffness(steps, Material(youngs_modulus, poisson_ratio, density))
+
+
+def read_case(path: str | os.PathLike) -> Case | DrivetrainCase:
+    """Case of a TOML file: a planetary set, or with ``model = "drivetrain"`` a chain of bodies.
+
+    Parameters
+    ----------
+    path : path-like
+        A regular UTF-8 file of at most 1 MB.
+
+    Returns
+    -------
+    Case or DrivetrainCase
+        Checked, frozen, in SI units and radians.
+
+    Raises
+    ------
+    CaseError
+        Everything that is wrong with the file, at once; ``problems`` holds one `CaseError` for each.
+    """
+    return parse_case(case_text.read_text(path), name=case_text.printable(os.fsdecode(path)))
+
+
+def parse_case(text: str, *, name: str = "") -> Case:
+    """Case of a TOML text; see `read_case`.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        File name for messages.
+    """
+    return _build(case_text.parse(text, name), text, name)
+
+
+def with_value(case: Case, key: str, value: object) -> Case:
+    """The case with one entry changed, checked again as a whole; see `with_values` for several at once.
+
+    Parameters
+    ----------
+    case : Case
+    key : str
+        Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
+        ``"sun.modifications[0].amount"``.
+    value : object
+        As the file would hold it: ``"50 N m"``, 0.3, 27, a list or table of such; None leaves the entry out.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    CaseError
+        As `read_case`; unknown keys are refused with the nearest valid one.
+    """
+    return with_values(case, {key: value})
+
+
+def with_values(case: Case, values: Mapping[str, object]) -> Case:
+    """The case with several entries changed at once, checked as a whole after all changes.
+
+    Published lines whose speed or harmonic is not computed any more are left out; ``notices`` says so.
+
+    Parameters
+    ----------
+    case : Case
+    values : mapping
+        Keys and values as of `with_value`, as in
+        ``{"operation.input": "carrier", "operation.fixed": "ring"}``.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    CaseError
+        As `with_value`.
+    """
+    data = case_text.parse(case.source, case.name)
+    for key, value in values.items():
+        _change(data, key, value, case.name)
+    try:
+        text = case_text.write(data)
+    except CaseError as error:
+        error.key, error.file = ", ".join(values), case.name or None
+        raise
+    said: tuple[str, ...] = ()
+    try:
+        changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
+    except CaseError as error:
+        published = any(key.startswith("housing") for key in values)
+        if published or not (notice := without_uncomputed(data, error)):
+            raise
+        said, text = (notice,), case_text.write(data)
+        changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
+    changed._notices += said
+    changed._profile_files = {
+        k: file
+        for k, file in case.profile_files.items()
+        if not any(k.startswith(key) or key.startswith(k) for key in values)
+    }
+    return changed
+
+
+def _change(data: dict, key: str, value: object, name: str) -> None:
+    """Change one entry of the tables of a case file; None takes it out."""
+    parts = re.findall(r"\[\d{1,9}\]|[^.\[\]]+", key) or [key]
+    *tables, last = parts
+    table = data
+    for part, following in zip(tables, parts[1:], strict=True):
+        table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
+    if last.startswith("["):
+        raise CaseError("a list is changed as a whole", code="E-KEY", key=key, file=name or None)
+    if value is None:
+        table.pop(last, None)
+    else:
+        table[last] = value.tolist() if hasattr(value, "tolist") else value
+
+
+def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type) -> dict | list:
+    """Table or list under a part of a key; tables that are not there yet are made."""
+    if isinstance(table, list):
+        number = int(part[1:-1])
+        found = table[number] if number < len(table) else None
+    else:
+        found = table.setdefault(part, {}) if wanted is dict else table.get(part)
+    if not isinstance(found, wanted):
+        kind = "table" if wanted is dict else "list"
+        raise CaseError(f"{part} is not a {kind}", code="E-KEY", key=key, file=name or None)
+    return found
+
+
+def to_toml(case: Case) -> str:
+    """TOML text that gives this case when read.
+
+    The text of its file as long as nothing was changed and it names no measured profile; the points of such
+    profiles are in the text, so that it needs no other file.
+    """
+    return case.source
+
+
+def case_schema(model: str | None = None) -> dict[str, Any]:
+    """JSON schema of the case file, for editors; with ``"drivetrain"`` that of these cases."""
+    return (DrivetrainCase if model else Case).model_json_schema()
+
+
+def planetary_set(case: Case) -> PlanetarySet:
+    """Gears of a case, closed on their centre distance and checked; of a helical one the transverse section.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    PlanetarySet
+        With the profile shifts, or the centre distance, that the case leaves to be found.
+
+    Raises
+    ------
+    GeometryError
+        What cannot be made, assembled or run (see `femgear.gears.checks.check_set`), and members that float
+        without being held (E-MECHANISM), with file and line.
+    """
+    refuse_drivetrain(case)
+    try:
+        closed = _closed_set(case)
+        check_set(closed)
+        check_floating(case, closed)
+    except GeometryError as error:
+        in_terms_of_the_case(error, case)
+        if (error.key or "").endswith("rack.root_radius"):
+            _name_root_radius(error, case)
+        raise
+    return closed
+
+
+def _closed_set(case: Case) -> PlanetarySet:
+    """Gears of a case, closed on their centre distance but not yet checked as a set."""
+    ring = case.ring
+    cutter = None
+    if ring.cutter_teeth is not None:
+        shift = ring.cutter_profile_shift * _normal_modules(case)
+        cutter = PinionCutter(teeth=ring.cutter_teeth, profile_shift=shift)
+    left_open = (("sun", case.sun.profile_shift), ("ring", ring.profile_shift))
+    return close_set(
+        _gear(case, case.sun, "sun", case.sun.bore_radius),
+        _gear(case, case.planet, "planet", case.planet.bore_radius),
+        _gear(case, ring, "ring", ring.outer_radius, cutter),
+        planet_angles=case.set.planet_angles or equal_planet_angles(case.set.planets),
+        centre_distance=case.set.centre_distance,
+        find=tuple(name for name, shift in left_open if shift is None),
+    )
+
+
+def _name_root_radius(error: GeometryError, case: Case) -> None:
+    """Let a refusal of the tool's rounding name the largest root radius that can be typed in its place.
+
+    The limit of one gear is not that of the others, and that of a gear whose profile shift is found only
+    shows with that shift.
+    """
+    if error.code == "E-FILLET":
+        if (most := _largest_root_radius(case, error.key, ("E-ROOT-RADIUS", "E-FILLET"))) is not None:
+            error.remedy = error.remedy.replace("root_radius", f"root_radius to {most:.4f} or less", 1)
+        return
+    most = _largest_root_radius(case, error.key, ("E-ROOT-RADIUS", "E-FILLET"))
+    if most is None:
+        most = _largest_root_radius(case, error.key, ("E-ROOT-RADIUS",))
+    if most is None:
+        error.limit, error.remedy = None, "reduce the dedendum: no root_radius fits"
+    else:
+        error.limit = f"<= {most:.4f} modules for the gears of this rack"
+        error.remedy = "reduce root_radius"
+
+
+def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float | None:
+    """Largest root radius [modules] of four decimals that is not refused with one of the codes, if any."""
+
+    def fits(steps: int) -> bool:
+        rack = rack_at(case, key).model_copy(update={"root_radius": steps / 1e4})
+        gear = key.partition(".")[0]
+        owner = {} if gear == "rack" else {gear: getattr(case, gear).model_copy(update={"rack": rack})}
+        try:
+            check_set(_closed_set(case.model_copy(update=owner or {"rack": rack})))
+        except GeometryError as other:
+            return other.code not in codes
+        return True
+
+    low, high = -1, round(1e4 * rack_at(case, key).root_radius)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low / 1e4 if low >= 0 else None
+
+
+def _gear(
+    case: Case,
+    section: SunSection | PlanetSection | RingSection,
+    name: str,
+    rim: float,
+    cutter: PinionCutter | None = None,
+) -> Gear:
+    given, module, pressure_angle = section.rack or case.rack, case.sun.module, case.sun.pressure_angle
+    rack = BasicRack(addendum=given.addendum, dedendum=given.dedendum, root_radius=given.root_radius)
+    if case.helical is not None:
+        helix = case.helical.helix_angle
+        module, pressure_angle = transverse_tool(module, pressure_angle, helix)
+        rack = transverse_rack(rack, helix)
+    return Gear(
+        teeth=section.teeth,
+        module=module,
+        pressure_angle=pressure_angle,
+        profile_shift=(section.profile_shift or 0.0) * _normal_modules(case),
+        face_width=case.set.face_width,
+        rim_radius=rim,
+        internal=name == "ring",
+        rack=rack,
+        cutter=cutter,
+        tip_diameter=section.tip_diameter,
+        root_diameter=section.root_diameter,
+        thickness_allowance=0.5 * case.set.backlash,
+        name=name,
+    )
+
+
+def _normal_modules(case: Case) -> float:
+    """Normal modules in the module of the gears' section: cos(beta) of helical teeth, 1 of spur teeth."""
+    return 1.0 if case.helical is None else math.cos(case.helical.helix_angle)
+
+
+def set_deviations(case: Case) -> SetDeviations:
+    """Modifications and errors of a case, as separations of the loaded flanks.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    SetDeviations
+
+    Raises
+    ------
+    GeometryError
+        Modifications that the flanks cannot have (E-MODIFICATION, E-DEVIATION), with file and line, and
+        what `planetary_set` refuses.
+    """
+    s = planetary_set(case)
+    planets = [_planet_errors(case, n) for n in range(1, s.n_planets + 1)]
+    pitch = [_pitch(errors, s.planet) for errors in planets]
+    pins = np.zeros((s.n_planets, 2))
+    for pin in case.set.pin_errors:
+        pins[pin.planet - 1] = pin.radial, pin.tangential
+    found = replace(
+        no_deviations(s),
+        sun=flank_form(case, s.sun),
+        planet_sun_side=flank_form(case, s.planet, "sun side"),
+        planet_ring_side=flank_form(case, s.planet, "ring side"),
+        ring=flank_form(case, s.ring),
+        # a tooth that stands further on brings its left flank nearer to the mate, its right flank away
+        sun_pitch=-_pitch(case.sun.errors, s.sun),
+        planet_pitch=[-displaced for displaced in pitch],
+        planet_ring_side_pitch=pitch,
+        ring_pitch=-_pitch(case.ring.errors, s.ring),
+        sun_runout=_runout(case.sun.errors),
+        planet_runout=tuple(_runout(errors) for errors in planets),
+        ring_runout=_runout(case.ring.errors),
+        carrier_runout=_runout(case.carrier.errors),
+        pin_errors=pins,
+        ovality=_ovality(case),
+        sun_thickness=_thickness(case.sun.errors),
+        planet_thickness=[_thickness(errors) for errors in planets],
+        ring_thickness=_thickness(case.ring.errors),
+    )
+    try:
+        check_deviations(found, s)
+    except GeometryError as error:
+        error.file = case.location(error.key or "")
+        raise
+    return found
+
+
+def _planet_errors(case: Case, number: int) -> GearErrors | None:
+    """Errors of one planet: those of all planets, replaced by what is given for this one."""
+    own = next((one for one in case.planet.individual if one.planet == number), None)
+    if own is None:
+        return case.planet.errors
+    values = {} if case.planet.errors is None else case.planet.errors.model_dump()
+    given = own.model_dump(exclude_unset=True, exclude={"planet"})
+    if "pitch" in given or "cumulative_pitch" in given:
+        values |= {"pitch": None, "cumulative_pitch": None}
+    return GearErrors.model_construct(**(GearErrors().model_dump() | values | given))
+
+
+def _pitch(errors: GearErrors | None, gear: Gear) -> np.ndarray:
+    """Displacement of every tooth on the base circle [m]."""
+    if errors is None:
+        return np.zeros(gear.teeth)
+    return tooth_displacements(gear, cumulative=errors.cumulative_pitch, single=errors.pitch)
+
+
+def _runout(errors: CarrierErrors | None) -> Runout:
+    if errors is None:
+        return Runout()
+    return Runout(errors.runout_amplitude or 0.0, errors.runout_phase or 0.0)
+
+
+def _thickness(errors: GearErrors | None) -> float:
+    return (errors.thickness_reduction or 0.0) if errors is not None else 0.0
+
+
+def _ovality(case: Case) -> Ovality:
+    given = case.ring.errors.ovality if case.ring.errors is not None else None
+    if given is None:
+        return Ovality()
+    return Ovality(given.nodal_diameter, given.amplitude, given.phase, given.inextensional)
+
+
+def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
+    version = data.get("format", FORMAT)
+    if type(version) is int and version > FORMAT:
+        raise CaseError(
+            "the file is written for a newer femgear",
+            code="E-FORMAT",
+            key="format",
+            value=case_text.found(version),
+            limit=f"up to {FORMAT}",
+            remedy="update femgear",
+            file=name,
+        )
+    if is_drivetrain(data):
+        return build_drivetrain(data, text, name, numbered=numbered)
+    lines = text if numbered else ""
+    files = embed_profiles(data, name)
+    if files:
+        text = text_with_points(data, name, points="measured profiles", remedy="measure at fewer points")
+    try:
+        case = Case.model_validate(data)
+    except ValidationError as error:
+        raise combine(translate(error, Case), lines, name) from None
+    problems = cross_check(case)
+    if problems:
+        raise combine(problems, lines, name)
+    case._source, case._lines, case._name, case._profile_files = text, lines, name, files
+    case._notices = (*notices(data), *added_material(case))
+    return with_shafts(case)

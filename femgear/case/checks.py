@@ -1,0 +1,491 @@
+"""What must hold between the entries of a case file.
+
+Members of a case that float though nothing holds them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import accumulate
+from typing import TYPE_CHECKING
+
+from femgear.case.deviations import LARGEST_DEVIATION, ROUNDING, CarrierErrors, GearErrors
+from femgear.case.sections import Case, check_published
+from femgear.case.units import FREQUENCY
+from femgear.errors import CaseError, GeometryError
+from femgear.gears.checks import unheld_members
+
+if TYPE_CHECKING:
+    from femgear.gears.planetary import PlanetarySet
+
+
+def check_deviation_sections(case: Case):
+    """What no entry shows alone: amounts against the module, numbers of teeth and planets."""
+    most = LARGEST_DEVIATION * case.sun.module
+    yield from _check_planets(case)
+    for name in ("sun", "planet", "ring"):
+        gear = getattr(case, name)
+        tables = [] if gear.errors is None else [(f"{name}.errors", gear.errors)]
+        if name == "planet":
+            tables += [(f"planet.individual[{i}]", one) for i, one in enumerate(gear.individual)]
+        for key, table in tables:
+            yield from _check_pitch(key, table, gear.teeth, most)
+    for key, value in _amounts(case):
+        if abs(value) > most:
+            yield CaseError(
+                f"a deviation of {value * 1e6:.6g} um is not plausible",
+                code="E-RANGE",
+                key=key,
+                limit=f"{LARGEST_DEVIATION} modules, {most * 1e6:.6g} um",
+                remedy="check the unit",
+            )
+
+
+def _check_planets(case: Case):
+    for key, tables in (
+        ("planet.individual", case.planet.individual),
+        ("set.pin_errors", case.set.pin_errors),
+    ):
+        seen = set()
+        for i, table in enumerate(tables):
+            if table.planet > case.set.planets:
+                yield CaseError(
+                    f"there is no planet {table.planet}",
+                    code="E-RANGE",
+                    key=f"{key}[{i}].planet",
+                    value=table.planet,
+                    limit=f"1 to {case.set.planets}",
+                )
+            if table.planet in seen:
+                yield CaseError(
+                    f"planet {table.planet} is given twice", code="E-DUPLICATE", key=f"{key}[{i}].planet"
+                )
+            seen.add(table.planet)
+
+
+def _check_pitch(key: str, table: GearErrors, teeth: int, most: float):
+    for name in ("pitch", "cumulative_pitch"):
+        values = getattr(table, name)
+        if values is not None and len(values) != teeth:
+            yield CaseError(
+                f"{len(values)} pitch deviations for {teeth} teeth",
+                code="E-COUNT",
+                key=f"{key}.{name}",
+                limit=f"{teeth} deviations",
+            )
+    total = math.fsum(table.pitch or ())
+    if abs(total) > ROUNDING * teeth:
+        yield CaseError(
+            f"the pitch deviations add up to {total * 1e6:.6g} um; around the gear they must add up to zero",
+            code="E-RANGE",
+            key=f"{key}.pitch",
+            limit=f"{ROUNDING * teeth * 1e6:.6g} um from rounding",
+            remedy="subtract their mean, or give cumulative_pitch",
+        )
+    elif table.pitch:
+        yield from _check_cumulative(f"{key}.pitch", table.pitch, most)
+
+
+def _check_cumulative(key: str, pitch: tuple[float, ...], most: float):
+    """Single pitches, each of them plausible, may still carry a tooth far away."""
+    mean = math.fsum(pitch) / len(pitch)
+    cumulative = list(accumulate(value - mean for value in pitch[1:]))
+    largest = _largest(tuple(cumulative))
+    if abs(largest) > most:
+        yield CaseError(
+            f"the single pitch deviations add up to {largest * 1e6:.6g} um at tooth "
+            f"{cumulative.index(largest) + 1}",
+            code="E-RANGE",
+            key=key,
+            limit=f"cumulative deviations of at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um",
+            remedy="check signs, order and unit of the list; it holds deviations from tooth to tooth",
+        )
+
+
+def _amounts(case: Case):
+    """Keys and values [m] of all deviations."""
+    for name in ("sun", "planet", "ring"):
+        gear = getattr(case, name)
+        for i, one in enumerate(gear.modifications):
+            for entry in ("amount", "deviations"):
+                yield f"{name}.modifications[{i}].{entry}", _largest(getattr(one, entry))
+        yield from _error_amounts(f"{name}.errors", gear.errors)
+    for i, one in enumerate(case.planet.individual):
+        yield from _error_amounts(f"planet.individual[{i}]", one)
+    yield from _error_amounts("carrier.errors", case.carrier.errors)
+    if case.ring.errors is not None and case.ring.errors.ovality is not None:
+        yield "ring.errors.ovality", case.ring.errors.ovality.amplitude
+    for i, pin in enumerate(case.set.pin_errors):
+        yield f"set.pin_errors[{i}].radial", pin.radial
+        yield f"set.pin_errors[{i}].tangential", pin.tangential
+
+
+def _error_amounts(key: str, table: CarrierErrors | None):
+    for name in ("pitch", "cumulative_pitch", "thickness_reduction", "runout_amplitude"):
+        yield f"{key}.{name}", _largest(getattr(table, name, None))
+
+
+def _largest(value: float | tuple[float, ...] | None) -> float:
+    """The value, or of several the one that is largest in size; 0 for none."""
+    values = value if isinstance(value, tuple) else (value or 0.0,)
+    return max(values, key=abs, default=0.0)
+
+
+def check_helical(case: Case) -> Iterator[CaseError]:
+    """Refusals of what a helical section does not go with."""
+    helical = case.helical
+    if helical is None:
+        return
+    if case.planar is not None:
+        yield CaseError(
+            "a set is planar or helical: the planar model has no motion out of its plane",
+            code="E-CHOICE",
+            key="helical",
+            value="planar and helical",
+            limit="one of the two sections",
+            remedy="leave one of them out",
+        )
+    if helical.helix_angle == 0.0:
+        yield CaseError(
+            "without a helix the teeth are spur teeth",
+            code="E-RANGE",
+            key="helical.helix_angle",
+            value="0 deg",
+            limit="above 0 deg up to 45 deg",
+            remedy="leave the section helical out",
+        )
+    if case.static.members == "elastic":
+        yield CaseError(
+            "the supports belong to the helical model: the static solution is that of the gears alone",
+            code="E-CHOICE",
+            key="static.members",
+            value="elastic",
+            limit='"fixed" in a helical case',
+            remedy="leave static.members out",
+        )
+    if case.operation.torque == 0.0:
+        yield CaseError(
+            "without torque no tooth carries load, so there is no mesh stiffness",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero in a helical case",
+        )
+    fixed = case.operation.fixed
+    if getattr(helical, fixed).torsional_stiffness == 0.0:
+        yield CaseError(
+            f"the {fixed} is the fixed member but nothing keeps it from turning",
+            code="E-MECHANISM",
+            key=f"helical.{fixed}.torsional_stiffness",
+            value="0 N m/rad",
+            limit="above 0 N m/rad",
+            remedy="leave the entry out to hold the member, or hold another one",
+        )
+
+
+def check_planar(case: Case) -> Iterator[CaseError]:
+    """Refusals of what a planar section does not go with."""
+    planar = case.planar
+    if planar is None:
+        return
+    if case.static.members == "elastic":
+        yield CaseError(
+            "the supports belong to the planar model: the static solution is that of the gears alone",
+            code="E-CHOICE",
+            key="static.members",
+            value="elastic",
+            limit='"fixed" in a planar case',
+            remedy="leave static.members out",
+        )
+    if case.operation.torque == 0.0:
+        yield CaseError(
+            "without torque no tooth carries load: the planar set would rattle in its play",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero in a planar case",
+        )
+    if planar.back_flanks and planar.line_backlash == 0.0:
+        yield CaseError(
+            "back flanks need play",
+            code="E-BACKLASH",
+            key="planar.line_backlash",
+            value="0 mm",
+            limit="above 0 mm",
+            remedy="give the play, or write planar.back_flanks = false",
+        )
+    yield from _check_torsion(case)
+    yield from _check_branch(case)
+
+
+def _check_torsion(case: Case) -> Iterator[CaseError]:
+    """The torque must find a way into the housing."""
+    planar, operation = case.planar, case.operation
+    output = output_member(case)
+    if getattr(planar.torsion, operation.fixed) == 0.0:
+        yield CaseError(
+            f"the {operation.fixed} is the fixed member but nothing keeps it from turning",
+            code="E-MECHANISM",
+            key=f"planar.torsion.{operation.fixed}",
+            value="0 N m/rad",
+            limit="above 0 N m/rad",
+            remedy="leave it out: the fixed member is then held",
+        )
+    if planar.reaction == "supports" and not getattr(planar.torsion, output):
+        yield CaseError(
+            f"the torque is to be carried by supports, but the {output}, which is the output, turns freely",
+            code="E-MECHANISM",
+            key=f"planar.torsion.{output}" if getattr(planar.torsion, output) == 0.0 else "planar.reaction",
+            value="supports",
+            limit=f"planar.torsion.{output} above 0 N m/rad",
+            remedy=f'give planar.torsion.{output}, or write reaction = "output"',
+        )
+
+
+def _check_branch(case: Case) -> Iterator[CaseError]:
+    planar, branch = case.planar, case.planar.branch
+    if branch is None:
+        return
+    if not branch.start < branch.to:
+        yield CaseError(
+            "the range of frequencies ends before it begins",
+            code="E-RANGE",
+            key="planar.branch.to",
+            value=FREQUENCY.show(branch.to),
+            limit=f"above {FREQUENCY.show(branch.start)}, where it begins",
+        )
+    if planar.gravity is None:
+        yield CaseError(
+            "the branch follows the response to the weight, and there is none",
+            code="E-KEY-MISSING",
+            key="planar.gravity",
+            remedy="add the section planar.gravity, or leave planar.branch out",
+        )
+    if case.operation.fixed == "carrier":
+        yield CaseError(
+            "the weight does not turn against a carrier that stands",
+            code="E-MECHANISM",
+            key="planar.branch",
+            value="operation.fixed = carrier",
+            limit="a carrier that turns",
+            remedy="leave planar.branch out",
+        )
+    if planar.gyroscopic:
+        yield CaseError(
+            "the gyroscopic terms would change along the branch, which is not computed",
+            code="E-CHOICE",
+            key="planar.gyroscopic",
+            value="true",
+            limit="false with planar.branch",
+            remedy="leave one of them out",
+        )
+
+
+def output_member(case: Case) -> str:
+    """The member that is neither driven nor held."""
+    others = {case.operation.input, case.operation.fixed}
+    return next((name for name in ("carrier", "sun", "ring") if name not in others), "carrier")
+
+
+LEAST_TORQUE = 1e-6
+
+
+def cross_check(case: Case) -> list[CaseError]:
+    """What no entry shows alone."""
+    problems = [problem for check in _CHECKS for problem in check(case)]
+    return problems or list(check_published(case))
+
+
+def _check_operation(case: Case):
+    operation, ring = case.operation, case.ring
+    if operation.input == operation.fixed:
+        yield CaseError(
+            f"the {operation.input} cannot be both driven and held",
+            code="E-MECHANISM",
+            key="operation.fixed",
+            value=operation.fixed,
+            limit="one member driven, another held, the third is the output",
+            remedy="drive the sun and hold the ring, or name two other members",
+        )
+    if len(set(operation.speeds)) < len(operation.speeds):
+        yield CaseError("a speed is given twice", code="E-DUPLICATE", key="operation.speeds")
+    if 0.0 < abs(operation.torque) < LEAST_TORQUE:
+        yield CaseError(
+            "the torque is too small to be told from none",
+            code="E-RANGE",
+            key="operation.torque",
+            value=f"{operation.torque:g} N m",
+            limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
+        )
+    elastic = case.planar is None and case.helical is None
+    if elastic and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
+        yield CaseError(
+            "the ring is the fixed member but nothing keeps it from turning",
+            code="E-MECHANISM",
+            key="ring.foundation_tangential",
+            value="0 N/m^3",
+            limit="above 0 N/m^3",
+            remedy="give a tangential foundation, or hold another member",
+        )
+
+
+def _check_set(case: Case):
+    angles, count = case.set.planet_angles, case.set.planets
+    if angles is not None and len(angles) != count:
+        yield CaseError(
+            f"{len(angles)} angles for {count} planets",
+            code="E-COUNT",
+            key="set.planet_angles",
+            value=len(angles),
+            limit=f"{count} angles",
+            remedy="give one angle a planet, or leave planet_angles out for equal spacing",
+        )
+    if (
+        case.set.centre_distance is None
+        and case.sun.profile_shift is None
+        and case.ring.profile_shift is None
+    ):
+        yield CaseError(
+            "neither the centre distance nor a profile shift of sun or ring is given",
+            code="E-KEY-MISSING",
+            key="set.centre_distance",
+            remedy="give set.centre_distance, sun.profile_shift or ring.profile_shift; the rest is found",
+        )
+
+
+def _check_supports(case: Case):
+    for name in ("sun", "carrier"):
+        section = getattr(case, name)
+        if (section.support_stiffness is None) == (not section.support_shaft):
+            both = section.support_stiffness is not None
+            how = "twice" if both else "neither as stiffness nor as shaft"
+            yield CaseError(
+                f"the support of the {name} is given {how}",
+                code="E-DUPLICATE" if both else "E-KEY-MISSING",
+                key=f"{name}.support_stiffness",
+                limit="one of support_stiffness and support_shaft",
+                remedy='write support_stiffness = "5e7 N/m" or the like, "0 N/m" for a member that floats',
+            )
+
+
+def _check_numbers(case: Case):
+    dynamics, harmonics = case.dynamics, case.mesh_harmonics
+    rigid = case.planar is not None or case.helical is not None
+    # the record of rigid bodies is that of the static positions
+    if rigid and case.static.positions <= 2 * harmonics:
+        yield CaseError(
+            f"{case.static.positions} positions cannot carry {harmonics} mesh harmonics",
+            code="E-RANGE",
+            key="static.positions",
+            value=case.static.positions,
+            limit=f"more than 2 x {harmonics}",
+        )
+    if harmonics is not None and case.response_harmonics < 2 * harmonics:
+        yield CaseError(
+            "the response needs twice the harmonics of the mesh: the product of both reaches that far",
+            code="E-RANGE",
+            key="dynamics.response_harmonics",
+            value=case.response_harmonics,
+            limit=f"{2 * harmonics} or more",
+        )
+    if dynamics.up_to is not None and (rigid or dynamics.mesh_harmonics is not None):
+        yield CaseError(
+            "the reach of the excitation is given twice"
+            if dynamics.mesh_harmonics is not None
+            else "rigid bodies are excited by mesh harmonics, not up to a frequency",
+            code="E-RANGE",
+            key="dynamics.up_to",
+            value=f"{dynamics.up_to:g} Hz",
+            limit="one of up_to and mesh_harmonics; rigid bodies have mesh_harmonics alone",
+            remedy="leave dynamics.up_to out" if rigid else "leave out one of the two",
+        )
+    if harmonics is None and dynamics.response_harmonics is not None:
+        yield CaseError(
+            "the harmonics of the response follow from the reach of the excitation",
+            code="E-RANGE",
+            key="dynamics.response_harmonics",
+            value=dynamics.response_harmonics,
+            limit="together with dynamics.mesh_harmonics",
+            remedy="give dynamics.mesh_harmonics too, or leave dynamics.response_harmonics out",
+        )
+    planets, points = case.set.planets, case.housing.points
+    if case.housing.form == "linear" and case.set.planet_angles is None and case.housing.points % planets:
+        yield CaseError(
+            f"{case.housing.points} points break the symmetry of {planets} equally spaced planets: the "
+            "interpolation between them makes carrier orders that cannot exist",
+            code="E-POINTS",
+            key="housing.points",
+            value=case.housing.points,
+            limit=f"a multiple of {planets}",
+            remedy=f"write {planets * -(-max(points, 54) // planets)}, or leave housing.form out",
+        )
+
+
+_CHECKS = (
+    _check_operation,
+    _check_set,
+    _check_supports,
+    _check_numbers,
+    check_deviation_sections,
+    check_planar,
+    check_helical,
+)
+
+
+def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False) -> None:
+    """Refuse members that float though the planets cannot hold them.
+
+    Parameters
+    ----------
+    case : Case
+    planetary : PlanetarySet
+    dynamic : bool
+        For modes and dynamics, where members move whatever static.members says.
+
+    Raises
+    ------
+    GeometryError
+        E-MECHANISM, with the support stiffness that is zero, or the foundation of a loose ring.
+    """
+    if case.static.members == "fixed" and not dynamic:
+        return
+    if case.ring.foundation_tangential == 0.0:
+        _mechanism(
+            case,
+            "ring.foundation_tangential",
+            "nothing keeps the ring from turning under the load of the planets",
+            value="0 N/m^3",
+            remedy='give it a tangential foundation, or write static.members = "fixed"',
+        )
+    names = [name for name in ("sun", "carrier") if getattr(case, name).support_stiffness == 0.0]
+    # the dynamic model has no back flanks
+    both_flanks = case.static.back_flanks and not dynamic
+    loose = unheld_members(planetary, names, both_flanks=both_flanks)
+    if not loose:
+        return
+    N = planetary.n_planets
+    if len(loose) > 1:
+        message = f"{N} planets cannot hold a floating sun and a floating carrier at once"
+    else:
+        angles = ", ".join(f"{math.degrees(angle):.6g}" for angle in planetary.planet_angles[:12])
+        where = f"{N} planet{'s' * (N > 1)} at {angles} deg"
+        message = f"{where} cannot hold a floating {loose[0]}: their forces leave it free to move aside"
+    _mechanism(
+        case,
+        f"{loose[-1]}.support_stiffness",
+        message,
+        value="0 N/m",
+        remedy=f'write support_stiffness = "5e7 N/m" or the like in [{loose[-1]}], or '
+        'run with static.members = "fixed" and --only static; three equally spaced planets hold it',
+    )
+
+
+def _mechanism(case: Case, key: str, message: str, *, value: str, remedy: str):
+    raise GeometryError(
+        message,
+        code="E-MECHANISM",
+        key=key,
+        value=value,
+        limit=f"above {value}",
+        remedy=remedy,
+        file=case.location(key),
+    )

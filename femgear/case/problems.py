@@ -1,0 +1,304 @@
+"""From pydantic's validation errors to femgear's, with the nearest valid key and the line of the file.
+
+Refusals of the gears, in terms of what the case file gives.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+
+from pydantic import BaseModel, ValidationError
+
+from femgear.case import text as case_text
+from femgear.case.fields import described
+from femgear.case.sections import Case, RackSection
+from femgear.case.units import ANGLE, LENGTH
+from femgear.errors import CaseError, GeometryError
+from femgear.trains.helical.section import helical_notices
+from femgear.trains.planar.section import planar_notices
+
+
+def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") -> list[CaseError]:
+    """One `CaseError` for each mistake that pydantic found.
+
+    Parameters
+    ----------
+    error : ValidationError
+    model : type
+        The model that was validated; its field names are the valid keys.
+    prefix : str
+        Dotted key of the table that was validated.
+
+    Returns
+    -------
+    list of CaseError
+        With code, key, value, limit and remedy.
+    """
+    problems = []
+    for item in error.errors(include_url=False):
+        key = _dotted(item["loc"], prefix)
+        nested = item.get("ctx", {}).get("error")
+        if isinstance(nested, ValidationError):
+            problems += translate(nested, model, key)
+        else:
+            problems.append(_problem(item, key, model))
+    return problems
+
+
+def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
+    """One error that lists all; its ``problems`` holds them one by one.
+
+    Parameters
+    ----------
+    problems : list of CaseError
+        At least one.
+    text : str
+        The file, for line numbers; empty where the text is not the user's.
+    name : str
+        Its name.
+    """
+    for problem in problems:
+        line = case_text.line_of(text, problem.key) if problem.key and name else None
+        problem.file = f"{name}:{line}" if line else name
+    if len(problems) == 1:
+        combined = problems[0]
+    else:
+        listed = "\n".join(str(problem) for problem in problems)
+        combined = CaseError(f"{len(problems)} problems\n{listed}", file=name)
+        combined.code = problems[0].code if len({p.code for p in problems}) == 1 else "E-CASE"
+    combined.problems = tuple(problems)
+    return combined
+
+
+def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
+    kind, context, value = item["type"], item.get("ctx", {}), item.get("input")
+    if kind.startswith("E-"):
+        return CaseError(
+            context["message"],
+            code=kind,
+            key=key,
+            value=context["found"],
+            limit=context["limit"],
+            remedy=context["remedy"],
+        )
+    if kind == "missing":
+        section = _section(model, item["loc"])
+        remedy = f"add it: {_description(model, item['loc'])}".removesuffix(": ")
+        if section is not None:
+            needed = [name for name, field in section.model_fields.items() if field.is_required()]
+            remedy = f"add the section with {', '.join(needed)}"
+        return CaseError("missing", code="E-KEY-MISSING", key=key, remedy=remedy)
+    if kind == "extra_forbidden":
+        return _unknown_key(item["loc"], key, model)
+    if kind == "literal_error":
+        return CaseError(
+            "not one of the choices", code="E-CHOICE", key=key, value=value, limit=context["expected"]
+        )
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        message = f"a table is needed, not {described(value)}"
+        section = f"[[{key.partition('[')[0]}]]" if key.endswith("]") else f"[{key}]"
+        return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section {section}")
+    if kind in ("tuple_type", "list_type"):
+        return CaseError(f"a list is needed, not {described(value)}", code="E-TYPE", key=key, value=value)
+    if kind in ("bool_type", "string_type"):
+        wanted = "true or false" if kind == "bool_type" else "a text"
+        message = f"{wanted} is needed, not {described(value)}"
+        return CaseError(message, code="E-TYPE", key=key, value=value)
+    if kind == "too_long":
+        message = f"{context['actual_length']} entries are too many"
+        return CaseError(message, code="E-RANGE", key=key, limit=f"at most {context['max_length']}")
+    if kind == "too_short":
+        message = f"{context['actual_length']} entries are too few"
+        return CaseError(message, code="E-RANGE", key=key, limit=f"{context['min_length']} or more")
+    return CaseError(f"not what is needed here: {item['msg'].lower()}", key=key, value=value)
+
+
+def _unknown_key(location: tuple, key: str, model: type[BaseModel]) -> CaseError:
+    """Refusal of a key that nobody reads, with where it may belong."""
+    parent = _section(model, location[:-1])
+    valid = _keys(parent) if parent else []
+    last = str(location[-1])
+    near = difflib.get_close_matches(last, valid, n=1, cutoff=0.6)
+    homes = [name for name in model.model_fields if last in _keys(_section(model, (name,)))]
+    if near:
+        remedy = f"did you mean {near[0]}?"
+    elif homes:
+        remedy = f"{last} belongs in [{'] or ['.join(homes)}]"
+    else:
+        remedy = None
+    return CaseError(
+        "unknown key", code="E-KEY-UNKNOWN", key=key, limit=", ".join(valid) or None, remedy=remedy
+    )
+
+
+def _description(model: type[BaseModel], location: tuple) -> str:
+    """What the schema says about the entry."""
+    section = _section(model, location[:-1]) or model
+    schema = section.model_json_schema()["properties"].get(str(location[-1]), {})
+    choices = " or ".join(str(choice) for choice in schema.get("enum", ()))
+    return schema.get("description") or choices or schema.get("type", "")
+
+
+def _keys(section: type[BaseModel] | None) -> list[str]:
+    return [field.alias or name for name, field in section.model_fields.items()] if section else []
+
+
+def _section(model: type[BaseModel], location: tuple) -> type[BaseModel] | None:
+    """Model of the table at ``location``, None where that is no table."""
+    current: type[BaseModel] | None = model
+    for part in location:
+        if isinstance(part, int):
+            continue
+        field = current.model_fields.get(str(part)) if current else None
+        candidates = (field.annotation, *getattr(field.annotation, "__args__", ())) if field else ()
+        current = next((c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)), None)
+    return current
+
+
+def _dotted(location: tuple, prefix: str) -> str:
+    key = prefix
+    for part in location:
+        if isinstance(part, int):
+            key += f"[{part}]"
+        else:
+            key += ("." if key else "") + case_text.printable(part)
+    return key
+
+
+# dimensions of the entries whose values the refusals of gears give as SI numbers
+_DIMENSIONS = {
+    "centre_distance": LENGTH,
+    "bore_radius": LENGTH,
+    "outer_radius": LENGTH,
+    "tip_diameter": LENGTH,
+    "root_diameter": LENGTH,
+    "module": LENGTH,
+    "pressure_angle": ANGLE,
+}
+
+
+def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
+    """Let a refusal name the entries that the user gave, their values, and keys that exist.
+
+    Parameters
+    ----------
+    error : GeometryError
+        Its fields are changed, ``file`` (with the line) among them.
+    case : Case
+    """
+    if error.code == "E-BACKLASH":
+        gear = (error.key or "").partition(".")[0]
+        error.remedy = (
+            f"leave {gear}.profile_shift out so that it is found, give set.backlash, or another "
+            "set.centre_distance"
+        )
+    if error.code == "E-ASSEMBLY":
+        _assembly(error, case)
+    if error.code == "E-ALLOWANCE":
+        error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
+        error.limit = f"0 mm to {LENGTH.show(2.0 * case.sun.module)}: each gear takes half of it"
+        error.remedy = "reduce the backlash"
+    if error.key == "rack.root_radius":
+        cut = re.match(r"(\w+):|the \w+'s tip runs into the (\w+)'s root fillet", error.message)
+        gear = (cut[1] or cut[2]) if cut else ""
+        if getattr(getattr(case, gear, None), "rack", None) is not None:
+            error.key = f"{gear}.rack.root_radius"
+        error.value = rack_at(case, error.key).root_radius
+    _shift_left_out(error, case)
+    _in_transverse_section(error, case)
+    dimension = _DIMENSIONS.get((error.key or "").rpartition(".")[2])
+    if dimension is not None and isinstance(error.value, float):
+        error.value = dimension.show(error.value)
+    error.file = case.location(error.key or "")
+
+
+def rack_at(case: Case, key: str) -> RackSection:
+    """The rack section of a key, that of all gears or of one."""
+    gear = key.partition(".")[0]
+    return case.rack if gear == "rack" else getattr(case, gear).rack
+
+
+def _in_transverse_section(error: GeometryError, case: Case) -> None:
+    """Gears of a helical case are refused in their transverse section, the file gives the normal one."""
+    if case.helical is None:
+        return
+    error.message += " (in the transverse section of the helical gears"
+    factor = math.cos(case.helical.helix_angle)
+    if factor < 0.999 and ((error.key or "").endswith("profile_shift") or "rack." in (error.key or "")):
+        error.message += f", whose coefficients are {factor:.6g} times those of the file"
+    error.message += ")"
+
+
+def _assembly(error: GeometryError, case: Case) -> None:
+    angles = case.set.planet_angles
+    if angles is None:
+        error.key, error.value = "set.planets", case.set.planets
+        return
+    error.value = ", ".join(f"{math.degrees(angle):.6g}" for angle in angles[:24]) + " deg"
+
+
+def _shift_left_out(error: GeometryError, case: Case) -> None:
+    """A shift that was found is no entry to change: name the one that it follows from."""
+    sections = {"sun": case.sun, "ring": case.ring}
+    gear, _, entry = (error.key or "").partition(".")
+    if gear not in sections or entry != "profile_shift" or sections[gear].profile_shift is not None:
+        return
+    if case.set.centre_distance is not None:
+        error.key, given = "set.centre_distance", f"{1e3 * case.set.centre_distance:.6g} mm"
+        remedy = "change the centre distance or the tooth numbers"
+    else:
+        other = "ring" if gear == "sun" else "sun"
+        error.key, given = f"{other}.profile_shift", sections[other].profile_shift
+        remedy = f"change the {other}'s profile shift or the tooth numbers"
+    found = f"{error.value:.5g}" if isinstance(error.value, float) else error.value
+    error.message += f" (the {gear}'s profile shift of {found} is what closes the set)"
+    if error.code == "E-SHIFT":
+        error.limit = f"such that the {gear}'s shift is {error.limit}"
+    error.value, error.remedy = given, remedy
+
+
+def added_material(case: Case) -> tuple[str, ...]:
+    """Warnings of reliefs and crownings with a negative amount: most are slips of the sign.
+
+    Parameters
+    ----------
+    case : Case
+    """
+    found = []
+    for gear in ("sun", "planet", "ring"):
+        for i, one in enumerate(getattr(case, gear).modifications):
+            if one.kind in ("tip relief", "root relief", "profile crowning") and one.amount < 0.0:
+                found.append(
+                    f"[W-RELIEF-SIGN] {gear}.modifications[{i}].amount: a {one.kind} of "
+                    f"{one.amount * 1e6:.6g} um adds material; a positive amount takes it off (usual: 0 um "
+                    "or above)"
+                )
+    return tuple(found)
+
+
+def notices(data: dict) -> tuple[str, ...]:
+    """Remarks on what was read in a way that deserves to be said.
+
+    Parameters
+    ----------
+    data : dict
+        Tables of a case file that was checked.
+    """
+    found = []
+    if (teeth := data["ring"]["teeth"]) < 0:
+        found.append(
+            f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
+            "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
+        )
+    if "planar" in data:
+        return (*found, *planar_notices(data))
+    if "helical" in data:
+        return (*found, *helical_notices(data))
+    if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
+        found.append(
+            'planet.bearing_clearance has no effect while static.members is "fixed": write '
+            'static.members = "elastic"'
+        )
+    return tuple(found)

@@ -1,0 +1,365 @@
+"""The sections of a case file and what must hold between them.
+
+Published lines: they are compared only where the case computes their speed and harmonic.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, model_validator
+
+from femgear.case.deviations import (
+    CarrierErrors,
+    GearErrors,
+    IndividualPlanet,
+    ModificationSection,
+    PinError,
+    PlanetModificationSection,
+    RingErrors,
+)
+from femgear.case.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.case.text import ReadCase
+from femgear.case.units import (
+    ANGLE,
+    DENSITY,
+    FOUNDATION,
+    FREQUENCY,
+    INERTIA,
+    LENGTH,
+    MASS,
+    MODULUS,
+    SPEED,
+    STIFFNESS,
+    TORQUE,
+    TORSION,
+)
+from femgear.errors import CaseError
+from femgear.trains.helical.section import HelicalSection
+from femgear.trains.planar.section import PlanarSection
+
+FORMAT = 1
+RPM = SPEED.scale
+_MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
+
+Member = Literal["sun", "ring", "carrier"]
+Radius = Quantity(LENGTH, 1e-4, 10.0)
+Mass = Quantity(MASS, 1e-6, 1e6)
+Inertia = Quantity(INERTIA, 1e-12, 1e8)
+Stiffness = Quantity(STIFFNESS, 1.0, 1e15)
+Shift = Number(-5.0, 5.0)
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class SetSection(_Section):
+    """What the gears share.
+
+    ``centre_distance`` may be left out (the profile shifts give it), and so may the profile shift of the sun,
+    of the ring or of both (they are found so that the meshes have no play). ``backlash`` is the play of each
+    mesh on the reference circles: half of it is taken from the tooth thickness of every gear.
+    """
+
+    planets: Count(1, 1000)
+    centre_distance: Quantity(LENGTH, 1e-3, 10.0) | None = None
+    face_width: Quantity(LENGTH, 1e-4, 5.0)
+    planet_angles: tuple[Quantity(ANGLE, -2 * math.pi, 2 * math.pi), ...] | None = None
+    backlash: Quantity(LENGTH, 0.0, 0.01) = 0.0
+    pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
+
+
+class RackSection(_Section):
+    """Basic rack, in modules; the default is ISO 53 profile C."""
+
+    addendum: Number(0.1, 3.0) = 1.0
+    dedendum: Number(0.1, 3.0) = 1.25
+    root_radius: Number(0.0, 1.0) = 0.25
+
+
+class MaterialSection(_Section):
+    """Isotropic elastic material of all gears."""
+
+    youngs_modulus: Quantity(MODULUS, 1e9, 1e12)
+    poisson_ratio: Number(
+        -1.0,
+        0.5,
+        open_low=True,
+        open_high=True,
+        note="0.5 is incompressible, beyond it no material is stable",
+    )
+    density: Quantity(DENSITY, 100.0, 25000.0)
+
+
+class ShaftPart(_Section):
+    """One part of a stepped shaft of the material of the gears."""
+
+    length: Quantity(LENGTH, 1e-4, 10.0)
+    outer_diameter: Quantity(LENGTH, 1e-4, 5.0)
+    inner_diameter: Quantity(LENGTH, 0.0, 5.0) = 0.0
+
+
+_Shaft = Annotated[tuple[ShaftPart, ...], Field(max_length=50)]
+
+
+class SunSection(_Section):
+    """The sun, and with it the module and the pressure angle of the set."""
+
+    teeth: Count(5, 5000, note=_MANY_TEETH)
+    module: Quantity(LENGTH, 5e-5, 0.1)
+    pressure_angle: Quantity(ANGLE, math.radians(5), math.radians(45))
+    profile_shift: Shift | None = None
+    bore_radius: Radius
+    mass: Mass
+    inertia: Inertia
+    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15) | None = None
+    support_shaft: _Shaft = ()
+    tip_diameter: Radius | None = None
+    root_diameter: Radius | None = None
+    rack: RackSection | None = None
+    modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()
+    errors: GearErrors | None = None
+
+
+class PlanetSection(_Section):
+    """One of the equal planets."""
+
+    teeth: Count(5, 5000, note=_MANY_TEETH)
+    profile_shift: Shift = 0.0
+    bore_radius: Radius
+    mass: Mass
+    inertia: Inertia
+    bearing_stiffness: Stiffness
+    bearing_clearance: Quantity(LENGTH, 0.0, 0.002) = 0.0
+    tip_diameter: Radius | None = None
+    root_diameter: Radius | None = None
+    rack: RackSection | None = None
+    modifications: Annotated[tuple[PlanetModificationSection, ...], Field(max_length=20)] = ()
+    errors: GearErrors | None = None
+    individual: Annotated[tuple[IndividualPlanet, ...], Field(max_length=1000)] = ()
+
+
+class RingSection(_Section):
+    """The internal gear; a positive profile shift moves its flanks outwards, to larger radii."""
+
+    teeth: Count(10, 5000, note=_MANY_TEETH, signed=True)
+    profile_shift: Shift | None = None
+    outer_radius: Radius
+    cutter_teeth: Count(5, 1000) | None = None
+    cutter_profile_shift: Shift = 0.0
+    foundation_radial: Quantity(FOUNDATION, 0.0, 1e20)
+    foundation_tangential: Quantity(FOUNDATION, 0.0, 1e20)
+    tip_diameter: Radius | None = None
+    root_diameter: Radius | None = None
+    rack: RackSection | None = None
+    modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()
+    errors: RingErrors | None = None
+
+
+class CarrierSection(_Section):
+    """The rigid carrier, without its planets."""
+
+    mass: Mass
+    inertia: Inertia
+    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15) | None = None
+    support_shaft: _Shaft = ()
+    errors: CarrierErrors | None = None
+
+
+class MachineSection(_Section):
+    """A rotor behind a torsional coupling; without it the member turns freely under its torque."""
+
+    inertia: Inertia
+    coupling_stiffness: Quantity(TORSION, 1e-3, 1e15)
+
+
+def _speed_range(value: object) -> object:
+    """List of speeds of a table ``{from, to, count}``, equally spaced."""
+    if not isinstance(value, dict):
+        if not isinstance(value, list) or not value:
+            message = f"a list of speeds is needed, not {'an empty one' if value == [] else described(value)}"
+            raise refuse(message, code="E-TYPE", value=value, remedy='write ["250 rpm", "3100 rpm"]')
+        return value
+    ends = _SpeedRange.model_validate(value)
+    step = (ends.to - ends.start) / (ends.count - 1)
+    return [f"{ends.start + i * step!r} rad/s" for i in range(ends.count)]
+
+
+_Speed = Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)
+
+
+class _SpeedRange(_Section):
+    start: _Speed = Field(alias="from")
+    to: _Speed
+    count: Count(2, 100_000)
+
+
+class OperationSection(_Section):
+    """Torque and speeds of the input member; a negative torque loads the other flanks."""
+
+    input: Member
+    fixed: Member
+    torque: Quantity(TORQUE, -1e9, 1e9)
+    speeds: Annotated[tuple[_Speed, ...], BeforeValidator(_speed_range), Field(max_length=100_000)]
+
+
+class StaticSection(_Section):
+    """Positions over one mesh period, contact search and grid."""
+
+    positions: Count(8, 4096) = 64
+    contact: Literal["profile", "line_of_action"] = "profile"
+    flank_elements: Count(4, 200) = 24
+    members: Literal["fixed", "elastic"] = "fixed"
+    back_flanks: StrictBool = False
+    stresses: StrictBool = True
+    longest_record: Count(1, 4096) = 256
+    depth: Quantity(LENGTH, 1e-6, 0.1) | None = None
+
+
+class DynamicsSection(_Section):
+    """Modal damping, reach of the excitation and tolerance of the periodic solution.
+
+    The excitation of a set with an elastic ring ends at the frequency ``up_to``, or after ``mesh_harmonics``;
+    where neither is given it reaches so far that the level of the housing no longer changes.
+    """
+
+    damping_ratio: Number(0.0, 1.0, open_high=True) = 0.05
+    up_to: Quantity(FREQUENCY, 10.0, 200e3) | None = None
+    mesh_harmonics: Count(1, 512) | None = None
+    response_harmonics: Count(1, 1000) | None = None
+    tolerance: Number(1e-14, 1e-2) = 1e-6
+
+
+class PublishedLines(_Section):
+    """Lines and lobes around a mesh harmonic that somebody published; the report compares them."""
+
+    speed: _Speed
+    harmonic: Count(1, 1000)
+    orders: Annotated[tuple[Count(0, 10_000_000), ...], Field(min_length=1, max_length=20)]
+    lobes: Count(0, 10_000) | None = None
+    source: Title
+
+
+class HousingSection(_Section):
+    """The fixed sensor, and how the ring's field is carried to it.
+
+    ``form = "exact"`` hears every circumferential component at its own order; ``"linear"`` is the
+    interpolation between ``points`` points of the paper on carrier modulation, with its images.
+    """
+
+    form: Literal["exact", "linear"] = "exact"
+    points: Count(3, 100_000) = 54
+    sensor_angle: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = 0.0
+    published: tuple[PublishedLines, ...] = ()
+
+
+class Case(_Section, ReadCase):
+    """A planetary gear set, its operation and how to compute it, in SI units.
+
+    The sections carry the names of the case file. ``source`` is the text that gives this case,
+    ``notices`` what was read in a way that deserves to be said.
+    """
+
+    format: Count(1, 2**31) = FORMAT
+    title: Title
+    set: SetSection
+    rack: RackSection = RackSection()
+    material: MaterialSection
+    sun: SunSection
+    planet: PlanetSection
+    ring: RingSection
+    carrier: CarrierSection
+    motor: MachineSection | None = None
+    brake: MachineSection | None = None
+    operation: OperationSection
+    static: StaticSection = StaticSection()
+    dynamics: DynamicsSection = DynamicsSection()
+    housing: HousingSection = HousingSection()
+    planar: PlanarSection | None = None
+    helical: HelicalSection | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _rigid_ring(cls, data: object) -> object:
+        """The ring of a planar or helical case is rigid and needs no foundation."""
+        rigid = isinstance(data, dict) and ("planar" in data or "helical" in data)
+        if rigid and isinstance(data.get("ring"), dict):
+            loose = {"foundation_radial": "0 N/m^3", "foundation_tangential": "0 N/m^3"}
+            return data | {"ring": loose | data["ring"]}
+        return data
+
+    @property
+    def mesh_harmonics(self) -> int | None:
+        """Harmonics of the excitation: as given, 6 of rigid bodies, None where a frequency limits them."""
+        rigid = self.helical is not None or self.planar is not None
+        return self.dynamics.mesh_harmonics or (6 if rigid else None)
+
+    @property
+    def response_harmonics(self) -> int | None:
+        """Harmonics of the response: as given, or three times those of the mesh; None as there."""
+        found = self.mesh_harmonics
+        return self.dynamics.response_harmonics or (None if found is None else 3 * found)
+
+
+CODE = "E-PUBLISHED"
+
+
+def check_published(case: Case) -> Iterator[CaseError]:
+    """Refusals of published lines that nothing could be compared with."""
+    for i, entry in enumerate(case.housing.published):
+        key = f"housing.published[{i}]"
+        if not any(math.isclose(entry.speed, speed, rel_tol=1e-9) for speed in case.operation.speeds):
+            yield CaseError(
+                "this speed is not computed",
+                code=CODE,
+                key=f"{key}.speed",
+                value=SPEED.show(entry.speed),
+                limit=_speeds(case),
+                remedy="add it to operation.speeds, or leave the published lines out",
+            )
+        computed = case.response_harmonics
+        if computed is not None and entry.harmonic > computed:
+            yield CaseError(
+                "this mesh harmonic is not computed",
+                code=CODE,
+                key=f"{key}.harmonic",
+                value=entry.harmonic,
+                limit=f"1 to {computed}, the harmonics of the response",
+                remedy="raise dynamics.response_harmonics, or leave the published lines out",
+            )
+
+
+def _speeds(case: Case) -> str:
+    shown = [SPEED.show(speed) for speed in case.operation.speeds[:6]]
+    more = len(case.operation.speeds) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more else "")
+
+
+def without_uncomputed(data: dict, error: CaseError) -> str | None:
+    """Take those published lines out of the tables of a case to which alone an error objects.
+
+    Parameters
+    ----------
+    data : dict
+        Tables of a case file; modified.
+    error : CaseError
+        Of the check of the case.
+
+    Returns
+    -------
+    str or None
+        What was left out, in words; None where the error is about other things too.
+    """
+    problems = getattr(error, "problems", ())
+    if not problems or any(problem.code != CODE for problem in problems):
+        return None
+    numbers = {int(problem.key.split("[")[1].split("]")[0]) for problem in problems}
+    published = data["housing"]["published"]
+    data["housing"]["published"] = [e for i, e in enumerate(published) if i not in numbers]
+    return (
+        f"{len(numbers)} of {len(published)} entries housing.published are left out: their speed or harmonic "
+        "is not computed"
+    )

@@ -1,0 +1,289 @@
+"""CSV files of two columns that a case names: numbers with their units in the heading.
+
+Measured profiles: the CSV files that a case names, read once and kept inside the case.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import PurePath
+from typing import Any
+
+from femgear.case import text
+from femgear.case.deviations import MOST_POINTS
+from femgear.case.units import ANGLE, LENGTH, Dimension, to_si
+from femgear.errors import CaseError
+
+_HEADING = re.compile(r"\s*(?P<name>[A-Za-z_ ]+?)[\s_]*[\[(](?P<unit>[^\])]+)[\])]\s*")
+_COMMAS = "decimal commas need semicolons or tabs between the columns, or write decimal points"
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Two columns of a file.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for messages.
+    values : dict of str to list of float
+        SI values by the title of the column, in the order of the file.
+    lines : list of int
+        Number of the line of every point.
+    heading : int
+        Number of the line that names the columns.
+    """
+
+    name: str
+    values: dict[str, list[float]]
+    lines: list[int]
+    heading: int
+
+    def problem(self, message: str, line: int, *, value=None, limit=None, remedy: str) -> CaseError:
+        """A refusal (E-CSV) that names the file and its line."""
+        return _problem(message, self.name, line, value=value, limit=limit, remedy=remedy)
+
+
+def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
+    """What `read` finds in a file beside the case file or below.
+
+    Parameters
+    ----------
+    file : str
+        Relative to the folder of the case file.
+    name : str
+        Of the case file.
+    key : str
+        Of the entry, for messages.
+    read : callable
+        Takes the path.
+
+    Raises
+    ------
+    CaseError
+        A path that leads out of the folder (E-FILE), and what `read` raises, with the key.
+    """
+    path = PurePath(file)
+    if path.is_absolute() or ".." in path.parts or not path.parts:
+        raise CaseError(
+            "the file must lie in the folder of the case or below",
+            code="E-FILE",
+            key=key,
+            value=text.printable(file),
+            file=name or None,
+            remedy="copy it there and name it relative to the case file",
+        )
+    try:
+        return read(os.path.join(os.path.dirname(name), file))
+    except CaseError as error:
+        error.key = key
+        raise
+
+
+def read_columns(
+    path: str | os.PathLike, dimensions: Mapping[str, Dimension], *, least: int, most: int, remedy: str
+) -> Columns:
+    """Two columns, divided by comma, semicolon or tab, under a heading with names and units.
+
+    With semicolon or tab the numbers may have decimal commas. Empty lines and those that begin with ``#`` are
+    skipped.
+
+    Parameters
+    ----------
+    path : path-like
+    dimensions : mapping of str to Dimension
+        By the titles that are known, in small letters.
+    least, most : int
+        Points.
+    remedy : str
+        What the heading should be.
+
+    Raises
+    ------
+    CaseError
+        ``E-FILE``, ``E-FILE-ENC`` (see `tomlfile.read_text`); ``E-CSV`` with the number of the line: unknown
+        columns or units, numbers that are none or not finite, decimal commas beside decimal points.
+    """
+    name = text.printable(os.fsdecode(path))
+    lines = [(i, line) for i, line in enumerate(_text(path).splitlines(), start=1) if line.strip()]
+    lines = [(i, line) for i, line in lines if not line.lstrip().startswith("#")]
+    count = max(len(lines) - 1, 0)
+    if count < least:
+        limit = f"a heading, and {least} or more under it"
+        raise _problem(f"{count or 'no'} points", name, None, limit=limit, remedy=remedy)
+    if count > most:
+        words = f"{count} points are too many"
+        raise _problem(words, name, None, limit=f"{most} points", remedy="give it at fewer points")
+    divider = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
+    table = [(i, _cells(line, divider)) for i, line in lines]
+    factors = _heading(table[0][1], dimensions, name, table[0][0], remedy)
+    comma = divider != "," and any("," in cell for _, cells in table[1:] for cell in cells)
+    rows = [_row(cells, list(factors), divider, comma, name, i) for i, cells in table[1:]]
+    values = {title: [row[k] * factor for row in rows] for k, (title, factor) in enumerate(factors.items())}
+    return Columns(name, values, [i for i, _ in table[1:]], table[0][0])
+
+
+def _text(path) -> str:
+    try:
+        return text.read_text(path)
+    except CaseError as error:
+        if error.code == "E-FILE":
+            error.remedy = "name a text file of two columns, beside the case file or below"
+        raise
+
+
+def _cells(line: str, divider: str) -> list[str]:
+    """Entries of a line, without blanks and quotation marks around them."""
+    try:
+        (cells,) = csv.reader([line], delimiter=divider, skipinitialspace=True)
+    except csv.Error:  # an entry of more than 131 072 characters
+        cells = [line[:80]]
+    return [cell.strip() for cell in cells]
+
+
+def _heading(cells, dimensions, name: str, line: int, remedy: str) -> dict[str, float]:
+    """Titles of the columns and the SI values of their units."""
+    found = {}
+    for cell in cells:
+        match = _HEADING.fullmatch(cell)
+        title = " ".join(match["name"].lower().replace("_", " ").split()) if match else ""
+        if title not in dimensions:
+            words = "a column has no known name with its unit"
+            raise _problem(words, name, line, value=cell, remedy=remedy)
+        try:
+            found[title] = to_si(f"1 {match['unit']}", dimensions[title])
+        except CaseError as error:
+            swapped = any(_has(match["unit"], d) for d in dimensions.values() if d is not dimensions[title])
+            words = "the units of the two columns seem to be swapped" if swapped else remedy
+            raise _problem(error.message, name, line, value=cell, remedy=words) from None
+    if len(cells) != 2 or len(found) != 2:
+        raise _problem(f"the columns are {', '.join(cells)}", name, line, limit="two", remedy=remedy)
+    return found
+
+
+def _has(unit: str, dimension: Dimension) -> bool:
+    try:
+        to_si(f"1 {unit}", dimension)
+    except CaseError:
+        return False
+    return True
+
+
+def _row(cells, titles: list[str], divider: str, comma: bool, name: str, line: int) -> tuple[float, float]:
+    """Numbers of a line; with decimal commas anywhere in the file a point would be of thousands."""
+    if len(cells) != 2:
+        remedy = f"every line needs a {titles[0]} and a {titles[1]}, divided as the heading is"
+        if divider == "," and len(cells) > 2:
+            semicolon = any(";" in cell for cell in cells)
+            remedy = "divide the heading by a semicolon as well" if semicolon else _COMMAS
+        count = f"{len(cells)} {'entry' if len(cells) == 1 else 'entries'}"
+        raise _problem(f"{count} in a line", name, line, limit="2", remedy=remedy)
+    return _number(cells[0], divider, comma, name, line), _number(cells[1], divider, comma, name, line)
+
+
+def _number(cell: str, divider: str, comma: bool, name: str, line: int) -> float:
+    if comma and "." in cell:
+        raise _problem(
+            "decimal commas and points in one file", name, line, value=cell, limit="one of them",
+            remedy="write decimal commas throughout or decimal points throughout, and none for thousands",
+        )  # fmt: skip
+    try:
+        value = float(cell.replace(",", ".") if comma else cell) if cell.isascii() else math.nan
+    except ValueError:
+        value = math.nan
+    # underscores and words such as nan are numbers to Python alone
+    if not math.isfinite(value) or "_" in cell:
+        remedy = _COMMAS if divider == "," and "," in cell else "write numbers such as 120, 1.5 or 2.4e3"
+        raise _problem("not a finite number", name, line, value=cell, remedy=remedy)
+    return value
+
+
+def _problem(message: str, name: str, line: int | None, *, value=None, limit=None, remedy: str) -> CaseError:
+    file = f"{name}:{line}" if line else name
+    return CaseError(message, code="E-CSV", file=file, value=value, limit=limit, remedy=remedy)
+
+
+_COLUMNS = {"roll angle": "roll_angles", "diameter": "diameters", "deviation": "deviations"}
+_DIMENSIONS = {"roll angle": ANGLE, "diameter": LENGTH, "deviation": LENGTH}
+_UNITS = {"roll_angles": "rad", "diameters": "m", "deviations": "m"}
+_REMEDY = "the first line names two columns: roll angle [deg] or diameter [mm], and deviation [um]"
+
+
+def embed_profiles(data: dict, name: str) -> dict[str, str]:
+    """Put the points of every ``file`` of a measured profile in its place.
+
+    Parameters
+    ----------
+    data : dict
+        Tables of a case file; modified.
+    name : str
+        Name of the case file: files are looked for in its folder and below.
+
+    Returns
+    -------
+    dict of str to str
+        The files by the key of their modification, such as ``"sun.modifications[0]"``.
+
+    Raises
+    ------
+    CaseError
+        As `read_profile`, or a path that leads out of the folder (E-FILE).
+    """
+    found = {}
+    for gear in ("sun", "planet", "ring"):
+        section = data.get(gear)
+        tables = section.get("modifications") if isinstance(section, dict) else None
+        for i, table in enumerate(tables if isinstance(tables, list) else ()):
+            if not (isinstance(table, dict) and isinstance(table.get("file"), str)):
+                continue
+            if table.get("kind") != "measured profile" or "deviations" in table:
+                continue
+            key = f"{gear}.modifications[{i}]"
+            file = table.pop("file")
+            columns = embedded(file, name, f"{key}.file", read_profile)
+            for column, values in columns.items():
+                table[column] = [f"{value:.13g} {_UNITS[column]}" for value in values]
+            found[key] = text.printable(file)
+    return found
+
+
+def read_profile(path: str | os.PathLike) -> dict[str, list[float]]:
+    """Columns of a measured profile in SI units.
+
+    Parameters
+    ----------
+    path : path-like
+        Text in two columns, divided by comma, semicolon or tab (with semicolon or tab the numbers may have
+        decimal commas); the first line names them with their units, such as ``roll angle [deg]`` or
+        ``diameter [mm]`` and ``deviation [um]``. Empty lines and those that begin with ``#`` are skipped.
+        Deviations are positive where there is more material.
+
+    Returns
+    -------
+    dict
+        ``"roll_angles"`` [rad] or ``"diameters"`` [m], ascending or descending, and ``"deviations"`` [m].
+
+    Raises
+    ------
+    CaseError
+        ``E-FILE``, ``E-FILE-ENC`` (see `tomlfile.read_text`); ``E-CSV`` with the number of the line.
+    """
+    found = read_columns(path, _DIMENSIONS, least=2, most=MOST_POINTS, remedy=_REMEDY)
+    if "deviation" not in found.values:
+        words = f"the columns are {' and '.join(found.values)}"
+        raise found.problem(words, found.heading, limit="one of them deviations", remedy=_REMEDY)
+    (places,) = (values for title, values in found.values.items() if title != "deviation")
+    rising = places[1] > places[0]
+    for (before, after), line in zip(pairwise(places), found.lines[1:], strict=True):
+        if before == after or (after > before) is not rising:
+            raise found.problem(
+                "the points are neither ascending nor descending", line, value=after,
+                remedy="sort the lines, and keep one line of every point",
+            )  # fmt: skip
+    return {_COLUMNS[title]: values for title, values in found.values.items()}

@@ -1,0 +1,350 @@
+"""TOML text: read with care, and written back.
+
+Where a case came from: its file, the text that gives it, the lines of its keys.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import stat
+import tomllib
+
+from pydantic import BaseModel, PrivateAttr
+
+from femgear.errors import CaseError
+
+MAX_BYTES = 1_000_000
+MAX_DEPTH = 32
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_HEADER = re.compile(r"\s*(\[\[?)([^\[\]#]+)\]")
+_ENTRY = re.compile(r"\s*([A-Za-z0-9_.\"' -]+?)\s*=")
+# tomllib needs a time that grows with the square of the parts of a dotted key.
+_LONG_KEY = re.compile(
+    r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){33}"
+)
+
+
+def read_text(path: str | os.PathLike) -> str:
+    """Text of a small regular UTF-8 file, without its byte-order mark.
+
+    Raises
+    ------
+    CaseError
+        ``E-FILE``: missing, unreadable, not a regular file, empty or over `MAX_BYTES`.
+        ``E-FILE-ENC``: not UTF-8, with the offset of the first wrong byte.
+    """
+    name = printable(os.fsdecode(path))
+    try:
+        # O_NONBLOCK: opening a FIFO must not wait for a writer.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise CaseError(f"cannot open the file: {reason}", code="E-FILE", file=name) from error
+    try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise CaseError("not a regular file", code="E-FILE", file=name, remedy="name a TOML file")
+        with open(descriptor, "rb", closefd=False) as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise CaseError(f"cannot read the file: {error.strerror}", code="E-FILE", file=name) from error
+    finally:
+        os.close(descriptor)
+    if len(data) > MAX_BYTES:
+        raise CaseError("the file is too long", code="E-FILE", file=name, limit=f"{MAX_BYTES} bytes")
+    if not data.strip():
+        raise CaseError("the file is empty", code="E-FILE", file=name)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise CaseError(
+            f"not UTF-8: byte 0x{data[error.start]:02x} at offset {error.start}",
+            code="E-FILE-ENC",
+            file=name,
+            remedy="save the file as UTF-8",
+        ) from error
+
+
+def parse(text: str, name: str) -> dict:
+    """Tables of a TOML text, of limited depth and with finite numbers only.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        File name for messages.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    CaseError
+        ``E-TOML`` (syntax, with line and column), ``E-TOML-DUPLICATE`` (with both lines), ``E-TOML-DEPTH``,
+        ``E-FINITE`` (with keys and lines).
+    """
+    if _LONG_KEY.search(text):
+        raise _too_deep(name)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(text, str(error), name) from error
+    except ValueError as error:
+        raise CaseError(
+            "an integer has thousands of digits",
+            code="E-TOML",
+            file=name,
+            limit="4300 digits",
+            remedy="write it as a decimal number such as 1e9",
+        ) from error
+    except RecursionError:
+        raise _too_deep(name) from None
+    infinite = _check_tree(data, name)
+    if infinite:
+        (key, value), *others = infinite.items()
+        line = line_of(text, key)
+        also = "".join(f", nor is {other} (line {line_of(text, other)})" for other, _ in others)
+        raise CaseError(
+            f"not a finite number{also}",
+            code="E-FINITE",
+            key=key,
+            value=value,
+            file=f"{name}:{line}" if name and line else name,
+            limit="finite numbers (no nan, no inf, nothing beyond 1.8e308)",
+        )
+    return data
+
+
+def _too_deep(name: str) -> CaseError:
+    return CaseError(
+        "tables or lists are nested too deeply", code="E-TOML-DEPTH", file=name, limit=f"{MAX_DEPTH} levels"
+    )
+
+
+def _syntax_error(text: str, message: str, name: str) -> CaseError:
+    position = re.search(r"\(at line (\d+), column \d+\)", message)
+    line = int(position[1]) if position else text.count("\n") + 1
+    if "Cannot overwrite a value" in message or "Cannot declare" in message:
+        key, lines = _duplicate(text, line)
+        if len(lines) > 1:
+            places = " and ".join(str(number) for number in lines)
+            return CaseError(
+                f"given twice, in lines {places}",
+                code="E-TOML-DUPLICATE",
+                key=key,
+                file=name,
+                remedy="keep one of them",
+            )
+    remedy = None
+    if "octal" in message or re.search(
+        r"=\s*0\d", (text.splitlines() or [""])[min(line, text.count("\n") + 1) - 1]
+    ):
+        remedy = "a number has no leading zeros"
+    return CaseError(f"not TOML: {message}", code="E-TOML", file=name, remedy=remedy)
+
+
+def _duplicate(text: str, line: int) -> tuple[str | None, list[int]]:
+    """Key that is given a second time at or before ``line``, and the lines that give it."""
+    seen: dict[str, list[int]] = {}
+    for key, number in _entries(text):
+        if number <= line:
+            seen.setdefault(key, []).append(number)
+    repeated = [(numbers[-1], key) for key, numbers in seen.items() if len(numbers) > 1]
+    if not repeated:
+        return None, []
+    key = max(repeated)[1]
+    return key, seen[key]
+
+
+def _entries(text: str):
+    """Dotted key and line number of every table header and every key that starts a line.
+
+    Tables of a list are numbered: ``sun.modifications[0].amount``.
+    """
+    table, quoted, counts = "", None, {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        starts_quoted = quoted
+        for mark in re.findall(r'"""|\'\'\'', line):
+            quoted = mark if quoted is None else (None if mark == quoted else quoted)
+        if starts_quoted:
+            continue
+        header = _HEADER.match(line)
+        entry = _ENTRY.match(line)
+        if header:
+            table = _clean(header[2])
+            if header[1] == "[[":
+                counts[table] = counts.get(table, -1) + 1
+                table = f"{table}[{counts[table]}]"
+            yield table, number
+        elif entry:
+            yield ".".join(part for part in (table, _clean(entry[1])) if part), number
+
+
+def _clean(key: str) -> str:
+    return ".".join(part.strip().strip("\"'") for part in key.split("."))
+
+
+def line_of(text: str, key: str) -> int | None:
+    """Line (from 1) that gives the dotted ``key``, or None where no line starts with it.
+
+    Of an entry of a list it is the line of the entry, of its table, or of the list.
+    """
+    lines: dict[str, int] = {}
+    for found, number in _entries(text):
+        lines.setdefault(found, number)
+    table = key.rpartition("]")
+    wanted = (key, re.sub(r"(\[\d+\])+$", "", key), table[0] + table[1], key.split("[")[0], f"{key}[0]")
+    return next((lines[name] for name in wanted if name in lines), None)
+
+
+def _check_tree(data: dict, name: str) -> dict[str, float]:
+    """Keys and values of the numbers that are not finite; refuses what is too deep (without recursion)."""
+    infinite, pending = {}, [("", data, 1)]
+    while pending:
+        key, value, depth = pending.pop()
+        if depth > MAX_DEPTH:
+            raise _too_deep(name)
+        if isinstance(value, dict):
+            prefix = f"{key}." if key else ""
+            pending += [(prefix + printable(k), v, depth + 1) for k, v in reversed(value.items())]
+        elif isinstance(value, list):
+            pending += [(f"{key}[{i}]", v, depth + 1) for i, v in reversed(list(enumerate(value)))]
+        elif isinstance(value, float) and not math.isfinite(value):
+            infinite[key] = value
+    return infinite
+
+
+def write(data: dict) -> str:
+    """TOML text of nested tables of strings, booleans, integers, floats and lists of these.
+
+    Returns
+    -------
+    str
+        Text for which ``parse(write(data), "")`` equals ``data``.
+    """
+    lines: list[str] = []
+    _write_table(data, (), lines)
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def _write_table(table: dict, path: tuple[str, ...], lines: list[str]) -> None:
+    values = {key: value for key, value in table.items() if not isinstance(value, dict)}
+    if path and (values or not table):
+        lines += ["", f"[{'.'.join(_key(part) for part in path)}]"]
+    lines += [f"{_key(key)} = {_value(value)}" for key, value in values.items()]
+    for key, value in table.items():
+        if isinstance(value, dict):
+            _write_table(value, (*path, key), lines)
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else _value(key)
+
+
+def _value(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return '"' + "".join(_escape(character) for character in value) + '"'
+    if isinstance(value, int):
+        if abs(value).bit_length() > 4096:
+            raise CaseError("the integer is too long", code="E-RANGE", value=shown(value), limit="4096 bits")
+        return str(value)
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
+    raise CaseError(f"no TOML form for a {type(value).__name__}", code="E-TYPE", value=value)
+
+
+def _escape(character: str) -> str:
+    if character in '"\\':
+        return "\\" + character
+    if character.isprintable():
+        return character
+    code = ord(character)
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def shown(number: int) -> str:
+    """Text of an integer of any size (``str`` refuses those of thousands of digits)."""
+    if abs(number) < 10**15:
+        return str(number)
+    return f"{'-' if number < 0 else ''}about 2^{abs(number).bit_length()}"
+
+
+def found(number: int) -> int | str:
+    """An integer as messages show it: itself, or the size of one of thousands of digits."""
+    return number if abs(number) < 10**15 else shown(number)
+
+
+def printable(text: str) -> str:
+    """``text`` with every control character as an escape, fit for one line of a message."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text
+    )
+
+
+class ReadCase(BaseModel):
+    """Values of a case file that know where they were read."""
+
+    _source: str = PrivateAttr(default="")
+    _lines: str = PrivateAttr(default="")
+    _name: str = PrivateAttr(default="")
+    _notices: tuple[str, ...] = PrivateAttr(default=())
+    _profile_files: dict[str, str] = PrivateAttr(default_factory=dict)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the values agree, from whatever text they came."""
+        return isinstance(other, type(self)) and self.model_dump() == other.model_dump()
+
+    @property
+    def source(self) -> str:
+        """TOML text that gives this case."""
+        return self._source
+
+    @property
+    def name(self) -> str:
+        """Name of the file, for messages."""
+        return self._name
+
+    def location(self, key: str) -> str | None:
+        """File, and line where the file gives it, of a dotted key; of ``rack.x`` for ``sun.rack.x``."""
+        found = (line_of(self._lines, name) for name in (key, key.partition(".")[2]) if name)
+        line = next((number for number in found if number), None)
+        return f"{self._name}:{line}" if self._name and line else self._name or None
+
+    @property
+    def profile_files(self) -> dict[str, str]:
+        """Files of measured profiles or torque series, by the key of their entry."""
+        return self._profile_files
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Remarks on how the file was read."""
+        return self._notices
+
+
+def text_with_points(data: dict, name: str, *, points: str, remedy: str) -> str:
+    """TOML text of tables that the points of other files were put into.
+
+    Raises
+    ------
+    CaseError
+        It is too long for a case file (E-FILE).
+    """
+    text = write(data)
+    if len(text.encode()) > MAX_BYTES:
+        raise CaseError(
+            f"the case is too long with the points of its {points}",
+            code="E-FILE",
+            value=f"{len(text.encode())} bytes",
+            limit=f"{MAX_BYTES} bytes",
+            remedy=remedy,
+            file=name or None,
+        )
+    return text

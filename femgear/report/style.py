@@ -1,0 +1,175 @@
+"""What all figures share: colours, sizes, legends outside the axes, files."""
+
+from __future__ import annotations
+
+import io
+import os
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from femgear.storage.files import replace_file
+
+# Okabe and Ito, "Color Universal Design" (2008): told apart with every kind of colour vision
+BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#000000", "#808080"
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+DASHES = ("-", "--", "-.", ":")
+MARKERS = "osD^vPX*<>"
+SIZE = 11
+DPI = 120
+# height of a row of the legend [in]
+_LEGEND_ROW = 0.21
+
+
+def new_figure(
+    *,
+    rows: int = 1,
+    columns: int = 1,
+    width: float = 8.0,
+    height: float = 4.4,
+    sharex: bool = False,
+    sharey: bool = False,
+    polar: bool = False,
+):
+    """A figure outside pyplot, and its axes as a flat list.
+
+    Returns
+    -------
+    Figure
+    list of Axes
+    """
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.subplots(
+        rows,
+        columns,
+        squeeze=False,
+        sharex=sharex,
+        sharey=sharey,
+        subplot_kw={"projection": "polar"} if polar else None,
+    )
+    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.1)
+    flat = list(axes.ravel())
+    for ax in flat:
+        ax.tick_params(labelsize=SIZE - 1)
+        ax.grid(True, color="0.88", linewidth=0.8)
+        ax.set_axisbelow(True)
+        if not polar:
+            ax.spines[["top", "right"]].set_visible(False)
+    return figure, flat
+
+
+def label(ax, x: str = "", y: str = "", title: str = "") -> None:
+    """Axis labels with units, and a title."""
+    if x:
+        ax.set_xlabel(x, fontsize=SIZE)
+    if y:
+        ax.set_ylabel(y, fontsize=SIZE)
+    if title:
+        ax.set_title(title, fontsize=SIZE, loc="left")
+
+
+def legend_below(figure: Figure, ax=None, *, columns: int = 3) -> None:
+    """One legend under the figure, where it hides nothing; entries of equal text appear once.
+
+    The figure grows by the rows beyond the third, so that many entries leave the axes their size.
+    """
+    entries = {}
+    for one in figure.axes if ax is None else [ax]:
+        for handle, text in zip(*one.get_legend_handles_labels()):
+            entries.setdefault(text, handle)
+    if entries:
+        rows = -(-len(entries) // columns)
+        figure.set_figheight(figure.get_figheight() + _LEGEND_ROW * max(rows - 3, 0))
+        figure.legend(
+            entries.values(),
+            entries.keys(),
+            loc="outside lower center",
+            ncols=min(columns, len(entries)),
+            fontsize=SIZE - 1,
+            frameon=False,
+        )
+
+
+def line_style(index: int) -> dict[str, str]:
+    """Colour and dash of the line number `index`: neighbours differ in both, 28 lines in one of them."""
+    return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
+
+
+def save_figure(figure: Figure, path: str | os.PathLike) -> None:
+    """Write a figure as PNG; the file is either the old or the new one, whole.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    path : path-like
+
+    Raises
+    ------
+    StorageError
+        When the file cannot be written.
+    """
+    data = png_bytes(figure)
+    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """The figure as PNG; the same figure gives the same bytes."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
+    return stream.getvalue()
+
+
+def family(name: str) -> str:
+    """Kind of a mesh from its label: ``"planet-ring"`` where the ring takes part."""
+    return "planet-ring" if "ring" in name else "sun-planet"
+
+
+def distinct_lines(names, values, *, tolerance: float = 1e-6):
+    """Rows of `values` to draw: one for a family of meshes whose rows agree, each row otherwise.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Mesh labels.
+    values : (n, ...) array
+        One row a mesh.
+    tolerance : float
+        Largest difference of rows counted as equal, relative to the largest value.
+
+    Returns
+    -------
+    list of (str, int)
+        Legend text and row number.
+    """
+    values = np.asarray(values)
+    names = [str(name) for name in names]
+    size = np.abs(values).max(initial=0.0)
+    lines = []
+    for kind in dict.fromkeys(family(name) for name in names):
+        rows = [i for i, name in enumerate(names) if family(name) == kind]
+        same = np.abs(values[rows] - values[rows[0]]).max() <= tolerance * size
+        if same and len(rows) > 1:
+            lines.append((f"all {kind} meshes (identical)", rows[0]))
+        else:
+            lines += [(names[i], i) for i in rows]
+    return lines
+
+
+def periodic(position, values):
+    """Append the first sample at the end of a record of whole periods, so that the curve closes."""
+    position, values = np.asarray(position), np.asarray(values)
+    length = np.floor(position[-1] - position[0]) + 1.0
+    return np.append(position, length + position[0]), np.concatenate([values, values[..., :1]], axis=-1)
+
+
+def excited_to(data, speed_index: int) -> str:
+    """Highest frequency of the excitation at one speed, for a title; empty where it is not known."""
+    if "excitation_limit" not in data:
+        return ""
+    return f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
+
+
+def rpm(speed: float) -> str:
+    """Input speed in a title; speeds in datasets are in rpm."""
+    return f"{float(speed):.6g} rpm"

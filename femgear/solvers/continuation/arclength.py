@@ -1,0 +1,496 @@
+"""Pseudo-arc-length continuation of a curve ``F(u, parameter) = 0`` past limit points and branch points.
+
+Tangent predictor, Newton corrector normal to the tangent, step control by contraction, angle and chord:
+Allgower and Georg, Introduction to Numerical Continuation Methods (SIAM 2003), chapter 6; Krack and Gross,
+Harmonic Balance for Nonlinear Vibration Problems (2019), chapter 4. The curve keeps the orientation of its
+bordered determinant, so it cannot turn back by itself, and a jump to another curve is refused.
+
+Steps of arc-length continuation: predictor, corrector, acceptance, ends of the range and closed loops.
+
+Allgower and Georg, Introduction to Numerical Continuation Methods (SIAM 2003), chapter 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.continuation.bifurcation import Segment, branch_point, crossing_tangent, folds
+from femgear.solvers.continuation.corrector import (
+    CurvePoint,
+    LostError,
+    ScaledCurve,
+    check_step,
+    correct,
+    strain,
+    told_value,
+)
+
+# A loop is closed when it meets its start within this (scaled) distance.
+_CLOSED = 1e-6
+# One that starts in a branch point is closed by the same one within this part of the step.
+_CLOSED_BRANCH = 1e-2
+# Steps below this part of the largest one may turn in a corner of the curve; of a larger one than that of
+# a tenth of the scales they are no shorter than gaps between curves.
+_CORNER, _CORNER_LARGEST = 1e-3, 0.1
+# Steps below this part of those turn in a sharp corner: no smooth curve that the step control follows does.
+_SHARP = 0.02
+# Largest step over its option, a unit of the scaled unknowns, where they are large.
+_RELATIVE = 0.1
+# Largest options: the chord is compared with the mean of two tangents, and Newton's method must contract.
+_MOST_ANGLE, _MOST_CONTRACTION = 0.5, 0.25
+
+
+@dataclass(frozen=True)
+class StepOptions:
+    """How a curve is followed; lengths are in the scaled unknowns ``(u / scale, parameter / unit)``.
+
+    Parameters
+    ----------
+    first, smallest, largest : float
+        Step lengths; where the scaled unknowns exceed ten, the largest is that many tenths longer.
+    angle : float
+        Angle between successive tangents that is aimed at [rad], up to 0.5; twice as much is refused.
+    contraction : float
+        Ratio of the second to the first Newton step, both with the first derivative, aimed at
+        (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 5.1), up to 0.25; it sets the next
+        step.
+    tolerance : float
+        Last Newton step relative to ``1 + |z|``.
+    max_iterations : int
+        Newton iterations of one correction.
+    max_points : int
+        The curve ends, incomplete, after so many points.
+    """
+
+    first: float = 0.01
+    smallest: float = 1e-8
+    largest: float = 0.1
+    angle: float = 0.15
+    contraction: float = 0.0625
+    tolerance: float = 1e-10
+    max_iterations: int = 10
+    max_points: int = 5000
+
+    def __post_init__(self):
+        if not 0.0 < self.smallest <= self.first or not self.smallest <= self.largest < np.inf:
+            raise CaseError(
+                f"steps from {self.smallest} over {self.first} to {self.largest}", code="E-STEP",
+                limit="0 < smallest <= first, smallest <= largest",
+            )  # fmt: skip
+        if min(self.angle, self.contraction, self.tolerance, self.max_iterations - 1, self.max_points) <= 0:
+            raise CaseError(
+                "a step option is not positive", code="E-STEP", limit="> 0; two iterations or more"
+            )
+        for name, bound in (("angle", _MOST_ANGLE), ("contraction", _MOST_CONTRACTION)):
+            value = getattr(self, name)
+            if not value <= bound:
+                raise CaseError(
+                    f"the step option {name} is {value}", code="E-RANGE", key=name, value=value,
+                    limit=f"up to {bound}: beyond, a jump to another curve may look like a step",
+                    remedy="lengthen the steps by largest instead",
+                )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a curve ended; complete: a closed loop or an end of the range, otherwise the message says why."""
+
+    closed: bool
+    complete: bool
+    message: str
+
+
+def curve_points(
+    curve: ScaledCurve, first: CurvePoint, *, limits, options: StepOptions | None = None
+) -> Iterator[CurvePoint]:
+    """Points of a curve one by one, limit points and branch points among them; returns an `Ending`.
+
+    ``first`` has orientation zero where it is a branch point.
+    """
+    options = options or StepOptions()
+    bounds = np.asarray(limits, float) / curve.unit
+    yield first
+    point, h, count = first, options.first, 1
+    while count < options.max_points:
+        try:
+            h = max(min(h, _longest(point, options)), options.smallest)
+            segment, special, h = _step(curve, point, h, bounds, options)
+        except LostError as lost:
+            return Ending(False, False, f"lost after {_where(curve, point)}: {lost}")
+        events = [*special, (segment.length, segment.last)]
+        events, closed = _closing(segment, first, events, count)
+        for _, end in _until_end(segment, events, bounds):
+            yield end
+            count += 1
+            if end.kind == "end":
+                return Ending(False, True, f"end of the range at {_where(curve, end)}")
+        if closed:
+            return Ending(True, True, "closed loop")
+        point = segment.last
+    where = _where(curve, point)
+    return Ending(
+        False, False, f"stopped at {where} after {count} points: raise max_points, largest or the scale"
+    )
+
+
+def _longest(point: CurvePoint, options: StepOptions) -> float:
+    """Largest step from a point: relative to its unknowns where they have outgrown their scale."""
+    return options.largest * max(1.0, _RELATIVE * float(np.linalg.norm(point.z[:-1])))
+
+
+def _where(curve: ScaledCurve, point: CurvePoint) -> str:
+    """The parameter of a point in words."""
+    return curve.told(float(point.z[-1] * curve.unit))
+
+
+def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: StepOptions):
+    """The next accepted point: segment, special points on it, length of the next step."""
+    reason = ""
+    while h >= options.smallest:
+        try:
+            new = _landing(curve, point, h, bounds)
+            if new is None:
+                new = correct(curve, point.z + h * point.tangent, point.tangent)
+            shortness = h / (_CORNER * min(options.largest, _CORNER_LARGEST))
+            corner = shortness <= 1.0
+            aims = {"angle": options.angle, "contraction": options.contraction, "corner": corner}
+            aims["sharp"] = shortness <= _SHARP
+            effort = strain(point, new, **aims)
+            if not corner:
+                check_step(curve, point, new)
+            segment = Segment(curve, point, new)
+            special = folds(segment)
+            if point.orientation * new.orientation < 0.0:
+                special.append(branch_point(segment))
+            factor = np.clip(1.0 / max(effort, 1e-3), 0.5, 2.0)
+            return segment, sorted(special, key=lambda s: s[0]), h * factor
+        except LostError as lost:
+            reason = str(lost)
+            h *= 0.5
+    raise LostError(f"{reason} (step reduced to {h:.1e})")
+
+
+def _landing(curve: ScaledCurve, point: CurvePoint, h: float, bounds) -> CurvePoint | None:
+    """Point at the end of the range where the predictor reaches it, so that nothing is evaluated beyond."""
+    rate = point.tangent[-1]
+    bound = bounds[1] if rate > 0.0 else bounds[0]
+    way = (bound - point.z[-1]) / rate if rate else 0.0
+    if not 0.0 < way <= h:
+        return None
+    try:
+        new = _at_parameter(curve, point.z + way * point.tangent, bound, point.tangent)
+    except LostError:
+        return None  # a limit point lies before the end
+    return new if point.tangent @ (new.z - point.z) <= 2.0 * way else None
+
+
+def _at_parameter(curve: ScaledCurve, guess: np.ndarray, bound: float, along: np.ndarray) -> CurvePoint:
+    """Point of the curve at the scaled parameter ``bound``, exactly."""
+    axis = np.zeros(len(guess))
+    axis[-1] = 1.0
+    found = correct(curve, np.append(guess[:-1], bound), axis, along=along)
+    return replace(found, z=np.append(found.z[:-1], bound))
+
+
+def _until_end(segment: Segment, events, bounds):
+    """Events up to the end of the range, which replaces the first one beyond it."""
+    low = (0.0, segment.first)
+    for event in events:
+        value = event[1].z[-1]
+        beyond = bounds[0] if value < bounds[0] else bounds[1] if value > bounds[1] else None
+        if beyond is not None:
+            yield _at_bound(segment, low, event, beyond)
+            return
+        outward = event[1].tangent[-1] * (value - bounds.mean()) > 0.0
+        if value in bounds and event[1] is segment.last and outward:
+            yield event[0], replace(event[1], kind="end")
+            return
+        yield event
+        low = event
+
+
+def _at_bound(segment: Segment, low, high, bound: float):
+    """Point exactly at the bound, between two points with a monotonous parameter between them."""
+    from scipy.optimize import brentq
+
+    if low[1].z[-1] == bound:
+        # the curve starts at the bound and leaves at once
+        return low[0] + np.finfo(float).tiny, replace(low[1], kind="end")
+    known = {low[0]: low[1].z[-1] - bound, high[0]: high[1].z[-1] - bound}
+
+    def gap(h: float) -> float:
+        return known[h] if h in known else segment.at(h).z[-1] - bound
+
+    h = brentq(gap, low[0], high[0], xtol=1e-13 * segment.length, rtol=1e-14)
+    near = segment.at(h) if h not in known else (low if h == low[0] else high)[1]
+    try:
+        exact = _at_parameter(segment.curve, near.z, bound, near.tangent)
+        if np.linalg.norm(exact.z - near.z) < 1e-6 * segment.length:
+            near = exact
+    except LostError:
+        pass  # the bound is a limit point: the root above stands
+    return h, replace(near, z=np.append(near.z[:-1], bound), kind="end")
+
+
+def _closing(segment: Segment, first: CurvePoint, events, count: int):
+    """Events up to the start of the curve, when the segment meets it again in the same sense."""
+    if first.orientation == 0.0:
+        return _closing_branch(segment, first, events, count)
+    offset = first.z - segment.first.z
+    h = float(segment.first.tangent @ offset)
+    if count < 3 or not 0.0 < h <= segment.length or segment.first.tangent @ first.tangent < 0.5:
+        return events, False
+    if np.linalg.norm(offset) > 2.0 * segment.length:
+        return events, False
+    try:
+        met = segment.at(h)
+    except LostError:
+        return events, False
+    if np.linalg.norm(met.z - first.z) > _CLOSED or met.tangent @ first.tangent < 0.9:
+        return events, False
+    return [e for e in events if e[0] < h - 1e-9] + [(h, replace(first, kind="regular"))], True
+
+
+def _closing_branch(segment: Segment, first: CurvePoint, events, count: int):
+    """The same for a curve that starts in a branch point, where Newton's method would not converge."""
+    for place, point in events if count >= 3 else ():
+        near = np.linalg.norm(point.z - first.z) <= _CLOSED_BRANCH * segment.length
+        if point.kind == "branch point" and near and point.tangent @ first.tangent > 0.9:
+            return [e for e in events if e[0] < place] + [(place, replace(first, kind="regular"))], True
+    return events, False
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve of solutions.
+
+    Parameters
+    ----------
+    points : (p, n) array
+        Unknowns, in order along the curve.
+    parameter : (p,) array
+    folds, branch_points : int arrays
+        Indices of the points that are limit points and branch points.
+    closed : bool
+        The last point is the first one again.
+    complete : bool
+        The curve reached an end of the range or closed.
+    message : str
+        How it ended.
+    tangent : (p, n + 1) array
+        Unit tangents of ``(u / scale, parameter / unit)``.
+    iterations : (p,) int array
+        Newton iterations of every point.
+    error : (p,) array
+        Last Newton step relative to ``1 + |z|``.
+    scale : (n,) array
+    unit : float
+    """
+
+    points: np.ndarray
+    parameter: np.ndarray
+    folds: np.ndarray
+    branch_points: np.ndarray
+    closed: bool
+    complete: bool
+    message: str
+    tangent: np.ndarray
+    iterations: np.ndarray
+    error: np.ndarray
+    scale: np.ndarray
+    unit: float
+
+
+def continue_curve(
+    evaluate: Callable,
+    start,
+    parameter: float,
+    *,
+    limits: tuple[float, float],
+    scale=1.0,
+    unit: float | None = None,
+    direction: int = 1,
+    options: StepOptions | None = None,
+    told: Callable[[float], str] = told_value,
+) -> Curve:
+    """Follow the curve through a solution until it leaves the range of the parameter or closes.
+
+    Parameters
+    ----------
+    evaluate : callable
+        ``(u (n,), parameter) -> residual (n,), jacobian (n, n), slope (n,)``, slope = dF / dparameter.
+    start : (n,) array
+        Solution, or a guess of it, at ``parameter``.
+    parameter : float
+        Where to start, within the limits.
+    limits : (low, high)
+        The curve ends exactly there.
+    scale : float or (n,) array
+        Typical size of ``u``.
+    unit : float, optional
+        Typical change of the parameter; by default the width of the range.
+    direction : int
+        +1 starts towards larger parameters, -1 towards smaller ones.
+    options : StepOptions, optional
+    told : callable
+        The parameter as text with its name and unit, for messages.
+
+    Returns
+    -------
+    Curve
+
+    Raises
+    ------
+    CaseError
+        A start or limits that cannot be used.
+    ConvergenceError
+        No solution near the start.
+    """
+    curve = scaled_curve(
+        evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, told=told
+    )
+    first = start_point(curve, start, parameter, limits=limits, direction=direction)
+    return collect(curve, first, limits=limits, options=options)
+
+
+def scaled_curve(
+    evaluate, start, parameter: float, *, limits, scale=1.0, unit=None, options=None, told=told_value
+) -> ScaledCurve:
+    """The equations with their scales, checked; arguments as for :func:`continue_curve`."""
+    options = options or StepOptions()
+    low, high = _checked_limits(limits)
+    unit = high - low if unit is None else unit
+    scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
+    if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
+        raise CaseError("the scales of a curve must be positive", code="E-SCALE", limit="> 0")
+    curve = ScaledCurve(evaluate, scale, float(unit), options.tolerance, options.max_iterations, told=told)
+    return _with_rows(curve, curve.scaled(start, parameter))
+
+
+def _checked_limits(limits) -> tuple[float, float]:
+    """Low and high end of the range of the parameter."""
+    try:
+        low, high = (float(value) for value in limits)
+        valid = bool(np.isfinite([low, high]).all() and low < high)
+    except (TypeError, ValueError):
+        valid = False
+    if not valid:
+        raise CaseError(
+            f"a range of {limits}", code="E-RANGE", key="limits", limit="low < high, both finite",
+            remedy="give limits=(low, high) of the parameter",
+        )  # fmt: skip
+    return low, high
+
+
+def _with_rows(curve: ScaledCurve, z: np.ndarray) -> ScaledCurve:
+    """The same equations over the sizes that the rows of their derivative have at z."""
+    try:
+        size = np.abs(curve.equations(z)[1]).max(axis=1)
+    except LostError as error:
+        raise ConvergenceError(f"the start cannot be used: {error}", code="E-START") from error
+    # in a branch point all of one equation may vanish
+    return replace(curve, rows=np.where(size > 0.0, size, size.max() or 1.0))
+
+
+def start_point(curve: ScaledCurve, start, parameter: float, *, limits, direction: int = 1) -> CurvePoint:
+    """Corrected point at the parameter; the tangent goes with ``direction``."""
+    if not limits[0] <= parameter <= limits[1]:
+        raise CaseError(
+            f"the start at {curve.told(parameter)} lies outside the range", code="E-RANGE",
+            limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
+        )  # fmt: skip
+    axis = np.zeros(len(curve.scale) + 1)
+    axis[-1] = 1.0
+    try:
+        return correct(curve, curve.scaled(start, parameter), axis, along=np.sign(direction) * axis)
+    except LostError as error:
+        raise ConvergenceError(
+            f"no solution found near the start at {curve.told(parameter)}: {error}", code="E-START",
+            remedy="give a better start, or start away from a limit point",
+        ) from error  # fmt: skip
+
+
+def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options=None) -> Curve:
+    """The whole curve from a corrected point in the sense of its tangent."""
+    walk, points = curve_points(curve, first, limits=limits, options=options), []
+    while True:
+        try:
+            points.append(next(walk))
+        except StopIteration as stop:
+            ending = stop.value
+            break
+    z = np.array([p.z for p in points])
+    parameter = z[:, -1] * curve.unit
+    if points[-1].kind == "end":
+        parameter[-1] = min(limits, key=lambda limit: abs(limit - parameter[-1]))
+    kinds = np.array([p.kind for p in points])
+    return Curve(
+        points=z[:, :-1] * curve.scale,
+        parameter=parameter,
+        folds=np.flatnonzero(kinds == "fold"),
+        branch_points=np.flatnonzero(kinds == "branch point"),
+        closed=ending.closed,
+        complete=ending.complete,
+        message=ending.message,
+        tangent=np.array([p.tangent for p in points]),
+        iterations=np.array([p.iterations for p in points]),
+        error=np.array([p.error for p in points]),
+        scale=curve.scale,
+        unit=curve.unit,
+    )
+
+
+def switch_branch(
+    evaluate: Callable,
+    known: Curve,
+    index: int,
+    *,
+    limits,
+    options: StepOptions | None = None,
+    told: Callable[[float], str] = told_value,
+) -> tuple[Curve, Curve]:
+    """The curve that crosses a known one in a branch point, in both directions from there.
+
+    Parameters
+    ----------
+    evaluate : callable
+        As given to :func:`continue_curve`.
+    known : Curve
+    index : int
+        Of the branch point among the points of the known curve, one of ``known.branch_points``.
+    limits, options, told
+        As for :func:`continue_curve`.
+
+    Raises
+    ------
+    CaseError
+        The point is no branch point.
+    ConvergenceError
+        The branch point is not simple, so that the other directions cannot be told apart.
+    """
+    if index not in known.branch_points:
+        raise CaseError(
+            f"point {index} is no branch point", code="E-BRANCH",
+            limit=f"one of {known.branch_points.tolist()}",
+        )  # fmt: skip
+    start = known.points[index]
+    curve = scaled_curve(
+        evaluate, start, known.parameter[index], limits=limits, scale=known.scale, unit=known.unit,
+        options=options, told=told,
+    )  # fmt: skip
+    z = curve.scaled(start, known.parameter[index])
+    _, derivative = curve.equations(z)
+    point = CurvePoint(z, known.tangent[index], derivative, 0.0, 0, 0.0, float(known.error[index]))
+    try:
+        tangent = crossing_tangent(curve, point)
+    except LostError as error:
+        raise ConvergenceError(
+            f"no other curve found at {told(float(known.parameter[index]))}: {error}", code="E-BRANCH",
+            remedy="disturb the symmetry of the system a little",
+        ) from error  # fmt: skip
+    sides = (replace(point, tangent=sign * tangent) for sign in (1.0, -1.0))
+    return tuple(collect(curve, side, limits=limits, options=options) for side in sides)

@@ -1,0 +1,322 @@
+"""Newton's method on a curve ``F(u, parameter) = 0``: bordered systems, tangents, their orientation.
+
+Allgower and Georg, Introduction to Numerical Continuation Methods (SIAM 2003), chapters 2, 3 and 6.
+
+Whether a step along a curve stayed on it: angle, contraction of Newton's method, way back, middle.
+
+Allgower and Georg, Introduction to Numerical Continuation Methods (SIAM 2003), chapter 6; Deuflhard, Newton
+Methods for Nonlinear Problems (Springer 2004), sections 2.1 and 5.1, for the contraction.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import FemgearError
+
+
+class LostError(Exception):
+    """A correction that did not succeed; the reason is its text."""
+
+
+class RoundingError(LostError):
+    """A correction that came near a solution, but whose last steps are rounding: it is nearly singular."""
+
+
+# Residuals over the sizes of the rows, relative to 1 + |z|, that are rounding.
+_ROUNDING = 1e-13
+
+
+def told_value(parameter: float) -> str:
+    """A parameter without a name or a unit of its own, in words."""
+    return f"parameter = {parameter:.9g}"
+
+
+@dataclass(frozen=True)
+class ScaledCurve:
+    """``F(u, parameter)`` in the unknowns ``z = (u / scale, parameter / unit)``.
+
+    Parameters
+    ----------
+    evaluate : callable
+        ``(u (n,), parameter) -> residual (n,), jacobian (n, n), slope (n,)``.
+    scale : (n,) array
+        Typical sizes of ``u``.
+    unit : float
+        Typical size of a change of the parameter.
+    tolerance : float
+        Length of the last Newton step, relative to ``1 + |z|``.
+    max_iterations : int
+    rows : (n,) array or float
+        Typical sizes of the rows of the scaled derivative, constant so that no singularity is divided away.
+    told : callable
+        Parameter -> text, for messages.
+    """
+
+    evaluate: Callable
+    scale: np.ndarray
+    unit: float
+    tolerance: float
+    max_iterations: int
+    rows: np.ndarray | float = 1.0
+    told: Callable[[float], str] = told_value
+
+    def scaled(self, u, parameter: float) -> np.ndarray:
+        """``z`` (n + 1,)."""
+        return np.append(np.asarray(u, float) / self.scale, parameter / self.unit)
+
+    def physical(self, z: np.ndarray) -> tuple[np.ndarray, float]:
+        """``u`` and the parameter."""
+        return z[:-1] * self.scale, float(z[-1] * self.unit)
+
+    def equations(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residual (n,) and derivative (n, n + 1) with respect to z, both over ``rows``."""
+        try:
+            residual, jacobian, slope = self.evaluate(*self.physical(z))
+        except (FemgearError, np.linalg.LinAlgError) as error:
+            raise LostError(f"the equations cannot be evaluated ({str(error).splitlines()[0]})") from error
+        matrix = np.column_stack([jacobian * self.scale, np.asarray(slope) * self.unit])
+        if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(matrix))):
+            raise LostError("the equations give numbers that are not finite")
+        return residual / self.rows, (matrix.T / self.rows).T
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """A corrected point of a curve.
+
+    Parameters
+    ----------
+    z, tangent : (n + 1,) arrays
+        Scaled point and unit tangent.
+    derivative : (n, n + 1) array
+        Scaled derivative of the equations.
+    orientation : float
+        Sign of the determinant of the derivative bordered by the tangent.
+    iterations : int
+    contraction : float
+        Second Newton step, with the derivative of the first one, over the first; zero when one was enough.
+    error : float
+        Length of the last Newton step, relative to ``1 + |z|``.
+    kind : str
+        ``"regular"``, ``"fold"``, ``"branch point"`` or ``"end"``.
+    """
+
+    z: np.ndarray
+    tangent: np.ndarray
+    derivative: np.ndarray
+    orientation: float
+    iterations: int
+    contraction: float
+    error: float
+    kind: str = "regular"
+
+    @property
+    def bordered(self) -> np.ndarray:
+        """Derivative with the tangent as last row, (n + 1, n + 1)."""
+        return np.vstack([self.derivative, self.tangent])
+
+
+def factored(matrix: np.ndarray):
+    """LU factors of a bordered matrix and the sign of its determinant."""
+    from scipy import linalg
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", linalg.LinAlgWarning)
+        factors = linalg.lu_factor(matrix, check_finite=False)
+    diagonal = np.diag(factors[0])
+    if not np.all(diagonal):
+        raise LostError("the bordered matrix is singular")
+    swaps = np.count_nonzero(factors[1] != np.arange(len(diagonal)))
+    return factors, float(np.prod(np.sign(diagonal)) * (-1) ** swaps)
+
+
+def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=None) -> CurvePoint:
+    """Point of the curve in the plane ``normal . (z - guess) = 0``, by Newton's method.
+
+    Parameters
+    ----------
+    curve : ScaledCurve
+    guess, normal : (n + 1,) arrays
+    along : (n + 1,) array, optional
+        The tangent is given the sense of this vector; of ``normal`` when not given.
+
+    Raises
+    ------
+    LostError
+        No convergence, or a bordered matrix that is singular.
+    """
+    from scipy import linalg
+
+    z, lengths, contraction, factors = guess.copy(), [], 0.0, None
+    residuals = []
+    unit = np.zeros(len(z))
+    unit[-1] = 1.0
+    for _ in range(curve.max_iterations):
+        residual, derivative = curve.equations(z)
+        right = np.append(residual, normal @ (z - guess))
+        residuals.append(float(np.abs(residual).max() / (1.0 + np.linalg.norm(z))))
+        if len(lengths) == 1:
+            # what the next step would be with the first derivative
+            again = linalg.lu_solve(factors, right, check_finite=False)
+            contraction = np.linalg.norm(again) / (1.0 + np.linalg.norm(z)) / lengths[0]
+        factors, sign = factored(np.vstack([derivative, normal]))
+        step = linalg.lu_solve(factors, right, check_finite=False)
+        z = z - step
+        lengths.append(float(np.linalg.norm(step) / (1.0 + np.linalg.norm(z))))
+        if not np.isfinite(lengths[-1]):
+            raise LostError("Newton's method left the finite numbers")
+        if lengths[-1] <= curve.tolerance:
+            break
+        if len(lengths) > 3 and lengths[-1] > 2.0 * max(lengths[-2], lengths[-3]):
+            raise _failed(residuals)(f"Newton's method diverges (steps {lengths[-2]:.1e}, {lengths[-1]:.1e})")
+    else:
+        count, last = curve.max_iterations, lengths[-1]
+        raise _failed(residuals)(f"no convergence in {count} iterations (last step {last:.1e})")
+    tangent = linalg.lu_solve(factors, unit, check_finite=False)
+    tangent /= np.linalg.norm(tangent)
+    if along is not None and tangent @ along < 0.0:
+        # normal . tangent is positive as solved, so only a turned tangent changes the sign of the determinant
+        tangent, sign = -tangent, -sign
+    if lengths[0] <= 1e2 * curve.tolerance:
+        contraction = 0.0  # rounding
+    return CurvePoint(z, tangent, derivative, sign, len(lengths), float(contraction), lengths[-1])
+
+
+def _failed(residuals: list[float]) -> type[LostError]:
+    """Kind of a failure: the last steps began where the equations hold to rounding, or not."""
+    return RoundingError if max(residuals[-2:]) <= _ROUNDING else LostError
+
+
+# Deviation of a chord from the mean of its tangents [rad], beyond a share of the angle between them.
+_CHORD, _CHORD_SHARE, _CORNER_SHARE = 0.003, 0.15, 0.6
+# Sharpest corner [rad] and distance of the chord from the plane of its sides, over its length.
+_SHARPEST, _ASIDE = 1.2, 0.05
+# Distance from the old point, over that of the prediction from it, after one Newton step on the way back.
+_RETURN = 0.1
+# Middle of a step: distance from the cubic between the ends over the length, and error of Simpson's rule.
+_OFFSET, _TURN = 0.03, 0.1
+
+
+def strain(
+    point: CurvePoint,
+    new: CurvePoint,
+    *,
+    angle: float,
+    contraction: float,
+    corner: bool = False,
+    sharp: bool = False,
+) -> float:
+    """How far a step was from what is aimed at: 1 on target.
+
+    On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
+    a jump from curve to curve turns the chord but not the tangents.
+
+    Parameters
+    ----------
+    point, new : CurvePoint
+    angle, contraction : float
+        Aimed at; see `StepOptions`.
+    corner : bool
+        The step is so short that the curve may turn in a corner.
+    sharp : bool
+        It is so short that any turn is one of a corner, between whose sides the chord lies.
+
+    Raises
+    ------
+    LostError
+        The angle is twice what is aimed at, or the chord leaves the tangents.
+    """
+    turn = np.arccos(float(np.clip(point.tangent @ new.tangent, -1.0, 1.0)))
+    if sharp and 2.0 * angle < turn <= _SHARPEST:
+        _check_sides(point, new)
+        return float(np.sqrt(new.contraction / contraction))
+    if turn > 2.0 * angle:
+        raise LostError(f"the tangent turns by {turn:.2g} rad")
+    chord = new.z - point.z
+    mean = point.tangent + new.tangent
+    mean /= np.linalg.norm(mean)
+    along = chord @ mean
+    aside = np.arctan2(np.linalg.norm(chord - along * mean), along)
+    if aside > _CHORD + (_CORNER_SHARE if corner else _CHORD_SHARE) * turn:
+        raise LostError(f"the chord leaves the tangents by {aside:.2g} rad: another curve was reached")
+    return max(turn / angle, np.sqrt(new.contraction / contraction))
+
+
+def _check_sides(point: CurvePoint, new: CurvePoint) -> None:
+    """A step over a corner between two straight sides goes forward along each of them."""
+    chord = new.z - point.z
+    sides = np.column_stack([point.tangent, new.tangent])
+    ways = np.linalg.lstsq(sides, chord, rcond=None)[0]
+    length = float(np.linalg.norm(chord))
+    aside = np.linalg.norm(chord - sides @ ways) / length
+    if not (aside <= _ASIDE and ways.min() >= -_ASIDE * length):
+        raise LostError(f"a corner that the step does not go around ({aside:.2g} aside): another curve")
+
+
+def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
+    """Look at a step from its other end and at its middle, one evaluation each.
+
+    Raises
+    ------
+    LostError
+        The step left the curve, or passed over a piece of it.
+    """
+    if np.linalg.norm(new.z - point.z) <= 1e2 * curve.tolerance * (1.0 + np.linalg.norm(new.z)):
+        return
+    _check_return(curve, point, new)
+    _check_middle(curve, point, new)
+
+
+def _check_return(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
+    """Predict the old point from the new one: Newton's method must lead back to it.
+
+    Where a step jumped to a neighbouring curve, the way back misses the curve that it came from. The old
+    point is known, so one Newton step tells how the method contracts towards it.
+    """
+    way = float(new.tangent @ (point.z - new.z))
+    guess = new.z + way * new.tangent
+    miss = np.linalg.norm(guess - point.z)
+    if miss <= 1e2 * curve.tolerance * (1.0 + np.linalg.norm(point.z)):
+        return
+    step, _, _ = _newton_step(curve, guess, new.tangent)
+    left = np.linalg.norm(guess - step - point.z) / miss
+    if not left <= _RETURN:
+        raise LostError(f"the way back misses the point before by {left:.2g} of the prediction")
+
+
+def _check_middle(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
+    """The curve passes near the middle of the cubic between both ends, with the tangent that it has there.
+
+    Simpson's rule gives the chord from the tangents at both ends and in the middle. A curve that makes a
+    detour between two points, such as a resonance narrower than the step, is not near; two branch points in
+    one step show by the orientation between them.
+    """
+    chord = new.z - point.z
+    length = float(np.linalg.norm(chord))
+    along = chord / length
+    start, end = (p.tangent / (p.tangent @ along) for p in (point, new))
+    guess = 0.5 * (point.z + new.z) + 0.125 * length * (start - end)
+    step, tangent, sign = _newton_step(curve, guess, along)
+    offset = np.linalg.norm(step) / length
+    turn = np.linalg.norm(along - (start + 4.0 * tangent + end) / 6.0)
+    if not (offset <= _OFFSET and turn <= _TURN):
+        raise LostError(f"midway the curve is {offset:.2g} of the step away and turned by {turn:.2g}")
+    if sign * point.orientation < 0.0 and sign * new.orientation < 0.0:
+        raise LostError("the orientation changes twice")
+
+
+def _newton_step(curve: ScaledCurve, z: np.ndarray, normal: np.ndarray):
+    """Newton step to subtract in the plane normal to a vector, tangent over that vector, sign."""
+    from scipy import linalg
+
+    residual, derivative = curve.equations(z)
+    factors, sign = factored(np.vstack([derivative, normal]))
+    right = np.zeros((len(z), 2))
+    right[:-1, 0], right[-1, 1] = residual, 1.0
+    step, tangent = linalg.lu_solve(factors, right, check_finite=False).T
+    return step, tangent, sign

@@ -1,0 +1,606 @@
+"""Modal basis of a system with mean mesh stiffnesses, and what the modes left out leave behind.
+
+Complex modes: natural frequencies, damping and whirl with gyroscopic terms and any viscous damping.
+
+``(lambda^2 M + lambda D + K') x = 0`` with ``D = C + speed G`` and ``K' = K + W diag(mesh_stiffness) W^T``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.system.system import MechanicalSystem, Modes, Response
+
+# Eigenvalues of two modes closer than this (relative) are one multiple eigenvalue: never cut through it.
+_MULTIPLE = 1e-6
+# Strain of a mesh, or work of the load, on a rigid mode relative to the sum of the absolute terms.
+_RIGID_TOLERANCE = 1e-6
+# Entries of a rigid mode this small relative to its largest one are rounding.
+_RIGID_ROUNDING = 1e-9
+
+
+def solve_modes(
+    system: MechanicalSystem,
+    mesh_stiffness,
+    *,
+    damping_ratio=None,
+    count: int | None = None,
+    max_frequency: float | None = None,
+) -> Modes:
+    """Modes of ``K + W diag(k) W^T`` and ``M`` with the static flexibility of the modes left out.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+        Without gyroscopic terms; its ``C`` must be zero unless ``damping_ratio`` is ``None``.
+    mesh_stiffness : (n_meshes,) array
+        Mean mesh stiffnesses [N/m], not negative.
+    damping_ratio : float or (n_modes,) array, optional
+        Fraction of critical damping. ``None`` takes ``phi^T C phi / (2 omega)``, which needs a ``C`` that
+        the modes make diagonal.
+    count : int, optional
+        Number of modes to keep, one or two more when the last belongs to a multiple eigenvalue.
+    max_frequency : float, optional
+        Keep the modes up to this frequency [Hz]. All modes when neither is given.
+
+    Returns
+    -------
+    Modes
+        ``kind`` is ``"rigid"`` or ``"elastic"`` and ``nodal_diameter`` -1: the model knows better names.
+
+    Raises
+    ------
+    CaseError
+        Matrices that do not fit, are not symmetric or not finite; a load that no support takes up.
+    ConvergenceError
+        A mass that is not positive definite, a stiffness that is negative, a rigid mode that strains a mesh.
+
+    Notes
+    -----
+    Residual flexibility ``W^T K^+ W - sum r r^T / omega^2``, ``r = W^T phi`` (Geradin and Rixen, Mechanical
+    Vibrations, 3rd ed., section 2.9); ``K^+`` is the inverse on the motions free of rigid modes.
+
+    With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give
+    ``d = S (W^T q - C g)`` and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the
+    directions ``W S^T``, whose total stiffness is ``W (k^-1 + C)^-1 W^T``, and the flexibility ``S C`` beside
+    that of the modes left out.
+    """
+    stiffness = total_stiffness(system, mesh_stiffness)
+    if count is not None and max_frequency is not None:
+        raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
+    scale, values, shape = _eigen(system.M, stiffness, count, max_frequency)
+    rigid = _rigid(values, scale, len(system.M))
+    if np.any(rigid):
+        shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
+    springs = spring_directions(system, mesh_stiffness)
+    rows = springs.T @ shape
+    modal_load = shape.T @ system.load
+    _check_rigid(system, shape[:, rigid])
+    rows[:, rigid] = 0.0
+    modal_load[rigid] = 0.0
+    omega = np.sqrt(np.where(rigid, 0.0, values))
+    flexible = pseudo_solve(system.M, stiffness, shape[:, rigid], np.column_stack([springs, system.load]))
+    static = springs.T @ flexible
+    residual = static[:, :-1] - _modal_flexibility(rows, rows, omega)
+    if system.flexibility is not None:
+        residual += _shared(system, mesh_stiffness) @ system.flexibility
+    return Modes(
+        frequency=omega / (2.0 * np.pi),
+        damping_ratio=_damping(system, shape, omega, damping_ratio),
+        shape=shape,
+        mesh_stiffness=np.asarray(mesh_stiffness, dtype=float),
+        mesh_deflection=rows,
+        residual=0.5 * (residual + residual.T),
+        load_deflection=static[:, -1],
+        kind=tuple("rigid" if flag else "elastic" for flag in rigid),
+        nodal_diameter=np.full(len(omega), -1),
+        dofs=system.dofs,
+        modal_load=modal_load,
+    )
+
+
+def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
+    """Static flexibility of the modes left out, from the mesh forces to the outputs ``L q``.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    modes : Modes
+        Of that system.
+    outputs : (n_outputs, n) array
+        ``L``.
+
+    Returns
+    -------
+    (n_outputs, n_meshes) array
+        ``L K^+ W - sum (L phi) r^T / omega^2`` [m/N per unit of L].
+    """
+    outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
+    springs = spring_directions(system, modes.mesh_stiffness)
+    static = outputs @ pseudo_solve(*rigid_basis(system, modes), springs)
+    omega = 2.0 * np.pi * modes.frequency
+    return static - _modal_flexibility(outputs @ modes.shape, modes.mesh_deflection, omega)
+
+
+def output_load(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
+    """Static outputs ``L K^+ load`` (n_outputs,) under the constant external load, all modes included."""
+    outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
+    return outputs @ pseudo_solve(*rigid_basis(system, modes), system.load[:, None])[:, 0]
+
+
+def output_response(modes: Modes, response: Response, rows, *, residual, load) -> np.ndarray:
+    """Harmonics of the outputs ``L q`` of a periodic response.
+
+    Parameters
+    ----------
+    modes, response
+        The response computed with those modes.
+    rows : (n_outputs, n_modes) array
+        ``L @ modes.shape``.
+    residual : (n_outputs, n_meshes) array
+        From :func:`residual_output`.
+    load : (n_outputs,) array
+        From :func:`output_load`.
+
+    Returns
+    -------
+    (n_speeds, n_outputs, H + 1) complex array
+    """
+    omega = 2.0 * np.pi * modes.frequency
+    forcing = response.force - modes.mesh_stiffness[:, None] * response.deflection
+    out = np.matmul(rows, response.modal) - np.matmul(residual, forcing)
+    modal_load = np.zeros(len(omega)) if modes.modal_load is None else modes.modal_load
+    out[..., 0] += load - _modal_flexibility(rows, modal_load[None, :], omega)[:, 0]
+    return out
+
+
+def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+    n, meshes = len(system.M), np.asarray(mesh_stiffness, dtype=float)
+    shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "W": (n, len(meshes)), "load": (n,)}
+    for name, shape in shapes.items():
+        array = getattr(system, name)
+        if array.shape != shape:
+            raise CaseError(f"{name} has shape {array.shape}, expected {shape}", code="E-SHAPE")
+        if not np.all(np.isfinite(array)):
+            raise CaseError(f"{name} holds numbers that are not finite", code="E-FINITE")
+    for name in ("M", "K"):
+        array = getattr(system, name)
+        error, size = np.abs(array - array.T).max(), np.abs(array).max()
+        if error > 1e-9 * size:
+            raise CaseError(f"{name} is not symmetric: {error:.3e} of {size:.3e}", code="E-SYMMETRY")
+    if not np.all(np.isfinite(meshes)) or np.any(meshes < 0.0):
+        raise CaseError(
+            "mesh stiffnesses must be finite and not negative",
+            code="E-MESH-STIFFNESS", value=meshes.tolist(), limit=">= 0 N/m",
+        )  # fmt: skip
+    if system.gyroscopic is not None and np.any(system.gyroscopic):
+        raise CaseError(
+            "real modes cannot carry gyroscopic terms", code="E-GYROSCOPIC", key="gyroscopic",
+            remedy="leave them out of the system that is reduced to modes",
+        )  # fmt: skip
+    carried = np.diag(meshes)
+    if system.flexibility is not None:
+        carried = meshes[:, None] * _shared(system, meshes)
+    return 0.5 * (system.K + system.K.T) + system.W @ carried @ system.W.T
+
+
+def spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+    """Directions (n, n_meshes) whose products with the motions are the deflections of the mesh springs."""
+    return system.W if system.flexibility is None else system.W @ _shared(system, mesh_stiffness).T
+
+
+def _shared(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+    """``(I + C k)^-1``: what the springs take of the mesh deflections, the bodies taking the rest."""
+    flexibility = system.flexibility
+    return np.linalg.inv(np.eye(len(flexibility)) + flexibility * np.asarray(mesh_stiffness, float))
+
+
+def _eigen(mass, stiffness, count, max_frequency):
+    """Largest eigenvalue scale, eigenvalues and mass-normalised shapes that are asked for."""
+    from scipy import linalg
+
+    n = len(mass)
+    try:
+        factor = np.linalg.cholesky(0.5 * (mass + mass.T))
+    except np.linalg.LinAlgError as error:
+        raise ConvergenceError(
+            "the mass matrix is not positive definite", code="E-MASS",
+            remedy="give every degree of freedom some mass or condense it",
+        ) from error  # fmt: skip
+    standard = linalg.solve_triangular(factor, stiffness, lower=True)
+    standard = linalg.solve_triangular(factor, standard.T, lower=True)
+    standard = 0.5 * (standard + standard.T)
+    scale = np.abs(standard).sum(axis=1).max()
+    subset = None
+    if count is not None:
+        if count < 1 or int(count) != count:
+            raise CaseError("at least one mode is needed", code="E-MODES", value=count)
+        if count < n:
+            subset = {"subset_by_index": (0, min(n, int(count) + 4) - 1)}
+    if max_frequency is not None:
+        if not max_frequency > 0.0:
+            raise CaseError("the highest frequency must be positive", code="E-MODES", value=max_frequency)
+        top = (2.0 * np.pi * max_frequency) ** 2 * (1.0 + 10.0 * _MULTIPLE)
+        subset = {"subset_by_value": (-np.inf, top)}
+    values, vectors = linalg.eigh(standard, **(subset or {"driver": "evd"}))
+    if not np.all(np.isfinite(values)) or not len(values):
+        raise ConvergenceError(
+            f"no natural frequency below {max_frequency} Hz", code="E-MODES",
+            remedy="raise the highest frequency",
+        )  # fmt: skip
+    if count is not None:
+        kept = min(int(count), len(values))
+        while kept < len(values) and values[kept] - values[kept - 1] < _MULTIPLE * abs(values[kept]):
+            kept += 1
+        values, vectors = values[:kept], vectors[:, :kept]
+    return scale, values, linalg.solve_triangular(factor, vectors, lower=True, trans="T")
+
+
+def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
+    """Which eigenvalues are zero up to rounding of the largest one; refuses negative ones."""
+    threshold = max(1e-12, 10.0 * n * np.finfo(float).eps) * scale
+    if values[0] < -threshold:
+        raise ConvergenceError(
+            f"the stiffness matrix is negative on some motion: smallest eigenvalue {values[0]:.3e} 1/s^2",
+            code="E-STIFFNESS", remedy="check the signs of supports, couplings and mesh directions",
+        )  # fmt: skip
+    return np.abs(values) <= threshold
+
+
+def _refined_rigid(mass, stiffness, shape) -> np.ndarray:
+    """Rigid modes cleaned of elastic parts, mass-orthonormal: twice ``x - (K + a M x x^T M)^-1 K x``."""
+    from scipy import linalg
+
+    for _ in range(2):
+        shape = shape - linalg.cho_solve(_held(mass, stiffness, shape), stiffness @ shape)
+        lower = np.linalg.cholesky(shape.T @ mass @ shape)
+        shape = linalg.solve_triangular(lower, shape.T, lower=True).T
+    return shape
+
+
+def _held(mass, stiffness, rigid):
+    """Cholesky factor of ``K + a M R R^T M``: the elastic part as it is, rigid motions held by a spring a."""
+    from scipy import linalg
+
+    carried = mass @ rigid
+    # as soft as the softest coordinate: a stiff spring would drown soft couplings in its rounding
+    own = np.diag(stiffness) / np.diag(mass)
+    weight = own[own > 0.0].min(initial=np.inf)
+    weight = weight if np.isfinite(weight) else 1.0
+    return linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
+
+
+def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
+    """Refuse rigid modes that strain a mesh or on which the load does work."""
+    strain, allowed = np.abs(system.W.T @ rigid), _allowed(system.W, rigid)
+    if np.any(strain > allowed):
+        mesh = int(np.argmax((strain - allowed).max(axis=1)))
+        raise ConvergenceError(
+            f"a motion without stiffness strains column {mesh + 1} of W: its mean stiffness is missing or "
+            "too small", code="E-RIGID-MODE", remedy="give every mesh, bearing or spring a mean stiffness",
+        )  # fmt: skip
+    work, allowed = np.abs(system.load @ rigid), _allowed(system.load[:, None], rigid)[0]
+    if np.any(work > allowed):
+        mode = int(np.argmax(work - allowed))
+        size = np.abs(system.load) @ np.abs(rigid[:, mode])
+        dof = int(np.argmax(np.abs(rigid[:, mode])))
+        name = system.dofs[dof] if system.dofs else str(dof)
+        raise CaseError(
+            f"the constant load does work on a rigid-body motion (largest at {name}): "
+            f"{work[mode]:.3e} of {size:.3e}",
+            code="E-LOAD-BALANCE", limit="a load in equilibrium with itself",
+            remedy="add the reaction torque of the output, or hold that motion by a support",
+        )  # fmt: skip
+
+
+def _allowed(columns: np.ndarray, rigid: np.ndarray) -> np.ndarray:
+    """Products (n_columns, n_rigid) of columns and rigid modes that count as zero.
+
+    A share of the absolute terms; where the mode does not move the column these terms are rounding
+    themselves, so that entries of the mode below the rounding of its largest one count as zero.
+    """
+    terms = _RIGID_TOLERANCE * np.abs(columns).T @ np.abs(rigid)
+    largest = np.abs(columns).max(axis=0, initial=0.0)[:, None] * np.abs(rigid).max(axis=0, initial=0.0)
+    return np.maximum(terms, _RIGID_ROUNDING * largest)
+
+
+def rigid_basis(system: MechanicalSystem, modes: Modes):
+    return system.M, total_stiffness(system, modes.mesh_stiffness), modes.shape[:, modes.frequency == 0.0]
+
+
+def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
+    """``K^+ loads``: elastic displacement, mass-orthogonal to the rigid modes, of self-equilibrated loads.
+
+    ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.
+    """
+    from scipy import linalg
+
+    carried = mass @ rigid
+    loads = loads - carried @ (rigid.T @ loads)
+    out = linalg.cho_solve(_held(mass, stiffness, rigid), loads)
+    return out - rigid @ (carried.T @ out)
+
+
+def _modal_flexibility(left: np.ndarray, right: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """``sum left right^T / omega^2`` over the modes that are not rigid."""
+    elastic = omega > 0.0
+    return (left[:, elastic] / omega[elastic] ** 2) @ right[:, elastic].T
+
+
+def _damping(system: MechanicalSystem, shape, omega, damping_ratio) -> np.ndarray:
+    if damping_ratio is None:
+        modal = shape.T @ system.C @ shape
+        off = np.abs(modal - np.diag(np.diag(modal))).max(initial=0.0)
+        if off > 1e-6 * np.abs(modal).max(initial=0.0):
+            raise CaseError(
+                "the viscous damping couples the modes", code="E-DAMPING", key="damping_ratio",
+                remedy="give a modal damping ratio, or a damping matrix proportional to mass and stiffness",
+            )  # fmt: skip
+        return np.where(omega > 0.0, np.diag(modal) / (2.0 * np.where(omega > 0.0, omega, 1.0)), 0.0)
+    if np.any(system.C):
+        raise CaseError(
+            "a damping ratio and a damping matrix are given", code="E-DAMPING", key="damping_ratio",
+            remedy="keep one of them",
+        )  # fmt: skip
+    ratio = np.asarray(damping_ratio, dtype=float)
+    if ratio.ndim > 1 or (ratio.ndim == 1 and len(ratio) != len(omega)):
+        raise CaseError(
+            f"{ratio.size} damping ratios for {len(omega)} modes", code="E-DAMPING", key="damping_ratio",
+            limit="one number, or one a mode",
+        )  # fmt: skip
+    if not np.all(np.isfinite(ratio)) or np.any(ratio < 0.0):
+        raise CaseError(
+            "damping ratios must be finite and not negative", code="E-DAMPING", key="damping_ratio",
+            value=ratio.tolist(), limit=">= 0",
+        )  # fmt: skip
+    return np.where(omega > 0.0, ratio, 0.0)
+
+
+# Eigenvalue of K' over M, relative to the largest, below which a motion has no stiffness.
+_RIGID = 1e-12
+# Pole relative to the largest one that counts as zero or as real.
+_ZERO = 1e-11
+# Condition of the eigenvectors above which the poles are taken for defective.
+_DEFECTIVE = 1e10
+
+
+@dataclass(frozen=True)
+class ComplexModes:
+    """Poles with their right and left vectors.
+
+    Of two conjugate poles the one with positive imaginary part stands for both; real poles stand alone.
+    Rigid motions enter by their velocity, so that free rotation makes a single pole at zero.
+
+    Parameters
+    ----------
+    eigenvalue : (p,) complex array
+        ``lambda`` [1/s], by size; exactly zero for rigid-body modes.
+    shape, drift : (n, p) complex arrays
+        Displacement of the elastic motions and velocity of the rigid ones; the right vector of a pole is
+        ``shape + drift / lambda``.
+    left : (n, p) complex array
+        Left vectors ``y``: ``y^H (2 lambda M + D) x = 1``.
+    paired : (p,) bool array
+        Whether the conjugate pole belongs to it.
+    speed : float
+        That multiplies the gyroscopic matrix [rad/s].
+    dofs : tuple of str
+    """
+
+    eigenvalue: np.ndarray
+    shape: np.ndarray
+    drift: np.ndarray
+    left: np.ndarray
+    paired: np.ndarray
+    speed: float
+    dofs: tuple[str, ...]
+
+    def __post_init__(self):
+        for name in ("eigenvalue", "shape", "drift", "left", "paired"):
+            array = np.array(getattr(self, name))
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def rigid(self) -> np.ndarray:
+        """Poles at zero (p,)."""
+        return self.eigenvalue == 0.0
+
+    @property
+    def right(self) -> np.ndarray:
+        """Right vectors (n, p) with ``x^H M x = 1``; of rigid modes their velocity."""
+        return np.where(
+            self.rigid, self.drift, self.shape + self.drift / np.where(self.rigid, 1.0, self.eigenvalue)
+        )
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """``|lambda| / 2 pi`` (p,) [Hz], the undamped natural frequency where damping is light."""
+        return np.abs(self.eigenvalue) / (2.0 * np.pi)
+
+    @property
+    def damped_frequency(self) -> np.ndarray:
+        """``Im lambda / 2 pi`` (p,) [Hz]; zero for real poles."""
+        return self.eigenvalue.imag / (2.0 * np.pi)
+
+    @property
+    def damping_ratio(self) -> np.ndarray:
+        """``-Re lambda / |lambda|`` (p,): negative where motions grow, +-1 for real poles, 0 if rigid."""
+        return np.where(
+            self.rigid, 0.0, -self.eigenvalue.real / np.where(self.rigid, 1.0, np.abs(self.eigenvalue))
+        )
+
+
+def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.0) -> ComplexModes:
+    """All modes of the damped, rotating system.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+        M positive definite, M and K symmetric. K may be negative on some motions (centripetal terms).
+    mesh_stiffness : (n_meshes,) array
+        [N/m], not negative.
+    speed : float
+        That multiplies ``system.gyroscopic`` [rad/s].
+
+    Raises
+    ------
+    CaseError
+        Matrices that do not fit, are not symmetric or not finite.
+    ConvergenceError
+        A mass that is not positive definite, or poles that share one vector (E-DEFECTIVE).
+
+    Notes
+    -----
+    State form of the real modes of ``K'`` and ``M`` (L. Meirovitch, Principles and Techniques of Vibrations,
+    1997, sections 4.4 and 4.9); the left vectors are the rows of the inverse of the right ones, so that both
+    are biorthonormal within multiple poles as well.
+    """
+    from scipy import linalg
+
+    square, real, rigid = _real_modes(system, mesh_stiffness)
+    damping = real.T @ damping_matrix(system, speed) @ real
+    m, elastic = int(np.count_nonzero(~rigid)), ~rigid
+    order = np.concatenate([np.flatnonzero(elastic), np.flatnonzero(rigid)])
+    # speeds scaled by a mean frequency keep the state matrix balanced
+    scale = np.exp(0.5 * np.mean(np.log(np.abs(square[elastic])))) if m else 1.0
+    state = np.zeros((m + len(square),) * 2)
+    state[:m, m : 2 * m] = scale * np.eye(m)
+    state[m : 2 * m, :m] = -np.diag(square[elastic]) / scale
+    state[m:, m:] = -damping[np.ix_(order, order)]
+    value, vector = linalg.eig(state)
+    inverse = _inverse(vector)
+    zero = max(_ZERO * np.abs(value).max(), 100.0 * np.finfo(float).eps * np.linalg.norm(state))
+    value = np.where(np.abs(value) <= zero, 0.0, value)
+    value = np.where(np.abs(value.imag) <= _ZERO * np.abs(value), value.real, value)
+    kept = np.flatnonzero(value.imag >= 0.0)
+    kept = kept[np.argsort(np.abs(value[kept]), kind="stable")]
+    modes = ComplexModes(
+        eigenvalue=value[kept], shape=real[:, elastic] @ vector[:m, kept],
+        drift=real[:, rigid] @ vector[2 * m :, kept] * scale,
+        left=(inverse[kept, m:] @ real[:, order].T).conj().T / scale,
+        paired=value[kept].imag > 0.0, speed=float(speed), dofs=system.dofs,
+    )  # fmt: skip
+    return _normalised(modes, system.M)
+
+
+def damping_matrix(system: MechanicalSystem, speed: float = 0.0) -> np.ndarray:
+    """``C + speed G`` (n, n).
+
+    Raises
+    ------
+    CaseError
+        A speed that is not finite (E-SPEED), a gyroscopic matrix that is not skew-symmetric (E-SYMMETRY).
+    """
+    if not np.isfinite(speed):
+        raise CaseError("the speed is not finite", code="E-SPEED", value=speed)
+    if system.gyroscopic is None or not speed:
+        return np.asarray(system.C)
+    G = system.gyroscopic
+    if G.shape != system.M.shape or np.abs(G + G.T).max() > 1e-9 * np.abs(G).max(initial=0.0):
+        raise CaseError(
+            "the gyroscopic matrix is not skew-symmetric", code="E-SYMMETRY", key="gyroscopic",
+            remedy="put damping into C and springs into K",
+        )  # fmt: skip
+    return system.C + speed * G
+
+
+def whirl(shape, mass, planes) -> np.ndarray:
+    """Sense of the orbits of every mode, from -1 (backward) over 0 (straight) to 1 (forward).
+
+    An orbit ``Re((X, Y) exp(i omega t))`` covers area at the rate ``-omega Im(conj(X) Y)``, positive for a
+    counter-clockwise one; the sum over the planes, weighted with their masses, is divided by its bound (G.
+    Genta, Dynamics of Rotating Systems, 2005, section 2.5). In a rotating frame it is the sense seen there.
+
+    Parameters
+    ----------
+    shape : (n, m) complex array
+    mass : (n,) array
+        Diagonal of the mass matrix.
+    planes : (k, 2) int array
+        Rows of x and y, or of radial and tangential, of one body each.
+
+    Returns
+    -------
+    (m,) array
+        Zero where nothing moves in the planes.
+    """
+    shape, mass, planes = np.asarray(shape), np.asarray(mass, float), np.asarray(planes, int).reshape(-1, 2)
+    x, y = shape[planes[:, 0]], shape[planes[:, 1]]
+    weight = np.sqrt(mass[planes[:, 0]] * mass[planes[:, 1]])
+    area = -2.0 * weight @ (x.conj() * y).imag
+    bound = weight @ (np.abs(x) ** 2 + np.abs(y) ** 2)
+    total = mass @ np.abs(shape) ** 2
+    return np.where(bound > 1e-12 * total, area / np.where(bound > 0.0, bound, 1.0), 0.0)
+
+
+def _real_modes(system: MechanicalSystem, mesh_stiffness):
+    """``omega^2`` of any sign, mass-normalised shapes and which of them are rigid."""
+    from scipy import linalg
+
+    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
+    try:
+        square, shape = linalg.eigh(stiffness, system.M)
+    except linalg.LinAlgError as error:
+        raise ConvergenceError(
+            "the mass matrix is not positive definite", code="E-MASS",
+            remedy="give every degree of freedom some mass or condense it",
+        ) from error  # fmt: skip
+    limit = max(_RIGID, 10.0 * len(square) * np.finfo(float).eps) * np.abs(square).max()
+    return square, shape, np.abs(square) <= limit
+
+
+def _inverse(vector: np.ndarray) -> np.ndarray:
+    size = np.linalg.svd(vector, compute_uv=False)
+    if not size[-1] * _DEFECTIVE > size[0]:
+        raise ConvergenceError(
+            f"two poles share one vector: condition {size[0] / max(size[-1], 1e-300):.1e} of the modes",
+            code="E-DEFECTIVE", limit=f"{_DEFECTIVE:.0e}",
+            remedy="a mode is critically damped or a speed is critical: change damping or speed a little",
+        )  # fmt: skip
+    return np.linalg.inv(vector)
+
+
+def _normalised(modes: ComplexModes, mass: np.ndarray) -> ComplexModes:
+    """``x^H M x = 1`` with the phase that makes ``x^T M x`` real, so that real modes come out real."""
+    right = modes.right
+    size = np.sqrt(np.einsum("ip,ip->p", right.conj(), mass @ right).real)
+    square = np.einsum("ip,ip->p", right, mass @ right)
+    # circular orbits have x^T M x = 0 and any phase
+    phase = np.where(
+        np.abs(square) > 1e-9 * size**2, np.sqrt(square / np.abs(np.where(square == 0, 1, square))), 1.0
+    )
+    factor = 1.0 / (size * phase)
+    return replace(
+        modes, shape=modes.shape * factor, drift=modes.drift * factor, left=modes.left / factor.conj()
+    )  # fmt: skip
+
+
+def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray:
+    """Viscous damping ``M Phi diag(2 zeta omega) Phi^T M`` (n, n) of modal damping ratios.
+
+    Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 3.1: all modes of the system whose columns have
+    the stiffnesses ``mesh_stiffness`` (n_columns,) get ``ratio``, a number or one a mode; rigid ones none.
+    """
+
+    modes = solve_modes(system, mesh_stiffness, damping_ratio=ratio)
+    carried = system.M @ modes.shape
+    return (carried * (4.0 * np.pi * modes.damping_ratio * modes.frequency)) @ carried.T
+
+
+def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> np.ndarray:
+    """``C`` as given, or of modal ratios."""
+    if damping is None:
+        return still.C
+    array = np.asarray(damping, float)
+    if array.ndim < 2:
+        return modal_damping(still, reference, damping)
+    if array.shape != still.M.shape or not np.all(np.isfinite(array)):
+        raise CaseError(
+            f"a damping matrix of shape {array.shape}", code="E-SHAPE", key="damping",
+            limit=f"{still.M.shape} finite numbers",
+        )  # fmt: skip
+    return array

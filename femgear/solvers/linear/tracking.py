@@ -1,0 +1,463 @@
+"""Modes followed over a parameter: assignment by shape and eigenvalue, steps refined where modes veer.
+
+Where branches of modes come close: crossing or veering.
+
+Where the kinetic and the strain energy of modes sit: shares of bodies, meshes and supports.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.linear.modal import ComplexModes
+
+# Relative distance of eigenvalues that belong to one multiple eigenvalue, whose vectors are free.
+_MULTIPLE = 1e-7
+# Relative distance at which two branches may pass each other: closer ones count as crossing.
+_CROSSING = 1e-6
+# Cost of a relative distance of eigenvalues, and its bound, against 1 - MAC.
+_CONTINUITY, _BOUND = 10.0, 0.5
+
+
+@dataclass(frozen=True)
+class TrackedModes:
+    """Branches of modes.
+
+    Parameters
+    ----------
+    value : (p,) array
+        Parameter, with the values that the refinement inserted.
+    given : (p,) bool array
+        The values that were asked for.
+    eigenvalue : (p, m) complex array
+        [1/s]; a branch is a column.
+    shape : (p, n, m) complex array
+        Mass-normalised; within a multiple eigenvalue turned to fit the neighbours.
+    agreement : (p - 1, m) array
+        MAC with mass weighting over each step; of multiple eigenvalues that with their space.
+    unresolved : tuple of (float, float)
+        Steps of the smallest size over which some branch still agrees less than asked.
+    """
+
+    value: np.ndarray
+    given: np.ndarray
+    eigenvalue: np.ndarray
+    shape: np.ndarray
+    agreement: np.ndarray
+    unresolved: tuple[tuple[float, float], ...]
+
+    def __post_init__(self):
+        for name in ("value", "given", "eigenvalue", "shape", "agreement"):
+            array = np.array(getattr(self, name))
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """``|lambda| / 2 pi`` (p, m) [Hz]."""
+        return np.abs(self.eigenvalue) / (2.0 * np.pi)
+
+    @property
+    def damping_ratio(self) -> np.ndarray:
+        """``-Re lambda / |lambda|`` (p, m)."""
+        size = np.abs(self.eigenvalue)
+        return -self.eigenvalue.real / np.where(size > 0.0, size, 1.0)
+
+
+@dataclass(frozen=True)
+class _Point:
+    value: float
+    eigenvalue: np.ndarray
+    vector: np.ndarray
+    slope: np.ndarray | None = None
+
+
+def oscillating(modes: ComplexModes) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and right vectors of the modes with a frequency: what `track_modes` follows."""
+    return modes.eigenvalue[modes.paired], modes.right[:, modes.paired]
+
+
+def mac(first, second, mass) -> np.ndarray:
+    """Modal assurance criterion (m1, m2) with the mass as weight.
+
+    ``|a^H M b|^2 / (a^H M a) (b^H M b)`` (R. J. Allemang, Sound and Vibration 37(8), 2003, 14-23).
+
+    Parameters
+    ----------
+    first, second : (n, m1), (n, m2) arrays
+    mass : (n, n) array
+    """
+    root = np.linalg.cholesky(np.asarray(mass, float)).T
+    return np.abs(_unit(root @ first).conj().T @ _unit(root @ second)) ** 2
+
+
+def track_modes(
+    family: Callable[[float], tuple[np.ndarray, np.ndarray]],
+    values,
+    mass,
+    *,
+    count: int | None = None,
+    agreement: float = 0.9,
+    max_halvings: int = 14,
+) -> TrackedModes:
+    """Follow modes from one parameter value to the next.
+
+    Each step assigns modes by ``1 - MAC`` and the distance to the extrapolated eigenvalue
+    (`scipy.optimize.linear_sum_assignment`). A step is refined where a branch agrees less than asked, and
+    where two branches change places without having been seen within 1e-6 of each other: a step that jumps
+    over a veering looks like a crossing.
+
+    Parameters
+    ----------
+    family : callable
+        ``family(value)`` returns eigenvalues (m,) [1/s] and shapes (n, m), as many or more at every value.
+    values : (k,) array
+        Ascending or descending.
+    mass : (n, n) array
+    count : int, optional
+        Lowest modes of the first value to follow; all when not given.
+    agreement : float
+        Lowest MAC over one step.
+    max_halvings : int
+        The smallest step is the given one over ``2 ** max_halvings``.
+
+    Raises
+    ------
+    CaseError
+        Values that do not ascend or descend (E-VALUES).
+    ConvergenceError
+        Fewer modes at a value than are followed (E-MODE-LOST).
+    """
+    values = np.asarray(values, float)
+    if (
+        values.ndim != 1
+        or len(values) < 2
+        or not (np.all(np.diff(values) > 0) or np.all(np.diff(values) < 0))
+    ):
+        raise CaseError("parameter values must ascend or descend", code="E-VALUES", limit="two or more")
+    root = np.linalg.cholesky(np.asarray(mass, float)).T
+    first = _solved(family, float(values[0]), root)
+    order = np.argsort(np.abs(first.eigenvalue), kind="stable")[:count]
+    points = [_Point(first.value, first.eigenvalue[order], first.vector[:, order])]
+    agreements, unresolved = [], []
+    for start, end in itertools.pairwise(values):
+        smallest = 1.5 * abs(end - start) / 2.0**max_halvings
+        pending = [_solved(family, float(end), root)]
+        while pending:
+            old = points[-1]
+            new, fits = _assigned(old, pending[-1])
+            between = _refined(old, new, fits, agreement)
+            if between is not None and abs(new.value - old.value) > smallest:
+                pending.append(_solved(family, between, root))
+                continue
+            if fits.min() < agreement:
+                unresolved.append((old.value, new.value))
+            if len(points) == 1:
+                points[0] = _turned(old, new)
+            points.append(new)
+            agreements.append(fits)
+            pending.pop()
+    return _tracked(points, values, root, agreements, unresolved)
+
+
+def _tracked(points: list[_Point], values, root, agreements, unresolved) -> TrackedModes:
+    """The points as arrays, with shapes instead of mass-weighted vectors."""
+    value = np.array([point.value for point in points])
+    return TrackedModes(
+        value=value,
+        given=np.isin(value, values),
+        eigenvalue=np.array([point.eigenvalue for point in points]),
+        shape=np.linalg.solve(root, np.array([point.vector for point in points])),
+        agreement=np.array(agreements),
+        unresolved=tuple(unresolved),
+    )
+
+
+def _solved(family, value: float, root: np.ndarray) -> _Point:
+    eigenvalue, shape = family(value)
+    return _Point(value, np.asarray(eigenvalue, complex), _unit(root @ np.asarray(shape)))
+
+
+def _assigned(old: _Point, new: _Point) -> tuple[_Point, np.ndarray]:
+    """The new modes in the order of the old branches, and their agreement (m,)."""
+    from scipy.optimize import linear_sum_assignment
+
+    m, value = len(old.eigenvalue), new.eigenvalue
+    if len(value) < m:
+        raise ConvergenceError(
+            f"{m} modes are followed, {len(value)} are there at {new.value:.6g}", code="E-MODE-LOST",
+            remedy="end before it, or follow fewer modes: one became rigid, overdamped or unstable",
+        )  # fmt: skip
+    plain = np.abs(old.vector.conj().T @ new.vector) ** 2
+    space = _space_agreement(old, new)
+    ahead = old.eigenvalue if old.slope is None else old.eigenvalue + old.slope * (new.value - old.value)
+    distance = np.abs(value[None, :] - ahead[:, None]) / np.maximum(np.abs(ahead), 1e-300)[:, None]
+    cost = 1.0 - space + 0.1 * (1.0 - plain) + np.minimum(_CONTINUITY * distance, _BOUND)
+    _, place = linear_sum_assignment(cost)
+    vector = _matched(old.vector, new.vector[:, place], value[place])
+    slope = (value[place] - old.eigenvalue) / (new.value - old.value)
+    return _Point(new.value, value[place], vector, slope), space[np.arange(m), place]
+
+
+def _space_agreement(old: _Point, new: _Point) -> np.ndarray:
+    """MAC (m, m') in which multiple eigenvalues count with the space of their vectors."""
+    fits = np.abs(old.vector.conj().T @ new.vector) ** 2
+    for group in _groups(old.eigenvalue):
+        basis = np.linalg.qr(old.vector[:, group])[0]
+        fits[group] = (np.abs(basis.conj().T @ new.vector) ** 2).sum(axis=0)
+    for group in _groups(new.eigenvalue):
+        basis = np.linalg.qr(new.vector[:, group])[0]
+        fits[:, group] = (np.abs(basis.conj().T @ old.vector) ** 2).sum(axis=0)[:, None]
+    return fits
+
+
+def _groups(eigenvalue: np.ndarray) -> list[np.ndarray]:
+    """Members of every multiple eigenvalue."""
+    order = np.argsort(np.abs(eigenvalue), kind="stable")
+    close = np.abs(np.diff(eigenvalue[order])) <= _MULTIPLE * np.abs(eigenvalue[order][1:])
+    groups = np.split(order, np.flatnonzero(~close) + 1)
+    return [group for group in groups if len(group) > 1]
+
+
+def _matched(old: np.ndarray, new: np.ndarray, eigenvalue: np.ndarray) -> np.ndarray:
+    """New vectors with the phase of the old ones; vectors of a multiple eigenvalue turned onto them."""
+    from scipy.linalg import polar
+
+    new = new.astype(complex)
+    for group in _groups(eigenvalue):
+        basis = np.linalg.qr(new[:, group])[0]
+        new[:, group] = basis @ polar(basis.conj().T @ old[:, group])[0]
+    overlap = np.einsum("im,im->m", new.conj(), old)
+    size = np.abs(overlap)
+    return new * np.where(size > 1e-8, overlap / np.where(size > 0.0, size, 1.0), 1.0)
+
+
+def _turned(first: _Point, second: _Point) -> _Point:
+    """The first point with the vectors of multiple eigenvalues turned onto those of the second."""
+    vector = first.vector.astype(complex)
+    for group in _groups(first.eigenvalue):
+        vector[:, group] = _matched(second.vector[:, group], vector[:, group], first.eigenvalue[group])
+    return _Point(first.value, first.eigenvalue, vector, second.slope)
+
+
+def _refined(old: _Point, new: _Point, fits: np.ndarray, limit: float) -> float | None:
+    """A value between two points at which to look first, or None where the step is good."""
+    a, b = old.eigenvalue.imag, new.eigenvalue.imag
+    before, after = a[:, None] - a, b[:, None] - b
+    near = _CROSSING * np.maximum(np.abs(a), np.abs(b))
+    passes = (before * after < 0.0) & (np.minimum(np.abs(before), np.abs(after)) > near[:, None])
+    step = new.value - old.value
+    if np.any(passes):
+        i, j = np.argwhere(passes)[0]
+        share = before[i, j] / (before[i, j] - after[i, j])
+        # an end that is hit exactly would repeat a point
+        return float(old.value + step * min(max(share, 0.02), 0.98))
+    return float(old.value + 0.5 * step) if fits.min() < limit else None
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector, axis=0)
+
+
+@dataclass(frozen=True)
+class Approach:
+    """Two branches at their smallest distance.
+
+    Parameters
+    ----------
+    first, second : int
+        Branches.
+    value : float
+        Parameter of the smallest distance.
+    frequency, gap : float
+        Mean frequency and smallest distance there [Hz].
+    exchange : float
+        MAC of the first branch before with the second after: one where they change shapes, zero where each
+        keeps its own.
+    kind : str
+        ``"crossing"`` where the branches pass through each other; ``"veering"`` where they turn away and
+        exchange their shapes; ``"approach"`` where they turn away and mostly keep them.
+    """
+
+    first: int
+    second: int
+    value: float
+    frequency: float
+    gap: float
+    exchange: float
+    kind: str
+
+
+def approaches(tracked: TrackedModes, mass, *, within: float = 0.1) -> tuple[Approach, ...]:
+    """Crossings and veerings of tracked modes, in the order of the parameter.
+
+    Near a veering of two modes the squared distance of their eigenvalues is a parabola in the parameter
+    (N. C. Perkins and C. D. Mote, J. Sound Vib. 106, 1986, 451-463), whose vertex is taken.
+
+    Parameters
+    ----------
+    tracked : TrackedModes
+    mass : (n, n) array
+    within : float
+        Largest distance relative to the frequency.
+    """
+    f = tracked.eigenvalue.imag / (2.0 * np.pi)
+    found = []
+    for first in range(f.shape[1]):
+        for second in range(first + 1, f.shape[1]):
+            found += _between(tracked, f, mass, first, second, within)
+    return tuple(sorted(found, key=lambda one: one.value))
+
+
+def coupling_factor(first, second, mass, stiffness_change, mass_change=None, *, squared) -> float:
+    """How far two modes veer instead of crossing, from derivatives at one parameter value.
+
+    With ``s_ij = phi_i^T (dK - lambda dM) phi_j`` the two eigenvalues change as those of the 2 x 2 matrix of
+    ``s``, so that their smallest distance is this factor times the present one:
+    ``2 |s_12| / sqrt((s_11 - s_22)^2 + 4 s_12^2)``. Zero: they cross. One: they are at their smallest
+    distance. ``s_12`` is the coupling of Perkins and Mote (1986); J. Lin and R. G. Parker (Mech. Struct.
+    Mach. 29, 2001, 411-429) evaluate it for planetary gears.
+
+    Parameters
+    ----------
+    first, second : (n,) arrays
+        Real shapes.
+    mass, stiffness_change : (n, n) arrays
+        M and dK/dp, the meshes included.
+    mass_change : (n, n) array, optional
+        dM/dp.
+    squared : (float, float)
+        ``omega^2`` of both [1/s^2].
+    """
+    mass = np.asarray(mass)
+    pair = np.column_stack([first, second])
+    pair = pair / np.sqrt(np.einsum("im,im->m", pair, mass @ pair))
+    s = pair.T @ stiffness_change @ pair
+    if mass_change is not None:
+        s = s - 0.5 * (squared[0] + squared[1]) * (pair.T @ mass_change @ pair)
+    size = np.hypot(s[0, 0] - s[1, 1], 2.0 * s[0, 1])
+    return float(2.0 * abs(s[0, 1]) / size) if size > 0.0 else 0.0
+
+
+def _between(tracked: TrackedModes, f, mass, first: int, second: int, within: float) -> list[Approach]:
+    """Approaches of two branches."""
+    value, difference = tracked.value, f[:, first] - f[:, second]
+    mean = 0.5 * (f[:, first] + f[:, second])
+    gap, scale = np.abs(difference), np.abs(mean)
+    apart = gap > 1e-6 * scale
+    found = []
+    places = np.flatnonzero(apart)
+    # signs are compared over the points that are apart, so that a hit on the crossing does not hide it
+    for left, right in itertools.pairwise(places):
+        if difference[left] * difference[right] < 0.0:
+            share = difference[left] / (difference[left] - difference[right])
+            at = value[left] + share * (value[right] - value[left])
+            found.append((at, np.interp(share, [0, 1], mean[[left, right]]), 0.0, left, right))
+    inner = np.flatnonzero((gap[1:-1] < gap[:-2]) & (gap[1:-1] <= gap[2:]) & apart[1:-1]) + 1
+    for i in inner:
+        if gap[i] > within * scale[i] or not np.all(difference[i - 1 : i + 2] * difference[i] > 0.0):
+            continue
+        at, smallest = _vertex(value[i - 1 : i + 2], gap[i - 1 : i + 2])
+        found.append((at, mean[i], smallest, i, i))
+    return [_named(tracked, mass, gap, first, second, *one) for one in found]
+
+
+def _vertex(value: np.ndarray, gap: np.ndarray) -> tuple[float, float]:
+    """Where the parabola through the squares of three distances is smallest, and the distance there."""
+    x = value - value[1]
+    c = np.linalg.solve(np.vander(x, 3, increasing=True), gap**2)
+    shift = float(np.clip(-0.5 * c[1] / c[2], *sorted((x[0], x[2]))))
+    square = c[0] + shift * (c[1] + shift * c[2])
+    return float(value[1] + shift), float(np.sqrt(max(square, 0.0)))
+
+
+def _named(tracked, mass, gap, first, second, at, mean, smallest, left, right) -> Approach:
+    if smallest > 0.0:
+        # shapes are compared where the branches are five times as far apart: 1 / 25 of them is then mixed
+        wide = np.flatnonzero(gap >= 5.0 * smallest)
+        left, right = (
+            max(wide[wide < left], default=0), min(wide[wide > right], default=len(gap) - 1)
+        )  # fmt: skip
+    exchange = mac(tracked.shape[left][:, [first]], tracked.shape[right][:, [second]], mass)[0, 0]
+    kind = "crossing" if smallest == 0.0 else "veering" if exchange > 0.5 else "approach"
+    return Approach(first, second, float(at), float(mean), float(smallest), float(exchange), kind)
+
+
+# Strain energy relative to the sum of the absolute terms below which a motion has none.
+_RIGID = 1e-12
+
+
+def kinetic_shares(mass, shape, groups: Mapping[str, Sequence[int]]) -> dict[str, np.ndarray]:
+    """Shares (m,) of groups of coordinates in the kinetic energy of every mode.
+
+    ``Re sum_i conj(x_i) (M x)_i / x^H M x`` over the group (Geradin and Rixen, Mechanical Vibrations, 3rd
+    ed., section 2.3). They add up to one.
+
+    Parameters
+    ----------
+    mass : (n, n) array
+    shape : (n, m) array
+        Real or complex; complex ones by their mean over a period.
+    groups : mapping of str to indices
+        Every coordinate in one group; `body_groups` makes them from names.
+
+    Raises
+    ------
+    CaseError
+        Coordinates that are in no group or in two (E-GROUPS).
+    """
+    shape = np.asarray(shape)
+    places = np.concatenate([np.asarray(rows, int) for rows in groups.values()])
+    if not np.array_equal(np.sort(places), np.arange(len(shape))):
+        raise CaseError(
+            f"{len(places)} coordinates in groups, of {len(shape)}", code="E-GROUPS",
+            limit="every coordinate in one group",
+        )  # fmt: skip
+    energy = (shape.conj() * (np.asarray(mass) @ shape)).real
+    total = energy.sum(axis=0)
+    return {name: energy[np.asarray(rows, int)].sum(axis=0) / total for name, rows in groups.items()}
+
+
+def strain_shares(parts: Mapping[str, tuple[np.ndarray, np.ndarray]], shape) -> dict[str, np.ndarray]:
+    """Shares (m,) of springs in the strain energy of every mode.
+
+    ``sum_c k_c |w_c^T x|^2 / total`` of each part. They add up to one; of a motion that strains nothing all
+    are zero.
+
+    Parameters
+    ----------
+    parts : mapping of str to (columns (n, g), stiffness (g,))
+        Springs ``k`` along the columns ``w``: meshes are columns of W, supports unit columns. Together they
+        must be the whole stiffness, which `stiffness_of` gives for comparison.
+    shape : (n, m) array
+        Real or complex; complex ones by their mean over a period.
+    """
+    shape = np.asarray(shape)
+    energy, bound = {}, np.zeros(shape.shape[1])
+    for name, (columns, stiffness) in parts.items():
+        k = np.asarray(stiffness, float)
+        energy[name] = k @ np.abs(columns.T @ shape) ** 2
+        bound += np.abs(k) @ (np.abs(columns).T @ np.abs(shape)) ** 2
+    total = sum(energy.values())
+    strained = np.abs(total) > _RIGID * bound
+    return {
+        name: np.where(strained, one / np.where(strained, total, 1.0), 0.0) for name, one in energy.items()
+    }
+
+
+def stiffness_of(parts: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """``sum w k w^T`` (n, n) of all parts."""
+    return sum((columns * stiffness) @ columns.T for columns, stiffness in parts.values())
+
+
+def body_groups(dofs: Sequence[str]) -> dict[str, np.ndarray]:
+    """Coordinates of every body, from names such as ``"planet 2: x"``."""
+    groups: dict[str, list[int]] = {}
+    for place, name in enumerate(dofs):
+        groups.setdefault(name.split(":")[0], []).append(place)
+    return {name: np.array(rows) for name, rows in groups.items()}

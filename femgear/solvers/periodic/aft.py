@@ -1,0 +1,251 @@
+"""Alternating between frequency and time: element forces and tangents on a grid of phases, and their lines.
+
+Cameron and Griffin, J. Appl. Mech. 56 (1989) 149; with several bases the grid is a torus of independent
+phases (Kim and Choi, J. Vib. Acoust. 119 (1997) 107).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, is_dataclass, replace
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.system.elements import Element, GearMeshes, PolynomialSprings
+from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.series import FourierSeries
+
+# Samples a line and at least, where a contact opens and closes: one base, several bases.
+_CONTACT_SAMPLES = ((128, 2048), (8, 64))
+
+
+@dataclass(frozen=True)
+class GridSeries:
+    """Coefficients on a fixed grid of phases: ``values`` (N, n), their ``mean`` (n,) and their orders."""
+
+    values: np.ndarray
+    mean: np.ndarray
+    orders: tuple[int, ...]
+
+    def at(self, theta) -> np.ndarray:
+        """The stored values; theta must be the grid."""
+        if len(theta) != len(self.values):
+            raise CaseError(
+                f"{len(theta)} phases on a grid of {len(self.values)}",
+                code="E-SHAPE",
+                limit="the grid itself",
+            )
+        return self.values
+
+
+@dataclass(frozen=True)
+class PhaseGrid:
+    """Equidistant phases of every base and the places of the lines in their Fourier transform.
+
+    Parameters
+    ----------
+    orders : (L, n_bases) int array
+    samples : tuple of int
+        Points along every base, more than twice its highest order.
+    theta : (N, n_bases) array
+        Phases [rad], the last base fastest.
+    lines, differences, sums : tuple of two arrays
+        Places of the lines, of ``orders_l - orders_m`` and of ``orders_l + orders_m`` in the transform of a
+        real signal, and whether the conjugate stands there.
+    flat : tuple of two arrays
+        Lines without the last base, whose plane of the transform holds both halves, and the second places.
+    """
+
+    orders: np.ndarray
+    samples: tuple[int, ...]
+    theta: np.ndarray
+    lines: tuple[np.ndarray, np.ndarray]
+    differences: tuple[np.ndarray, np.ndarray]
+    sums: tuple[np.ndarray, np.ndarray]
+    flat: tuple[np.ndarray, np.ndarray]
+
+    def values(self, lines: np.ndarray) -> np.ndarray:
+        """Signals (N, n) of one-sided lines (n, L)."""
+        from scipy.fft import irfftn
+
+        shape = (*self.samples[:-1], self.samples[-1] // 2 + 1)
+        spectrum = np.zeros((len(lines), int(np.prod(shape))), complex)
+        place, mirrored = self.lines
+        half = 0.5 * len(self.theta) * np.where(mirrored, lines.conj(), lines)
+        spectrum[:, place] = half
+        flat, other = self.flat
+        spectrum[:, other] += half[:, flat].conj()
+        axes = tuple(range(1, len(shape) + 1))
+        signal = irfftn(spectrum.reshape(-1, *shape), s=self.samples, axes=axes)
+        return np.ascontiguousarray(signal.reshape(len(lines), -1).T)
+
+    def transform(self, signals: np.ndarray) -> np.ndarray:
+        """Two-sided coefficients (n, M) of signals (N, n), the last base half."""
+        from scipy.fft import rfftn
+
+        grid = np.ascontiguousarray(signals.T).reshape(-1, *self.samples)
+        axes = tuple(range(1, grid.ndim))
+        return rfftn(grid, axes=axes).reshape(len(grid), -1) / len(self.theta)
+
+    def amplitudes(self, coefficients: np.ndarray) -> np.ndarray:
+        """One-sided lines (n, L) of the coefficients of `transform`."""
+        out = 2.0 * _pick(coefficients, self.lines)
+        out[:, 0] = 0.5 * out[:, 0].real
+        return out
+
+    def products(self, coefficients: np.ndarray) -> np.ndarray:
+        """Matrices (n, L, 2 L - 1) that give the lines of a product from ``Re X_0, Re X_1, Im X_1, ...``.
+
+        Toeplitz and Hankel parts as in `harmonics.product_matrix`; they are the exact derivatives of the
+        sampled transform, aliasing included.
+        """
+        toeplitz, hankel = _pick(coefficients, self.differences), _pick(coefficients, self.sums)
+        out = np.empty((*toeplitz.shape[:2], 2 * toeplitz.shape[2] - 1), complex)
+        out[..., 0] = toeplitz[..., 0] + hankel[..., 0]
+        out[..., 1::2] = (toeplitz + hankel)[..., 1:]
+        out[..., 2::2] = 1j * (toeplitz - hankel)[..., 1:]
+        out[:, 0] *= 0.5
+        return out
+
+
+def phase_grid(orders: np.ndarray, samples: tuple[int, ...]) -> PhaseGrid:
+    """Grid of ``samples`` points along every base for the lines ``orders`` (L, n_bases).
+
+    Raises
+    ------
+    CaseError
+        With no more than twice as many points as the highest order of a base (Nyquist).
+    """
+    top = np.abs(orders).max(axis=0)
+    for base, (count, highest) in enumerate(zip(samples, top)):
+        if count < 2 * highest + 1:
+            raise CaseError(
+                f"{count} samples along base {base + 1} cannot show order {highest}", code="E-SAMPLES",
+                limit=f"at least {2 * highest + 1}", remedy="ask for more samples or fewer harmonics",
+            )  # fmt: skip
+    axes = [2.0 * np.pi * np.arange(count) / count for count in samples]
+    theta = np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=-1)
+    left, right = orders[:, None, :], orders[None, :, :]
+    flat = np.flatnonzero(orders[:, -1] == 0)
+    return PhaseGrid(
+        orders, samples, theta, _places(orders, samples), _places(left - right, samples),
+        _places(left + right, samples), (flat, _places(-orders[flat], samples)[0]),
+    )  # fmt: skip
+
+
+def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ...]:
+    """Samples along every base that keep aliasing out of the lines.
+
+    Products of the lines with polynomials of degree p and with Fourier series of n harmonics are exact with
+    ``(p + 1) H + 2 n + 1`` samples, H the highest order along the base. Where contact opens and closes, or a
+    coefficient jumps, the error falls with the square of the spacing (with the spacing for a jump): 128 H and
+    at least 2048 samples for one base, 8 H and at least 64 along each of several.
+    """
+    from scipy.fft import next_fast_len
+
+    top = np.abs(orders).max(axis=0)
+    counts = np.ones(orders.shape[1], int)
+    for element in problem.elements:
+        degree = _degree(element)
+        content = _series_content(element, orders.shape[1])
+        if degree is None or content is None:
+            times, least = _CONTACT_SAMPLES[min(orders.shape[1], 2) - 1]
+            content = np.zeros_like(top) if content is None else content
+            wanted = np.where(top + content > 0, np.maximum(times * top, least) + 2 * content, 1)
+        else:
+            wanted = (degree + 1) * top + 2 * content + 1
+        counts = np.maximum(counts, wanted)
+    counts = np.maximum(counts, 2 * top + 1)
+    return tuple(int(next_fast_len(int(count), real=True)) for count in counts)
+
+
+def on_grid(element: Element, theta: np.ndarray) -> Element:
+    """The element with its periodic coefficients evaluated once at the phases ``theta`` (N, n_bases)."""
+    if not is_dataclass(element):
+        return element
+    series = {
+        item.name: getattr(element, item.name)
+        for item in fields(element)
+        if hasattr(getattr(element, item.name), "at") and hasattr(getattr(element, item.name), "orders")
+    }
+    fixed = {
+        name: GridSeries(np.ascontiguousarray(value.at(theta)), value.mean, value.orders)
+        for name, value in series.items()
+    }
+    return replace(element, **fixed) if fixed else element
+
+
+def coupled_pairs(elements: tuple[Element, ...]) -> np.ndarray:
+    """Pairs (n_pairs, 2) of columns that some element couples, each once."""
+    pairs = [
+        np.stack([np.repeat(columns, len(columns)), np.tile(columns, len(columns))], axis=1)
+        for element in elements
+        for columns in element.columns
+    ]
+    return np.unique(np.vstack(pairs), axis=0) if pairs else np.empty((0, 2), int)
+
+
+def forces_on_grid(elements, pairs, x, theta) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (N, n_columns) and tangents (N, n_pairs) of coupled pairs at deflections x (N, n_columns)."""
+    force, tangent = np.zeros_like(x), np.zeros((len(x), len(pairs)))
+    place = {tuple(pair): number for number, pair in enumerate(pairs.tolist())}
+    for element in elements:
+        columns = element.columns
+        part, slope = element.evaluate(x[:, columns], theta)
+        width = columns.shape[1]
+        for i in range(width):
+            _add(force, columns[:, i].tolist(), part[:, :, i])
+            for j in range(width):
+                pair = zip(columns[:, i].tolist(), columns[:, j].tolist())
+                _add(tangent, [place[a, b] for a, b in pair], slope[:, :, i, j])
+    return force, tangent
+
+
+def _add(total: np.ndarray, places: list[int], parts: np.ndarray) -> None:
+    """Add parts (N, g) to the places of total (N, n), which may be the same for several groups."""
+    if len(set(places)) == len(places):
+        total[:, places] += parts
+    else:
+        np.add.at(total.T, places, parts.T)
+
+
+def _places(orders: np.ndarray, samples: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Flat places of orders (..., n_bases) in the transform of real signals, and where to conjugate."""
+    flipped = np.asarray(orders).copy()
+    count = np.array(samples)
+    wrapped = (flipped[..., -1] + count[-1] // 2) % count[-1] - count[-1] // 2
+    mirrored = wrapped < 0
+    flipped = np.where(mirrored[..., None], -flipped, flipped)
+    index = flipped % count
+    shape = (*samples[:-1], samples[-1] // 2 + 1)
+    return np.ravel_multi_index(tuple(np.moveaxis(index, -1, 0)), shape), mirrored
+
+
+def _pick(coefficients: np.ndarray, places: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    index, mirrored = places
+    out = coefficients[:, index]
+    np.conjugate(out, out=out, where=mirrored)
+    return out
+
+
+def _degree(element: Element) -> int | None:
+    """Degree of the law in the deflections; none where it has corners."""
+    if isinstance(element, PolynomialSprings):
+        return element.coefficients.shape[1]
+    if isinstance(element, GearMeshes) and not element.separates:
+        return 1
+    return getattr(element, "degree", None)
+
+
+def _series_content(element: Element, bases: int) -> np.ndarray | None:
+    """Highest order along every base in the element's coefficients; none where one of them jumps."""
+    top = np.zeros(bases, int)
+    values = [getattr(element, item.name) for item in fields(element)] if is_dataclass(element) else []
+    for series in values:
+        if not (hasattr(series, "at") and hasattr(series, "orders")):
+            continue
+        if not isinstance(series, FourierSeries):
+            return None
+        orders = np.abs(np.array((*series.orders, *[0] * bases))[:bases])
+        top = np.maximum(top, orders * (series.amplitudes.shape[1] - 1))
+    return top

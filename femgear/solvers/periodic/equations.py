@@ -1,0 +1,582 @@
+"""The harmonic equations of the element deflections, whatever the number of degrees of freedom.
+
+``X_l + T(omega_l) (F_l - reference X_l) = T_load(omega_l) S_l`` for every line l, with the receptance T of
+the system whose elements are springs of the reference stiffness, the lines F of the element forces by
+alternating between frequency and time, and the loads S.
+(Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019, chapters 2 and 4.)
+
+Mean loads that no element can carry: a contact that they pull apart, with nothing else to hold it.
+
+A periodic motion needs a mean acceleration of zero, so on motions that supports leave free the mean forces
+of the elements balance the constant load (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems,
+2019, section 2.3: line zero of the harmonic equations). A one-sided contact pushes only; where the load asks
+it to pull, its mean deflection grows without end, and so does everything that is measured by it.
+
+The derivative of the harmonic equations as an operator: many lines without a matrix of their size.
+
+One product costs a transform forth and back and the receptance of every line. GMRES (Saad and Schultz,
+SIAM J. Sci. Stat. Comput. 7 (1986) 856) needs few of them, because the operator is the unit matrix plus the
+fixed point of the iteration with reference springs, whose eigenvalues are small or few.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.periodic.aft import (
+    PhaseGrid,
+    coupled_pairs,
+    forces_on_grid,
+    on_grid,
+    phase_grid,
+    sample_counts,
+)
+from femgear.solvers.periodic.receptance import Reduction, reduce_problem, source_columns
+from femgear.solvers.periodic.solution import PeriodicSolution
+from femgear.system.elements import Element
+from femgear.system.entries import checked_count
+from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.series import checked_lines, harmonic_lines, line_tail
+
+# Mean deflection, over the typical one and over the lengths of the elements, beyond which it is far away.
+_FAR, _LENGTHS = 1e6, 10.0
+# Share of the static deflection by which the mean may be out of balance.
+_BALANCED = 1e-3
+# Stiffness relative to the largest, strain of a column and force beyond reach that count as none.
+_FREE, _UNSTRAINED, _BEYOND = 1e-11, 1e-9, 1e-6
+# Degrees of freedom up to which the free motions are computed to name the cause.
+_MANY = 1500
+
+
+def far(balance: HarmonicBalance) -> float:
+    """Mean deflection [m] beyond which no element takes up more: a size that cannot run away."""
+    return max(_FAR * balance.scale, _LENGTHS * balance.longest)
+
+
+def relative_residual(balance: HarmonicBalance, error, y) -> float:
+    """Largest violation relative to the largest deflection, of which the mean counts up to `far` only.
+
+    Parameters
+    ----------
+    balance : HarmonicBalance
+    error, y : (n_y,) arrays
+        Residual [m] and unknowns.
+    """
+    table = np.abs(np.reshape(y, (len(balance.reduction.reference), -1)))
+    mean = min(float(table[:, 0].max()), far(balance))
+    size = max(mean, float(table[:, 1:].max(initial=0.0)), 1e-9 * balance.scale)
+    # numbers that are not finite must not count as a large deflection
+    return float(np.abs(error).max() / size) if np.all(np.isfinite(y)) else np.inf
+
+
+def uncarried_note(balance: HarmonicBalance, lines, residual, converged: bool) -> str:
+    """Which column's mean load nothing carries; empty where there is no such column.
+
+    Parameters
+    ----------
+    balance : HarmonicBalance
+    lines : (n_columns, L) complex array
+        Deflections [m].
+    residual : callable
+        Without arguments: violation (n_columns, L) of the harmonic equations at the lines [m].
+    converged : bool
+        Converged lines are doubted only where their mean is far away and out of balance.
+    """
+    mean = np.abs(lines[:, 0])
+    finite = bool(np.all(np.isfinite(lines)))
+    away = not finite or mean.max() > max(far(balance), 10.0 * np.abs(lines[:, 1:]).max(initial=0.0))
+    if converged and not away:
+        return ""
+    # first by the forces alone: so far away the residual is the rounding of two large numbers
+    found = _beyond_reach(balance)
+    if found is not None:
+        column, wanted, low, high = found
+        bound = f"no less than {low:.4g} N" if wanted < low else f"no more than {high:.4g} N"
+        why = f"it needs {wanted:.4g} N, the elements there give {bound}"
+    elif away and finite and np.abs(residual()[:, 0]).max() > _BALANCED * balance.scale:
+        column = int(np.argmax(mean))
+        why = f"its mean deflection runs away, {lines[column, 0].real:.3g} m"
+    else:
+        return ""
+    return (
+        f"nothing carries the mean load of column {column + 1}{_named(balance, column)}: {why}; turn the "
+        "load round, give the contact a back side (backlash) or add a support"
+    )
+
+
+def _named(balance: HarmonicBalance, column: int) -> str:
+
+    name = element_name(balance.problem, column)
+    return f" ({name})" if not name.startswith("column") else ""
+
+
+def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] | None:
+    """Column, mean force wanted of it, lowest and highest mean force that its elements have [N].
+
+    None where some forces within the reach of all elements balance the load on the free motions: a linear
+    programme that minimises what is left over. Of several columns the least forces are the wanted ones.
+    """
+    from scipy import optimize
+
+    strain, load = _free_balance(balance)
+    columns = np.flatnonzero(np.abs(strain).max(axis=0, initial=0.0) > _UNSTRAINED)
+    if not len(columns) or not np.any(load):
+        return None
+    wanted = np.linalg.lstsq(strain[:, columns], load, rcond=None)[0]
+    size = np.abs(wanted).max() or 1.0
+    reach = np.array([_reach(balance, int(column)) for column in columns])
+    rows, eye = strain[:, columns], np.eye(len(load))
+    bounds = np.clip(reach / size, -_FAR, _FAR).tolist() + [(0.0, None)] * (2 * len(load))
+    cost = np.concatenate([np.zeros(len(columns)), np.ones(2 * len(load))])
+    left = optimize.linprog(cost, A_eq=np.hstack([rows, eye, -eye]), b_eq=load / size, bounds=bounds)
+    if not left.success or left.fun <= _BEYOND * np.abs(load / size).max():
+        return None
+    worst = int(np.argmax(np.maximum(reach[:, 0] - wanted, wanted - reach[:, 1])))
+    return int(columns[worst]), float(wanted[worst]), *reach[worst].tolist()
+
+
+def _free_balance(balance: HarmonicBalance) -> tuple[np.ndarray, np.ndarray]:
+    """Strain (r, n_columns) of the columns by motions that only elements hold, and the load (r,) on them.
+
+    Rows have unit size; none for systems so large that the motions are not looked for.
+    """
+    from scipy import linalg
+
+    system, reference = balance.problem.system, balance.reduction.reference
+    if len(system.M) > _MANY:
+        return np.zeros((0, len(reference))), np.zeros(0)
+    square, shape = linalg.eigh(0.5 * (system.K + system.K.T), system.M)
+    whole = np.diag(system.K) + np.einsum("ij,j,ij->i", system.W, reference, system.W)
+    free = shape[:, np.abs(square) <= _FREE * np.abs(whole / np.diag(system.M)).max()]
+    steady = sum(force.force.real for force in balance.problem.forces if not any(force.orders))
+    strain, load = free.T @ system.W, free.T @ (system.load + steady)
+    size = np.abs(strain).max(axis=1, initial=0.0)
+    # motions that strain no column carry no load either: the reduction has made sure
+    held = size > _UNSTRAINED * size.max(initial=0.0)
+    return strain[held] / size[held, None], load[held] / size[held]
+
+
+def _reach(balance: HarmonicBalance, column: int) -> tuple[float, float]:
+    """Lowest and highest mean force [N] of a column between far apart and far together."""
+    values = []
+    for sign in (-1.0, 1.0):
+        lines = np.zeros((len(balance.reduction.reference), len(balance.orders)), complex)
+        lines[column, 0] = sign * far(balance)
+        beyond = balance.forces(lines).lines[column, 0].real
+        values.append(float(beyond + balance.reduction.reference[column] * lines[column, 0].real))
+    low, high = sorted(values)
+    # what is left of two large numbers is their rounding
+    rounding = 1e-12 * balance.reduction.reference[column] * far(balance)
+    return (0.0 if abs(low) <= rounding else low), (0.0 if abs(high) <= rounding else high)
+
+
+# Unknowns up to which matrices of their size are cheaper than products with them.
+MANY = 600
+# Stiffness of a column, relative to the largest one, that counts as none.
+_NO_STIFFNESS = 1e-9
+
+
+@dataclass(frozen=True)
+class LineForces:
+    """What the elements do beyond their reference springs.
+
+    Parameters
+    ----------
+    lines : (n_columns, L) complex array
+        [N]
+    products : (n_pairs, L, 2 L - 1) complex array
+        Their derivative by the unknowns of one column, for every coupled pair [N/m].
+    """
+
+    lines: np.ndarray
+    products: np.ndarray
+
+
+@dataclass(frozen=True)
+class HarmonicBalance:
+    """The harmonic equations of a problem on given lines, ready for any base frequencies.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    orders : (L, n_bases) int array
+        Lines; line 0 is the mean.
+    reduction : Reduction
+    grid : PhaseGrid
+    elements : tuple of Element
+        With their coefficients on the grid.
+    pairs : (n_pairs, 2) int array
+        Columns that elements couple.
+    source : (n_loads, L) complex array
+        Amplitudes of the load columns of the reduction.
+    scale : float
+        Typical deflection [m]: the largest static one, or a length of the elements where there is none.
+    longest : float
+        Largest length that an element names [m].
+    """
+
+    problem: NonlinearSystem
+    orders: np.ndarray
+    reduction: Reduction
+    grid: PhaseGrid
+    elements: tuple[Element, ...]
+    pairs: np.ndarray
+    source: np.ndarray
+    scale: float
+    longest: float
+
+    @property
+    def size(self) -> int:
+        """Number of real unknowns, ``n_columns (2 L - 1)``."""
+        return len(self.reduction.reference) * (2 * len(self.orders) - 1)
+
+    def unknowns(self, lines) -> np.ndarray:
+        """Real vector ``Re X_0, Re X_1, Im X_1, ...`` column by column, of lines (n_columns, L)."""
+        lines = np.asarray(lines, complex)
+        out = np.empty((len(lines), 2 * lines.shape[1] - 1))
+        out[:, 0], out[:, 1::2], out[:, 2::2] = lines[:, 0].real, lines[:, 1:].real, lines[:, 1:].imag
+        return out.ravel()
+
+    def lines(self, y) -> np.ndarray:
+        """Lines (n_columns, L) of the unknowns."""
+        table = np.asarray(y, float).reshape(len(self.reduction.reference), -1)
+        out = np.empty((len(table), len(self.orders)), complex)
+        out[:, 0], out[:, 1:] = table[:, 0], table[:, 1::2] + 1j * table[:, 2::2]
+        return out
+
+    def forces(self, lines) -> LineForces:
+        """What the elements do beyond their reference springs, at lines (n_columns, L)."""
+        reference = self.reduction.reference
+        x = self.grid.values(lines)
+        force, tangent = forces_on_grid(self.elements, self.pairs, x, self.grid.theta)
+        own = self.pairs[:, 0] == self.pairs[:, 1]
+        tangent[:, own] -= reference[self.pairs[own, 0]]
+        # one transform for forces and tangents; columns without elements keep their reference spring
+        both = self.grid.transform(np.hstack([force - reference * x, tangent]))
+        n = len(reference)
+        return LineForces(self.grid.amplitudes(both[:n]), self.grid.products(both[n:]))
+
+    def receptance(self, frequency) -> tuple[np.ndarray, np.ndarray]:
+        """Receptance and its derivative (L, n_columns, n_columns + n_loads) at all lines."""
+        frequency = np.atleast_1d(np.asarray(frequency, float))
+        return self.reduction.at(self.orders @ frequency)
+
+    def residual(self, lines, forces, receptance) -> np.ndarray:
+        """``X + T (F - reference X) - T_load S`` (n_columns, L) [m]."""
+        return lines + self._respond(receptance, forces.lines)
+
+    def jacobian(self, forces, receptance) -> np.ndarray:
+        """Derivative (n_y, n_y) of the residual by the unknowns."""
+        n, width = len(self.reduction.reference), 2 * len(self.orders) - 1
+        columns = np.zeros((n, len(self.orders), n, width), complex)
+        transfer = receptance[:, :, :n].transpose(1, 0, 2)
+        for (row, column), block in zip(self.pairs, forces.products):
+            columns[:, :, column] += transfer[:, :, row, None] * block
+        out = np.empty((n, width, n, width))
+        out[:, 0], out[:, 1::2], out[:, 2::2] = columns[:, 0].real, columns[:, 1:].real, columns[:, 1:].imag
+        out = out.reshape(n * width, n * width)
+        out[np.diag_indices(n * width)] += 1.0
+        return out
+
+    def evaluate(self, y, frequency) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Residual (n_y,) [m], its derivative (n_y, n_y) by y and (n_y, n_bases) by the base frequencies.
+
+        Parameters
+        ----------
+        y : (n_y,) array
+            See `unknowns`.
+        frequency : (n_bases,) array
+            Base frequencies [rad/s].
+        """
+        lines = self.lines(y)
+        forces = self.forces(lines)
+        value, change = self.receptance(frequency)
+        moved = self._respond(change, forces.lines)
+        slope = np.stack([self.unknowns(moved * order) for order in self.orders.T], axis=1)
+        residual = self.unknowns(self.residual(lines, forces, value))
+        return residual, self.jacobian(forces, value), slope
+
+    def spectral_radius(self, y, frequency) -> float:
+        """Spectral radius of the fixed point ``X <- T_load S - T (F - reference X)`` at the unknowns y.
+
+        Largest modulus of the eigenvalues of ``T d(F - reference X)/dX``, the Jacobian of the residual less
+        one; all are computed up to 600 unknowns. Beyond, Arnoldi's method finds it to 1 %.
+        """
+        if self.size > MANY:
+            # lazily: the module builds on this one
+
+            tangent = linearised(self, self.receptance(frequency)[0], np.asarray(y, float))[1]
+            found = krylov_radius(tangent)
+            if found is not None:
+                return found
+        return self._radius(self.forces(self.lines(y)), self.receptance(frequency)[0])
+
+    def _radius(self, forces: LineForces, receptance) -> float:
+        matrix = self.jacobian(forces, receptance)
+        matrix[np.diag_indices(self.size)] -= 1.0
+        return largest_modulus(matrix)
+
+    def linear_start(self, frequency) -> np.ndarray:
+        """Unknowns of the response with reference springs, forced by what the elements do at its mean."""
+        value, _ = self.receptance(frequency)
+        static = -self._respond(value, np.zeros((len(self.reduction.reference), len(self.orders))))
+        mean = np.zeros_like(static)
+        mean[:, 0] = static[:, 0]
+        return self.unknowns(-self._respond(value, self.forces(mean).lines))
+
+    def solution(self, y, frequency, *, radius: bool = False, **what_happened) -> PeriodicSolution:
+        """The unknowns as a solution; keywords are the fields of `PeriodicSolution` that say how it came.
+
+        With ``radius`` the spectral radius of the fixed point is among them.
+        """
+        frequency = np.atleast_1d(np.asarray(frequency, float))
+        lines = self.lines(y)
+        forces = self.forces(lines)
+        if radius or "residual" not in what_happened:
+            receptance = self.receptance(frequency)[0]
+        if "residual" not in what_happened:
+            error = self.unknowns(self.residual(lines, forces, receptance))
+            what_happened["residual"] = relative_residual(self, error, y)
+        if radius:
+            many = self.size > MANY
+            what_happened["spectral_radius"] = (
+                self.spectral_radius(y, frequency) if many else self._radius(forces, receptance)
+            )
+        told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
+        note = uncarried_note(
+            self,
+            lines,
+            lambda: self.residual(lines, forces, self.receptance(frequency)[0]),
+            told["converged"],
+        )
+        if note:
+            # the whole mean load is out of balance, whatever its ratio to a deflection that runs away
+            told |= {"converged": False, "message": f"Not converged: {note}."}
+            told["residual"] = max(told["residual"], 1.0)
+        force = forces.lines + self.reduction.reference[:, None] * lines
+        return PeriodicSolution(
+            frequency, self.orders, lines, force, tail=line_tail(lines, self.orders), **told
+        )
+
+    def _respond(self, receptance, force) -> np.ndarray:
+        """``T force - T_load S`` (n_columns, L)."""
+        table = np.concatenate([force, -self.source]).T
+        return (receptance @ table[..., None])[..., 0].T
+
+
+def harmonic_balance(
+    problem: NonlinearSystem,
+    *,
+    harmonics: int | None = None,
+    orders=None,
+    samples=None,
+    reduction: Reduction | None = None,
+) -> HarmonicBalance:
+    """The harmonic equations of a problem.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    harmonics : int, optional
+        Highest harmonic; with several base frequencies the highest sum of orders (`harmonic_lines`).
+    orders : (L, n_bases) int array, optional
+        The lines themselves, such as those of `side_bands`. One of the two must be given.
+    samples : int or tuple of int, optional
+        Points of the phase grid along every base; see `sample_counts` for the default.
+    reduction : Reduction, optional
+        Of the same problem, from `reduce_problem`; made here when not given.
+
+    Raises
+    ------
+    CaseError
+        Lines that cannot be used, a harmonic force without line, too few samples.
+    ConvergenceError
+        A rigid motion that strains a column, see `reduced`.
+    """
+    if (harmonics is None) == (orders is None):
+        raise CaseError("give the number of harmonics or the lines", code="E-LINES", limit="one of the two")
+    if orders is None:
+        harmonics = checked_count(harmonics, "harmonics", code="E-HARMONICS", least=0)
+        _check_harmonics(problem, harmonics)
+        orders = harmonic_lines(harmonics, problem.bases)
+    orders = checked_lines(orders)
+    bases = orders.shape[1]
+    if bases < problem.bases:
+        raise CaseError(
+            f"lines of {bases} base frequencies, elements and forces of {problem.bases}", code="E-LINES",
+            remedy="give one order a base frequency",
+        )  # fmt: skip
+    if samples is not None:
+        samples = (samples,) * bases if np.ndim(samples) == 0 else tuple(samples)
+        if len(samples) != bases or any(int(count) != count for count in samples):
+            raise CaseError(f"samples {samples} for {bases} base frequencies", code="E-SAMPLES")
+    reduction = reduced(problem) if reduction is None else reduction
+    columns, loads = len(reduction.reference), 1 + 2 * len(problem.forces)
+    if reduction.static.shape != (columns, columns + loads) or columns != problem.system.W.shape[1]:
+        raise CaseError("the reduction belongs to another problem", code="E-SHAPE", key="reduction")
+    source = source_columns(problem, orders)
+    grid = phase_grid(orders, samples or sample_counts(problem, orders))
+    elements = tuple(on_grid(element, grid.theta) for element in problem.elements)
+    longest = _longest(problem)
+    scale = _typical_deflection(reduction, source) or longest or 1.0
+    pairs = coupled_pairs(elements)
+    return HarmonicBalance(problem, orders, reduction, grid, elements, pairs, source, scale, longest)
+
+
+def reduced(problem: NonlinearSystem) -> Reduction:
+    """`reduce_problem` at the elements' own reference; a refusal names the element without stiffness there.
+
+    Raises
+    ------
+    ConvergenceError
+        A motion without stiffness strains an element (E-RIGID-MODE).
+    """
+    try:
+        return reduce_problem(problem)
+    except ConvergenceError as error:
+        total = np.abs(problem.reference)
+        column = int(np.argmin(total))
+        if error.code != "E-RIGID-MODE" or total[column] > _NO_STIFFNESS * total.max():
+            raise
+        raise ConvergenceError(
+            f"{element_name(problem, column)} has no linear stiffness, and nothing else holds the motion "
+            "that strains it", code="E-RIGID-MODE", limit="a stiffness at rest, or a reference in its place",
+            remedy="where it stiffens with the deflection pass reduction=reduce_problem(problem, "
+            "reference=stiffness of every column at the expected amplitude [N/m]); else give it a stiffness",
+        ) from error  # fmt: skip
+
+
+def element_name(problem: NonlinearSystem, column: int) -> str:
+    """Kind and number of the first element on a column: "bearing 1"."""
+    kinds = {"GearMeshes": "mesh", "RadialBearings": "bearing", "PolynomialSprings": "spring"}
+    count: dict[str, int] = {}
+    for element in problem.elements:
+        kind = kinds.get(type(element).__name__, "spring")
+        here = np.flatnonzero(np.any(element.columns == column, axis=1))
+        if len(here):
+            return f"{kind} {count.get(kind, 0) + int(here[0]) + 1}"
+        count[kind] = count.get(kind, 0) + len(element.columns)
+    return f"column {column + 1} of W, on which no element acts,"
+
+
+def _check_harmonics(problem: NonlinearSystem, harmonics: int) -> None:
+    """Refuse fewer harmonics than the harmonic forces name."""
+    for number, force in enumerate(problem.forces):
+        wanted = int(np.abs(force.orders).sum())
+        if wanted > harmonics >= 0:
+            raise CaseError(
+                f"{harmonics} harmonics, but harmonic force {number + 1} has orders {tuple(force.orders)}",
+                code="E-HARMONICS", key="harmonics", value=harmonics, limit=f"{wanted} or more",
+                remedy="raise the number of harmonics",
+            )  # fmt: skip
+
+
+def _typical_deflection(reduction, source) -> float:
+    """Largest static deflection [m] under the loads; zero without them."""
+    loads = reduction.static[:, len(reduction.reference) :]
+    return float(np.abs(loads @ source).max(initial=0.0))
+
+
+def _longest(problem) -> float:
+    """Largest finite length that an element names [m]; zero without one."""
+    names = ("backlash", "clearance", "breaks", "smoothing")
+    lengths = [np.ravel(getattr(e, name)) for e in problem.elements for name in names if hasattr(e, name)]
+    sizes = np.abs(np.concatenate([*lengths, np.zeros(1)]))
+    return float(sizes[np.isfinite(sizes)].max())
+
+
+def largest_modulus(matrix: np.ndarray) -> float:
+    """Largest modulus of the eigenvalues of a real matrix (n, n)."""
+    n = len(matrix)
+    if n <= MANY:
+        return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
+    from scipy.sparse import linalg
+
+    # a fixed start: the same value every time
+    start = np.random.default_rng(0).standard_normal(n)
+    try:
+        values = linalg.eigs(
+            matrix, k=2, ncv=40, v0=start, which="LM", tol=1e-10, maxiter=200, return_eigenvectors=False
+        )
+    except linalg.ArpackError:
+        values = np.linalg.eigvals(matrix)
+    return float(np.abs(values).max())
+
+
+# Relative accuracy of a Newton step, and products after which the matrix is taken instead.
+_ACCURACY, _PRODUCTS = 1e-3, 60
+# No derivatives are kept with the forces.
+_NONE = np.empty((0, 0, 0))
+
+
+@dataclass(frozen=True)
+class LineTangent:
+    """``dR/dX`` of the harmonic equations at one deflection.
+
+    Parameters
+    ----------
+    balance : HarmonicBalance
+    receptance : (L, n_columns, n_columns + n_loads) complex array
+    stiffness : (N, n_pairs) array
+        Tangents of the coupled pairs less the reference springs, on the grid [N/m].
+    """
+
+    balance: HarmonicBalance
+    receptance: np.ndarray
+    stiffness: np.ndarray
+
+    def fixed_point(self, y) -> np.ndarray:
+        """``T d(F - reference X)`` for a change y (n_y,) of the unknowns."""
+        balance = self.balance
+        lines = balance.lines(y)
+        n, pairs = len(lines), balance.pairs
+        x = balance.grid.values(lines)
+        force = np.zeros_like(x)
+        for number, (row, column) in enumerate(pairs):
+            force[:, row] += self.stiffness[:, number] * x[:, column]
+        moved = balance.grid.amplitudes(balance.grid.transform(force))
+        return balance.unknowns((self.receptance[:, :, :n] @ moved.T[..., None])[..., 0].T)
+
+    def solve(self, error) -> np.ndarray | None:
+        """``dR/dX^-1 error`` to three digits; None where GMRES does not get there."""
+        from scipy.sparse.linalg import LinearOperator, gmres
+
+        operator = LinearOperator((len(error),) * 2, matvec=lambda y: y + self.fixed_point(y), dtype=float)
+        step, state = gmres(operator, error, rtol=_ACCURACY, restart=_PRODUCTS, maxiter=1)
+        return None if state else step
+
+
+def linearised(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineTangent]:
+    """Residual (n_y,) [m] of the harmonic equations at the unknowns y, and its derivative."""
+    lines, reference = balance.lines(y), balance.reduction.reference
+    x = balance.grid.values(lines)
+    force, stiffness = forces_on_grid(balance.elements, balance.pairs, x, balance.grid.theta)
+    own = balance.pairs[:, 0] == balance.pairs[:, 1]
+    stiffness[:, own] -= reference[balance.pairs[own, 0]]
+    forces = balance.grid.amplitudes(balance.grid.transform(force - reference * x))
+    error = balance.unknowns(balance.residual(lines, LineForces(forces, _NONE), receptance))
+    return error, LineTangent(balance, receptance, stiffness)
+
+
+def krylov_radius(tangent: LineTangent) -> float | None:
+    """Largest modulus of the eigenvalues of the fixed point, to 1 %; None where Arnoldi's method fails.
+
+    Hundreds of lines far from any resonance have eigenvalues of nearly the same modulus: more digits would
+    take ten times as many products.
+    """
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
+
+    size = tangent.balance.size
+    operator = LinearOperator((size, size), matvec=tangent.fixed_point, dtype=float)
+    # a fixed start: the same value every time
+    start = np.random.default_rng(0).standard_normal(size)
+    try:
+        values = eigs(
+            operator, k=1, ncv=30, v0=start, which="LM", tol=1e-2, maxiter=60, return_eigenvectors=False
+        )
+    except ArpackError:
+        return None
+    return float(np.abs(values).max())

@@ -1,0 +1,465 @@
+"""Harmonic balance of systems with gear meshes, bearings and other springs between motions.
+
+Newton's method for the harmonic equations, and an embedding that leads to a start.
+
+A periodic solution with its period checked first, and its verdict at hand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.periodic.equations import (
+    MANY,
+    HarmonicBalance,
+    LineTangent,
+    harmonic_balance,
+    linearised,
+    reduced,
+    relative_residual,
+)
+from femgear.solvers.periodic.receptance import Reduction, respond, source_columns
+from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
+from femgear.solvers.stability.floquet import judged, require_period
+from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
+from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.series import coincidence_note
+
+# Shortest step of the line search and the decrease that it asks for (Dennis and Schnabel, 1983, 6.3); full
+# steps taken all the same where a corner of a contact law blocks the search.
+_SHORTEST, _DECREASE, _FORCED = 1.0 / 256.0, 1e-4, 5
+# Steps of the embedding: first length, shortest, longest (unit: the whole change), and how many.
+_FIRST, _LEAST, _LONGEST, _STEPS = 0.1, 1e-5, 0.5, 400
+
+
+def newton(balance: HarmonicBalance, frequency, y, tolerance: float, max_iterations: int) -> PeriodicSolution:
+    """Newton's method from the unknowns y with backtracking on the size of the residual."""
+    receptance = balance.receptance(frequency)[0]
+    evaluate = linearised if balance.size > MANY else _with_matrix
+    error, tangent = evaluate(balance, receptance, y)
+    history, trouble, forced = [relative_residual(balance, error, y)], "", 0
+    while not history[-1] <= tolerance and len(history) <= max_iterations:
+        try:
+            step = -_newton_step(balance, receptance, y, error, tangent)
+        except np.linalg.LinAlgError:
+            trouble = "the Jacobian is singular"
+            break
+        share = 1.0
+        while share >= _SHORTEST:
+            trial, tangent = evaluate(balance, receptance, y + share * step)
+            if np.linalg.norm(trial) <= (1.0 - _DECREASE * share) * np.linalg.norm(error):
+                break
+            share *= 0.5
+        else:
+            forced, share = forced + 1, 1.0
+            if forced > _FORCED:
+                trouble = "no step along Newton's direction lowers the residual"
+                break
+            trial, tangent = evaluate(balance, receptance, y + step)
+        y, error = y + share * step, trial
+        history.append(relative_residual(balance, error, y))
+    converged, steps = bool(history[-1] <= tolerance), len(history) - 1 + bool(trouble)
+    return balance.solution(
+        y, frequency, converged=converged, residual=history[-1], iterations=steps, factorisations=steps,
+        message=_message(converged, steps, history[-1], trouble, tolerance), history=tuple(history),
+    )  # fmt: skip
+
+
+def embed(
+    balance: HarmonicBalance, frequency, failed: PeriodicSolution, tolerance: float, max_iterations: int
+) -> PeriodicSolution:
+    """Solution found by turning the reference springs gradually into the elements.
+
+    ``X + t T (F - reference X) = T_load S`` is followed from t = 0, where it is linear, to t = 1 along its
+    arc, through limit points if there are any (Allgower and Georg, Introduction to Numerical Continuation
+    Methods, 2003, chapters 2 and 6); Newton's method finishes at t = 1.
+
+    Parameters
+    ----------
+    failed : PeriodicSolution
+        The attempt without embedding; returned, with a longer message, where the arc does not get there.
+    """
+    receptance = balance.receptance(frequency)[0]
+    curve = _Embedding(balance, receptance)
+    y, steps, count = curve.follow()
+    work = failed.factorisations + count
+    if y is None:
+        note = f" The embedding of the reference springs was lost after {steps} steps."
+        return replace(failed, factorisations=work, message=failed.message + note)
+    found = newton(balance, frequency, y, tolerance, max_iterations)
+    note = f" Newton's method alone failed; started from {steps} steps of embedding."
+    return replace(
+        found, factorisations=work + found.factorisations, iterations=failed.iterations + found.iterations,
+        message=found.message + note,
+    )  # fmt: skip
+
+
+class _Embedding:
+    """The arc of solutions over t, in unknowns scaled by the linear solution."""
+
+    def __init__(self, balance: HarmonicBalance, receptance):
+        self.balance, self.receptance = balance, receptance
+        forces = balance.forces(np.zeros((len(balance.reduction.reference), len(balance.orders))))
+        nothing = np.zeros_like(forces.lines)
+        self.linear = -balance.unknowns(balance.residual(nothing, replace(forces, lines=nothing), receptance))
+        self.scale = max(np.linalg.norm(self.linear), balance.scale)
+        self.factorisations = 0
+
+    def follow(self) -> tuple[np.ndarray | None, int, int]:
+        """Unknowns near t = 1, or none; steps; factorisations."""
+        point = np.append(self.linear / self.scale, 0.0)
+        tangent, length = np.append(np.zeros(len(self.linear)), 1.0), _FIRST
+        tangent = self._tangent(point, tangent)
+        for number in range(_STEPS):
+            new, rounds = self._correct(point + length * tangent, tangent)
+            if new is None:
+                length *= 0.5
+                if length < _LEAST:
+                    return None, number, self.factorisations
+                continue
+            if new[-1] >= 1.0:
+                share = (1.0 - point[-1]) / (new[-1] - point[-1])
+                end = point + share * (new - point)
+                return self.scale * end[:-1], number + 1, self.factorisations
+            point, tangent = new, self._tangent(new, tangent)
+            length = min(_LONGEST, 1.5 * length) if rounds <= 3 else length
+        return None, _STEPS, self.factorisations
+
+    def _system(self, point):
+        """Residual and its derivative (n_y, n_y + 1) by the scaled unknowns and t."""
+        y, t = self.scale * point[:-1], point[-1]
+        forces, full = _residual(self.balance, self.receptance, y)
+        change = full - (y - self.linear)
+        jacobian = t * self.balance.jacobian(forces, self.receptance)
+        jacobian[np.diag_indices(len(y))] += 1.0 - t
+        return y - self.linear + t * change, np.column_stack([self.scale * jacobian, change])
+
+    def _solve(self, matrix, row, right):
+        self.factorisations += 1
+        return np.linalg.solve(np.vstack([matrix / self.scale, row]), right)
+
+    def _tangent(self, point, before):
+        right = np.append(np.zeros(len(point) - 1), 1.0)
+        tangent = self._solve(self._system(point)[1], before, right)
+        return tangent / np.linalg.norm(tangent)
+
+    def _correct(self, guess, tangent):
+        """Point of the arc in the plane through the guess, normal to the tangent, and the rounds it took."""
+        point = guess
+        for rounds in range(1, 9):
+            error, matrix = self._system(point)
+            right = np.append(-error / self.scale, tangent @ (guess - point))
+            if np.abs(right).max() < 1e-8:
+                return point, rounds
+            try:
+                point = point + self._solve(matrix, tangent, right)
+            except np.linalg.LinAlgError:
+                return None, rounds
+        return None, rounds
+
+
+def _residual(balance: HarmonicBalance, receptance, y):
+    """What the elements do at the unknowns y, and the residual (n_y,)."""
+    lines = balance.lines(y)
+    forces = balance.forces(lines)
+    return forces, balance.unknowns(balance.residual(lines, forces, receptance))
+
+
+def _with_matrix(balance: HarmonicBalance, receptance, y):
+    """Residual (n_y,) at the unknowns y, and what its derivative is made of."""
+    forces, error = _residual(balance, receptance, y)
+    return error, forces
+
+
+def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.ndarray:
+    """``dR/dX^-1 error``: by its products where there are many lines, else, or where they fail, directly."""
+    if isinstance(tangent, LineTangent):
+        step = tangent.solve(error)
+        if step is not None:
+            return step
+        tangent = balance.forces(balance.lines(y))
+    return np.linalg.solve(balance.jacobian(tangent, receptance), error)
+
+
+def _message(converged: bool, steps: int, residual: float, trouble: str, tolerance: float) -> str:
+    if converged:
+        return f"Converged in {steps} steps, relative residual {residual:.2e}."
+    return (
+        f"Not converged after {steps} steps, relative residual {residual:.2e} (wanted {tolerance:.1e})"
+        f"{': ' + trouble if trouble else ''}. Start from the solution at a neighbouring frequency or follow "
+        "the branch by continuation; more samples, a smoothing length or more damping help too."
+    )
+
+
+def solve_harmonic_balance(
+    problem: NonlinearSystem,
+    frequency,
+    *,
+    harmonics: int | None = None,
+    orders=None,
+    start=None,
+    samples=None,
+    reduction: Reduction | None = None,
+    tolerance: float = 1e-10,
+    max_iterations: int = 50,
+    stability: bool = True,
+    radius: bool | None = None,
+) -> PeriodicSolution:
+    """Periodic or quasi-periodic solution at given base frequencies, by Newton's method with line search.
+
+    Parameters
+    ----------
+    problem, harmonics, orders, samples, reduction
+        See `harmonic_balance`.
+    frequency : float or (n_bases,) array
+        Base frequencies [rad/s], not negative.
+    start : PeriodicSolution or (n_columns, L) complex array, optional
+        Where to start. Which of several solutions is found depends on it. When not given, the response with
+        reference springs; where Newton's method fails from there, that response is followed while the
+        springs turn into the elements, see `embed`, and the message says so.
+    tolerance : float
+        Largest residual relative to the largest deflection.
+    max_iterations : int
+    stability : bool
+        Floquet verdict and spectral radius of the fixed point. With several base frequencies or the frequency
+        zero the verdict says "not covered". Loops that need neither are quicker without.
+    radius : bool, optional
+        The radius alone, with or without the verdict; it takes all eigenvalues of one matrix of the size of
+        the unknowns.
+
+    Returns
+    -------
+    PeriodicSolution
+        Where ``converged`` is False the lines are those of the last iterate and the message says what to do.
+
+    Raises
+    ------
+    CaseError
+        Input that cannot be used, two equal base frequencies (E-FREQUENCY). Where other lines have one
+        frequency, the message names them.
+    ConvergenceError
+        An undamped resonance of the system with reference springs at a line.
+    """
+    balance = harmonic_balance(
+        problem, harmonics=harmonics, orders=orders, samples=samples, reduction=reduction
+    )
+    frequency = _checked_frequency(balance, frequency)
+    tolerance = checked_tolerance(tolerance)
+    max_iterations = checked_count(max_iterations, "max_iterations", code="E-TOLERANCE")
+    found = newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
+    if start is None and not found.converged:
+        found = embed(balance, frequency, found, tolerance, max_iterations)
+    if note := coincidence_note(balance.orders, frequency):
+        found = replace(found, message=found.message + note)
+    if stability if radius is None else radius:
+        found = with_radius(balance, found)
+    return judged(problem, [found])[0] if stability else found
+
+
+def with_radius(balance: HarmonicBalance, found: PeriodicSolution) -> PeriodicSolution:
+    """The solution with the spectral radius of its fixed point; lines that are not finite have none."""
+    if not np.all(np.isfinite(found.deflection)):
+        return found
+    value = balance.spectral_radius(balance.unknowns(found.deflection), found.frequency)
+    return replace(found, spectral_radius=value)
+
+
+def _checked_frequency(balance: HarmonicBalance, frequency) -> np.ndarray:
+    """Base frequencies (n_bases,), finite and not negative."""
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    if frequency.shape != balance.orders.shape[1:]:
+        raise CaseError(
+            f"{frequency.size} base frequencies for lines of {balance.orders.shape[1]}", code="E-FREQUENCY"
+        )
+    if not np.all(np.isfinite(frequency)) or np.any(frequency < 0.0):
+        raise CaseError(
+            f"base frequencies {frequency.tolist()} rad/s", code="E-FREQUENCY", limit="finite, not negative"
+        )
+    near = np.abs(frequency[:, None] - frequency) <= 1e-9 * frequency.max(initial=0.0)
+    equal = near & (frequency > 0.0)
+    if np.any(same := np.triu(equal, 1)):
+        one, other = np.eye(len(frequency), dtype=int)[np.argwhere(same)[0]].tolist()
+        raise CaseError(
+            f"base frequencies {frequency.tolist()} rad/s: the lines {one} and {other} are one",
+            code="E-FREQUENCY", key="frequency", limit="no two base frequencies equal to 1e-9",
+            remedy="take one base frequency and add up the orders of elements and forces",
+        )  # fmt: skip
+    return frequency
+
+
+def adapt_harmonics(
+    problem: NonlinearSystem,
+    frequency,
+    *,
+    tail: float = 1e-6,
+    harmonics: int = 4,
+    max_harmonics: int = 64,
+    start=None,
+    stability: bool = True,
+    radius: bool | None = None,
+    **options,
+) -> PeriodicSolution:
+    """Double the harmonics, each time from the solution before, until the tail is below a given share.
+
+    Parameters
+    ----------
+    problem, frequency, start, options
+        As for `solve_harmonic_balance`.
+    tail : float
+        Wanted share of the amplitude in the upper half of the lines.
+    stability, radius : bool
+        Of the last solution only; see `solve_harmonic_balance`.
+    harmonics, max_harmonics : int
+        First and largest number, three or more: the upper half must hold odd and even harmonics.
+
+    Returns
+    -------
+    PeriodicSolution
+        The message says when the largest number did not suffice, and where it did not converge.
+    """
+    harmonics = checked_count(harmonics, "harmonics", code="E-HARMONICS")
+    max_harmonics = checked_count(max_harmonics, "max_harmonics", code="E-HARMONICS")
+    if not 0.0 < checked_numbers(tail, "tail", code="E-HARMONICS", unit="") < 1.0 or not (
+        3 <= harmonics <= max_harmonics
+    ):
+        raise CaseError(
+            f"tail {tail} with {harmonics} to {max_harmonics} harmonics", code="E-HARMONICS",
+            limit="a tail between 0 and 1, at least three harmonics",
+        )  # fmt: skip
+    if options.get("reduction") is None:
+        options["reduction"] = reduced(problem)
+    options["stability"] = False
+    while True:
+        found = solve_harmonic_balance(problem, frequency, harmonics=harmonics, start=start, **options)
+        if found.tail <= tail or harmonics == max_harmonics or not found.converged:
+            break
+        harmonics, start = min(2 * harmonics, max_harmonics), found
+    note = f" {harmonics} harmonics: the upper half of the lines holds {found.tail:.2g} of the amplitude."
+    if found.converged and found.tail > tail:
+        note += f" Wanted {tail:.2g}: allow more harmonics."
+    found = replace(found, message=found.message + note)
+    if stability if radius is None else radius:
+        known = {name: options.get(name) for name in ("samples", "reduction")}
+        found = with_radius(harmonic_balance(problem, orders=found.orders, **known), found)
+    return judged(problem, [found])[0] if stability else found
+
+
+def displacements(
+    problem: NonlinearSystem,
+    solution: PeriodicSolution,
+    outputs=None,
+    *,
+    reduction: Reduction | None = None,
+) -> np.ndarray:
+    """Lines of the outputs ``L q``; velocities are ``i omega_l`` times, accelerations ``-omega_l^2`` times.
+
+    Parameters
+    ----------
+    problem, solution
+    outputs : (n_outputs, n) array, optional
+        ``L``; all degrees of freedom when not given.
+    reduction : Reduction, optional
+        The one that the solution was computed with.
+
+    Returns
+    -------
+    (n_outputs, L) complex array
+        Rigid motions without support have no mean position: theirs is zero.
+    """
+    reduction = reduced(problem) if reduction is None else reduction
+    outputs = np.eye(len(problem.system.M)) if outputs is None else np.atleast_2d(np.asarray(outputs, float))
+    forcing = reduction.reference[:, None] * solution.deflection - solution.force
+    table = np.concatenate([forcing, source_columns(problem, solution.orders)])
+    return respond(reduction, outputs, solution.line_frequency, table)
+
+
+def _start(balance: HarmonicBalance, frequency, start) -> np.ndarray:
+    """Unknowns to start from."""
+    if start is None:
+        return balance.linear_start(frequency)
+    shape = (len(balance.reduction.reference), len(balance.orders))
+    if isinstance(start, PeriodicSolution):
+        lines = np.zeros(shape, complex)
+        known = {tuple(order): number for number, order in enumerate(start.orders.tolist())}
+        for number, order in enumerate(balance.orders.tolist()):
+            mirror = tuple(-o for o in order)
+            if tuple(order) in known:
+                lines[:, number] = start.deflection[:, known[tuple(order)]]
+            elif mirror in known:
+                lines[:, number] = start.deflection[:, known[mirror]].conj()
+    else:
+        lines = checked_numbers(start, "start", code="E-START", unit="m", kind=complex)
+    if lines.shape != shape or not np.all(np.isfinite(lines)):
+        raise CaseError(
+            f"a start of shape {lines.shape}", code="E-START", limit=f"finite lines of shape {shape}"
+        )
+    return balance.unknowns(lines)
+
+
+@dataclass(frozen=True)
+class PeriodicResponse:
+    """A periodic solution and short names of what it says about itself.
+
+    Parameters
+    ----------
+    solution : PeriodicSolution
+    """
+
+    solution: PeriodicSolution
+
+    @property
+    def verdict(self) -> FloquetVerdict:
+        """Its ``stable`` is None where the solution did not converge, has several base frequencies or too
+        long a period for its fastest mode."""
+        return self.solution.verdict
+
+    @property
+    def tail(self) -> float:
+        """Share of the amplitude in the upper half of the lines: a measure of truncation."""
+        return self.solution.tail
+
+    @property
+    def spectral_radius(self) -> float:
+        """Spectral radius of the fixed point; it says nothing on stability."""
+        return self.solution.spectral_radius
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether all Floquet multipliers lie within the unit circle; None where the verdict is open."""
+        return self.verdict.stable
+
+
+def periodic_response(
+    problem: NonlinearSystem,
+    frequency,
+    *,
+    method: str = "monodromy",
+    stability_tolerance: float = 1e-7,
+    **options,
+) -> PeriodicResponse:
+    """`solve_harmonic_balance` with a choice of the method of the verdict; refuses the frequency zero.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    frequency : float or (n_bases,) array
+        Base frequencies [rad/s]; a single one must be positive.
+    method, stability_tolerance
+        Method and tolerance of `floquet_verdicts`.
+    options
+        Those of `solve_harmonic_balance`; harmonics or orders must be given.
+
+    Raises
+    ------
+    CaseError
+        Input that cannot be used, a single base frequency of zero (E-FREQUENCY).
+    ConvergenceError
+        An undamped resonance of the system with reference springs at a line.
+    """
+    require_period(frequency)
+    options = {"radius": True, **options}
+    solution = solve_harmonic_balance(problem, frequency, stability=False, **options)
+    return PeriodicResponse(judged(problem, [solution], method=method, tolerance=stability_tolerance)[0])

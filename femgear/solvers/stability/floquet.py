@@ -1,0 +1,876 @@
+"""Stability of the periodically varying gear meshes: Floquet multipliers.
+
+Small motions about a periodic state: modes with the tangents of the elements, followed through one period.
+
+``M z'' + (C + speed G) z' + K z + W k(t) W^T z = 0`` in the modes of ``K + W diag(reference) W^T``, for many
+states at once.
+
+Stability of periodic solutions: Floquet multipliers from the monodromy matrix or by Hill's method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution, open_verdict, verdict_of
+from femgear.system.elements import tangent_jumps
+from femgear.system.entries import checked_numbers, checked_tolerance
+from femgear.system.nonlinear import NonlinearSystem, element_forces
+from femgear.system.series import mesh_harmonics, sample
+from femgear.system.system import MeshExcitation, Modes
+
+# Multipliers beyond the unit circle by less than this are taken as on it (undamped systems).
+_CIRCLE = 1e-6
+# Angle [rad] that the fastest mode turns in one step, and steps in a period of the highest harmonic.
+_STEP_ANGLE = 1.0
+_STEPS_PER_HARMONIC = 8
+# Modes that exchange less than this share of their stiffness move independently.
+_UNCOUPLED = 1e-9
+# Speeds treated together.
+_BATCH = 64
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Floquet verdict beside a periodic response; it does not depend on the load, only on k(t).
+
+    Parameters
+    ----------
+    mesh_frequency : (n_speeds,) array
+        [Hz].
+    multiplier : (n_speeds,) complex array
+        Multiplier of largest modulus over one period of the excitation record, rigid modes left out.
+    modes_kept : (n_speeds,) int array
+        Modes that were followed in time; the others counted as static flexibility.
+    steps : (n_speeds,) int array
+        Time steps a period.
+    """
+
+    mesh_frequency: np.ndarray
+    multiplier: np.ndarray
+    modes_kept: np.ndarray
+    steps: np.ndarray
+
+    @property
+    def stable(self) -> np.ndarray:
+        """(n_speeds,) bool: no perturbation grows (largest modulus at most 1 within 1e-6)."""
+        return np.abs(self.multiplier) <= 1.0 + _CIRCLE
+
+
+def floquet_multipliers(
+    modes: Modes,
+    excitation: MeshExcitation,
+    mesh_frequency,
+    *,
+    excitation_harmonics: int = 6,
+    steps: int | None = None,
+    frequency_ratio: float = 2.0,
+) -> np.ndarray:
+    """Largest modulus (n_speeds,) of the Floquet multipliers; see :func:`stability`."""
+    verdict = stability(
+        modes,
+        excitation,
+        mesh_frequency,
+        excitation_harmonics=excitation_harmonics,
+        steps=steps,
+        frequency_ratio=frequency_ratio,
+    )
+    return np.abs(verdict.multiplier)
+
+
+def stability(
+    modes: Modes,
+    excitation: MeshExcitation,
+    mesh_frequency,
+    *,
+    excitation_harmonics: int = 6,
+    steps: int | None = None,
+    frequency_ratio: float = 2.0,
+) -> Stability:
+    """Floquet multipliers of the linear system with the truncated mesh stiffnesses.
+
+    Parameters
+    ----------
+    modes, excitation
+        As given to ``solve_spectral``.
+    mesh_frequency : float or (n_speeds,) array
+        [Hz], positive.
+    excitation_harmonics : int
+        Mesh harmonics of the stiffness that are kept.
+    steps : int, optional
+        Time steps a period. By default 8 in a period of the highest harmonic and one for every radian of
+        the fastest mode that is followed.
+    frequency_ratio : float
+        Modes above this many times the highest excitation frequency are counted as static flexibility:
+        parametric resonances need ``h f = f_i + f_j``, their first order a ratio of one, their second order
+        two. Their own multipliers ``exp(-zeta omega T)`` still count. The static flexibility costs up to
+        1e-3 of a modulus below one and less of a growing one; a ratio of 5 or 20 follows nearly every mode.
+
+    Returns
+    -------
+    Stability
+
+    Raises
+    ------
+    CaseError
+        Frequencies that are not positive, data that cannot be used, too few steps.
+    ConvergenceError
+        A mesh stiffness so negative that the static flexibility cannot carry it.
+
+    Notes
+    -----
+    ``q'' + 2 zeta w q' + w^2 q + R^T kappa(t) R q = 0`` with ``kappa = k~ (I + T_res k~)^-1``. Between
+    the kicks that the meshes give, a matrix of rank n_meshes, the damped modes move exactly: algorithm 4A of
+    Chin (Phys. Lett. A 226, 1997), fourth order with positive steps; its corrected kick
+    ``kappa - dt^2/24 kappa R R^T kappa`` holds with damping too, because ``[B, [A, B]]`` does not contain the
+    damping. Modes that no stiffness couples are separate eigenvalue problems.
+    """
+    frequency = np.atleast_1d(np.array(mesh_frequency, dtype=float))
+    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)) or np.any(frequency <= 0.0):
+        raise CaseError(
+            "a period needs finite, positive mesh frequencies", code="E-FREQUENCY", key="mesh_frequency",
+            value=frequency.tolist(), limit="> 0 Hz",
+        )  # fmt: skip
+    if not frequency_ratio >= 1.0:
+        raise CaseError(
+            "modes up to the highest excitation frequency must be followed", code="E-MODES",
+            key="frequency_ratio", value=frequency_ratio, limit=">= 1",
+        )  # fmt: skip
+    stiffness = mesh_harmonics(excitation, excitation_harmonics)[0]
+    stiffness[:, 0] -= modes.mesh_stiffness
+    lines = excitation_harmonics * excitation.periods
+    cut = frequency * excitation_harmonics * frequency_ratio
+    kept = np.searchsorted(modes.frequency, cut, side="right")
+    multiplier = np.empty(len(frequency), dtype=complex)
+    taken = np.empty(len(frequency), dtype=int)
+    for number in np.unique(kept):
+        chosen = np.flatnonzero(kept == number)
+        for part in np.array_split(chosen, -(-len(chosen) // _BATCH)):
+            period = excitation.periods / frequency[part]
+            fastest = 2.0 * np.pi * modes.frequency[:number].max(initial=0.0) * period.max()
+            taken[part] = steps or int(np.ceil(max(fastest / _STEP_ANGLE, _STEPS_PER_HARMONIC * lines)))
+            multiplier[part] = _largest(modes, stiffness, number, period, int(taken[part[0]]))
+    moving = kept - np.searchsorted(modes.frequency, 0.0, side="right")
+    return Stability(frequency, multiplier, np.maximum(moving, 0), taken)
+
+
+def decisive_harmonics(modes: Modes, excitation: MeshExcitation, kept: int, *, least: int = 6) -> int:
+    """Highest mesh harmonic of the stiffness that could by itself make the response unstable.
+
+    ``q'' + 2 zeta w q' + w^2 (1 + eps cos 2 w t) q = 0`` is stable below ``eps = 4 zeta`` (Nayfeh and Mook,
+    Nonlinear Oscillations, 1979, section 5.3), and a mode whose strain is all in the mesh has
+    ``eps = |k_h|/k_0``; half of that is taken.
+
+    Parameters
+    ----------
+    modes, excitation
+        As given to `stability`.
+    kept : int
+        Mesh harmonics of the response.
+    least : int
+        Smallest number, as far as there are so many.
+
+    Returns
+    -------
+    int
+        At most 64: the amplitudes fall as one over the harmonic.
+    """
+    most = min(kept, 64)
+    stiffness = np.abs(mesh_harmonics(excitation, most)[0])
+    damped = modes.damping_ratio[modes.frequency > 0.0].min(initial=1.0)
+    large = np.flatnonzero((stiffness[:, 1:] > 2.0 * damped * stiffness[:, :1]).any(axis=0))
+    # lines of a record of several periods
+    highest = 0 if not len(large) else -(-(int(large[-1]) + 1) // excitation.periods)
+    return min(most, max(least, highest))
+
+
+def monodromy(matrices, durations) -> np.ndarray:
+    """Transition matrix over one period of ``x' = A x`` with A constant in pieces, by matrix exponentials.
+
+    Parameters
+    ----------
+    matrices : (n_pieces, n, n) array
+        ``A`` in order of time.
+    durations : (n_pieces,) array
+        [s], positive.
+
+    Returns
+    -------
+    (n, n) array
+        ``expm(A_last dt_last) ... expm(A_0 dt_0)``; its eigenvalues are the Floquet multipliers.
+    """
+    from scipy.linalg import expm
+
+    matrices, durations = np.asarray(matrices, dtype=float), np.asarray(durations, dtype=float)
+    if matrices.ndim != 3 or durations.shape != matrices.shape[:1] or np.any(durations <= 0.0):
+        raise CaseError("every matrix needs one positive duration", code="E-SHAPE", key="durations")
+    out = np.eye(matrices.shape[-1])
+    for step in expm(matrices * durations[:, None, None]):
+        out = step @ out
+    return out
+
+
+def _largest(modes: Modes, stiffness, number: int, period: np.ndarray, steps: int) -> np.ndarray:
+    """Multiplier of largest modulus for speeds that follow the first `number` modes."""
+    natural = 2.0 * np.pi * modes.frequency
+    static = natural > 0.0
+    static[:number] = False
+    rows = modes.mesh_deflection
+    flexibility = modes.residual + (rows[:, static] / natural[static] ** 2) @ rows[:, static].T
+    kicks = _kicks(stiffness, flexibility, steps)
+    moving = np.flatnonzero(natural[:number] > 0.0)
+    best = np.zeros(len(period), dtype=complex)
+    for group in _coupled(rows[:, moving] / natural[moving], kicks):
+        index = moving[group]
+        found = _multipliers(natural[index], modes.damping_ratio[index], rows[:, index], kicks, period)
+        best = np.where(np.abs(found) > np.abs(best), found, best)
+    if np.any(static):
+        slowest = np.exp(-np.min(modes.damping_ratio[static] * natural[static]) * period)
+        best = np.where(slowest > np.abs(best), slowest, best)
+    return best
+
+
+def _kicks(stiffness: np.ndarray, flexibility: np.ndarray, steps: int) -> np.ndarray:
+    """``kappa = k~ (I + T_res k~)^-1`` (2 steps, n, n) at the ends and middles of the steps [N/m]."""
+    lines = stiffness.shape[-1] - 1
+    if steps <= lines:
+        raise CaseError(
+            f"{steps} steps cannot follow {lines} harmonics", code="E-HARMONICS", key="steps",
+            value=steps, limit=f">= {lines + 1}", remedy="take more steps",
+        )  # fmt: skip
+    change = sample(stiffness, 2 * steps).T
+    carried = np.eye(len(stiffness)) + flexibility * change[:, None, :]
+    if np.linalg.eigvals(carried).real.min() <= 0.0:
+        raise ConvergenceError(
+            "the modes left out are more flexible than the meshes themselves at their lowest stiffness",
+            code="E-RESIDUAL", remedy="keep more modes",
+        )  # fmt: skip
+    return change[:, :, None] * np.linalg.inv(carried)
+
+
+def _coupled(rows: np.ndarray, kicks: np.ndarray) -> list[np.ndarray]:
+    """Groups of modes that the kicks couple, from the rows (n_meshes, m) divided by the frequencies."""
+    from scipy.sparse.csgraph import connected_components
+
+    if not rows.shape[1]:
+        return []
+    strength = np.abs(rows.T @ kicks @ rows).max(axis=0)
+    number, label = connected_components(strength > _UNCOUPLED, directed=False)
+    return [np.flatnonzero(label == g) for g in range(number)]
+
+
+def _multipliers(natural, damping_ratio, rows, kicks, period) -> np.ndarray:
+    """Largest multiplier (n_speeds,) of one group of modes, followed through one period."""
+    speeds, m, steps = len(period), len(natural), len(kicks) // 2
+    dt = (period / steps)[:, None, None]
+    stay, turn, back, keep = _half_step(natural, damping_ratio, 0.5 * dt)
+    gyration = rows @ rows.T
+    velocity_rows = (rows / natural).T
+    q = np.zeros((speeds, m, 2 * m))
+    q[:, range(m), range(m)] = 1.0
+    u = np.roll(q, m, axis=-1)
+    for step in range(steps):
+        first, middle = kicks[2 * step], kicks[2 * step + 1]
+        corrected = middle - dt**2 / 24.0 * (middle @ gyration @ middle)
+        for kick in (first * (dt / 3.0), corrected * (2.0 * dt / 3.0)):
+            u -= velocity_rows @ (kick @ (rows @ q))
+            q, u = stay * q + turn * u, back * q + keep * u
+    values = np.linalg.eigvals(np.concatenate([q, u], axis=1))
+    return values[np.arange(speeds), np.abs(values).argmax(axis=1)]
+
+
+def _half_step(natural, damping_ratio, duration):
+    """Exact motion of damped modes, ``u = q' / w``: ``q <- stay q + turn u``, ``u <- back q + keep u``."""
+    w, zeta = natural[:, None], damping_ratio[:, None]
+    angle = np.sqrt((1.0 - zeta**2).astype(complex)) * w * duration
+    sine = (np.sinc(angle / np.pi) * (w * duration)).real
+    cosine, decay = np.cos(angle).real, np.exp(-zeta * w * duration)
+    return decay * (cosine + zeta * sine), decay * sine, -decay * sine, decay * (cosine - zeta * sine)
+
+
+# Angle [rad] that the fastest mode turns in a step of the first sequence, and sequences of halved steps.
+_STEP_ANGLE_variational = 0.7
+_LEVELS = 7
+# Steps in a period beyond which they are not halved again.
+_MOST_HALVED = 320_000
+# Eigenvalues this small relative to the largest one, and rows relative to theirs, are zero.
+_RIGID = 1e-11
+_UNMOVED = 1e-9
+# Damping of a free motion, relative to the largest entry, that is rounding.
+_UNDAMPED = 1e-10
+# Distances of the Gauss points from the middle of a step of unit length.
+_GAUSS = 0.5 / np.sqrt(3.0)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Modal coordinates of small motions.
+
+    Parameters
+    ----------
+    square : (n,) array
+        Squares of the natural angular frequencies [1/s^2]; negative ones are possible.
+    damping : (n, n) array
+        Modal damping matrix [1/s].
+    rows : (n_c, n) array
+        Deflections of the columns, ``W^T Phi`` [1/sqrt(kg)].
+    reference : (n_c,) array
+        Stiffness of the columns that the modes contain [N/m].
+    residual : (n_c, n_c) array
+        Static flexibility of the modes left out [m/N].
+    positions : int
+        Modes kept whose position nothing feels, their velocity a damping that couples them to others; each
+        has one multiplier one.
+    drift : (r,) array
+        Decay of the velocities of free motions left out that a damping of their own slows down, or drives
+        where it is negative [1/s].
+    """
+
+    square: np.ndarray
+    damping: np.ndarray
+    rows: np.ndarray
+    reference: np.ndarray
+    residual: np.ndarray
+    positions: int = 0
+    drift: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def diagonal(self) -> bool:
+        """Whether the damping leaves the modes uncoupled."""
+        off = self.damping - np.diag(np.diag(self.damping))
+        return not np.any(np.abs(off) > 1e-12 * max(np.abs(self.damping).max(initial=0.0), 1e-300))
+
+    def steps(self, period):
+        """Steps of the first sequence over a period [s], as floats: they may be beyond all bounds."""
+        return np.ceil(np.maximum(8.0, self.fastest * np.asarray(period, float) / _STEP_ANGLE_variational))
+
+    @property
+    def fastest(self) -> float:
+        """Largest natural angular frequency [rad/s]."""
+        return float(np.sqrt(np.abs(self.square).max(initial=0.0)))
+
+    def kappa(self, tangent: np.ndarray) -> np.ndarray:
+        """Change of stiffness (..., n_c, n_c) with the modes left out in series, ``k (1 + T_res k)^-1``."""
+        change = tangent - np.diag(self.reference)
+        if not np.any(self.residual):
+            return change
+        carried = np.eye(len(self.residual)) + self.residual @ change
+        if np.linalg.eigvals(carried).real.min() <= 0.0:
+            raise ConvergenceError(
+                "the modes left out are more flexible than the elements at their lowest stiffness",
+                code="E-RESIDUAL", remedy="keep more modes",
+            )  # fmt: skip
+        return change @ np.linalg.inv(carried)
+
+    def state_matrices(self, kappa: np.ndarray) -> np.ndarray:
+        """``A`` (..., 2 n, 2 n) of ``(eta, eta')' = A (eta, eta')`` with kappa (..., n_c, n_c)."""
+        n = len(self.square)
+        out = np.zeros((*kappa.shape[:-2], 2 * n, 2 * n))
+        out[..., range(n), range(n, 2 * n)] = 1.0
+        out[..., n:, :n] = -np.diag(self.square) - self.rows.T @ kappa @ self.rows
+        out[..., n:, n:] = -self.damping
+        return out
+
+
+def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
+    """Modes of a problem about its reference stiffness, lowest first.
+
+    Free motions that no column and no coupling of the damping feels are left out: the multipliers of their
+    positions are one, those of their velocities follow from `Frame.drift`.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    modes : int
+        Largest number of modes kept; the others leave their static flexibility.
+    """
+    from scipy import linalg
+
+    system, reference = problem.system, np.maximum(problem.reference, 0.0)
+    stiffness = system.K + (system.W * reference) @ system.W.T
+    count = min(int(modes), len(stiffness))
+    if count < 1:
+        raise CaseError("no mode is kept", code="E-MODES", key="modes", value=modes, limit=">= 1")
+    all_modes = count == len(stiffness)
+    square, shape = linalg.eigh(
+        0.5 * (stiffness + stiffness.T), system.M, subset_by_index=None if all_modes else (0, count - 1)
+    )
+    rows, damping = system.W.T @ shape, shape.T @ problem.damping @ shape
+    square = np.where(np.abs(square) <= _RIGID * np.abs(square).max(), 0.0, square)
+    felt = np.abs(rows).max(axis=0, initial=0.0) > _UNMOVED * np.abs(rows).max(initial=0.0)
+    shared = np.abs(damping - np.diag(np.diag(damping))).max(axis=0)
+    # the rounding of a free motion is no damping
+    coupled = shared > np.where((square != 0.0) | felt, 1e-12, _UNDAMPED) * np.abs(damping).max()
+    moving = (square != 0.0) | felt | coupled
+    positions = int(np.count_nonzero(coupled & (square == 0.0) & ~felt))
+    rates = np.diag(damping)
+    drift = rates[~moving & (np.abs(rates) > _UNDAMPED * np.abs(damping).max())]
+    square, rows, damping = square[moving], rows[:, moving], damping[np.ix_(moving, moving)]
+    residual = np.zeros((len(rows), len(rows)))
+    if not all_modes:
+        residual = _residual(problem, stiffness, shape[:, ~moving], rows, square)
+    return Frame(square, damping, rows, reference, residual, positions, drift)
+
+
+def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:
+    """``W^T K^+ W`` without the part of the modes kept; rigid motions that no column feels are held."""
+    from scipy import linalg
+
+    system = problem.system
+    carried = system.M @ rigid
+    weight = np.trace(stiffness) / np.trace(system.M)
+    flexible = linalg.solve(stiffness + weight * (carried @ carried.T), system.W, assume_a="sym")
+    if np.any(square <= 0.0):
+        raise ConvergenceError(
+            "a motion without stiffness moves an element: static flexibilities do not exist",
+            code="E-RESIDUAL", remedy="keep all modes",
+        )  # fmt: skip
+    out = system.W.T @ flexible - (rows / square) @ rows.T
+    return 0.5 * (out + out.T)
+
+
+def frame_of_modes(modes: Modes) -> Frame:
+    """The moving modes of a modal basis with their damping ratios."""
+    moving = modes.frequency > 0.0
+    omega = 2.0 * np.pi * modes.frequency[moving]
+    damping = np.diag(2.0 * modes.damping_ratio[moving] * omega)
+    residual = modes.residual
+    size = np.abs((modes.mesh_deflection[:, moving] / omega**2) @ modes.mesh_deflection[:, moving].T).max()
+    if np.abs(residual).max(initial=0.0) <= 1e-12 * size:
+        residual = np.zeros_like(residual)  # rounding of a complete basis
+    return Frame(omega**2, damping, modes.mesh_deflection[:, moving], modes.mesh_stiffness, residual)
+
+
+@dataclass(frozen=True)
+class Passage:
+    """Monodromy matrices of several states.
+
+    Parameters
+    ----------
+    matrix : (p, 2 n, 2 n) array
+        In coordinates ``(eta, eta' / s)`` with a scale s of every mode.
+    error : (p,) array
+        Estimated error of the matrix relative to its norm.
+    steps : (p,) int array
+        Steps of the finest sequence; zero for exact exponentials.
+    """
+
+    matrix: np.ndarray
+    error: np.ndarray
+    steps: np.ndarray
+
+
+def passage(
+    frame: Frame, period, tangents: Callable, breaks: list[np.ndarray], *, tolerance: float = 1e-7
+) -> Passage:
+    """Monodromy matrices over one period by a splitting of fourth order with Richardson extrapolation.
+
+    Algorithm 4B of Chin (Phys. Lett. A 226, 1997; for forces that depend on time Chin and Chen, J. Chem.
+    Phys. 117, 2002): damped modes move exactly between kicks of the elements at the Gauss points of every
+    step, ``kappa - (2 - sqrt 3) / 12 dt^2 kappa R R^T kappa``. It is symmetric, so the errors have even
+    powers and halved steps extrapolate to orders 6, 8, ... Steps end where the tangents jump.
+
+    Parameters
+    ----------
+    frame : Frame
+    period : (p,) array
+        [s].
+    tangents : callable
+        ``(fraction (m, s), states (m,)) -> (m, s, n_c, n_c)`` tangents [N/m] at fractions of the period.
+    breaks : list of p arrays
+        Ascending fractions inside the period where tangents jump.
+    tolerance : float
+        Relative error of the matrix at which halving ends, after at most 7 sequences, fewer where a
+        period takes thousands of steps.
+    """
+    period = np.asarray(period, float)
+    size, n = len(period), len(frame.square)
+    out = Passage(np.empty((size, 2 * n, 2 * n)), np.full(size, np.inf), np.zeros(size, int))
+    open_states, table = np.arange(size), None
+    base = int(frame.steps(period.max(initial=0.0)))
+    for level in range(_LEVELS):
+        start, duration = _steps([breaks[i] for i in open_states], base, level)
+        found = _through(frame, period[open_states], start, duration, tangents, open_states)
+        table, error = _extrapolated(table, found)
+        out.matrix[open_states], out.error[open_states] = table[-1], error
+        out.steps[open_states] = start.shape[1]
+        rest = error > tolerance
+        open_states, table = open_states[rest], [entry[rest] for entry in table]
+        if not len(open_states) or (level and base << (level + 1) > _MOST_HALVED):
+            break
+    return out
+
+
+def _extrapolated(table, found):
+    """Next row of Romberg's table for errors of orders 4, 6, 8, ..., and the error of its last entry."""
+    row = [found]
+    for column, before in enumerate(table or []):
+        row.append(row[-1] + (row[-1] - before) / (2.0 ** (4 + 2 * column) - 1.0))
+    if len(row) == 1:
+        return row, np.full(len(found), np.inf)
+    size = np.maximum(np.linalg.norm(row[-1], axis=(1, 2)), 1.0)
+    return row, np.linalg.norm(row[-1] - row[-2], axis=(1, 2)) / size
+
+
+def _steps(breaks: list[np.ndarray], base: int, level: int) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and durations (p, s) of steps, in parts of the period, that end at the breaks.
+
+    Every piece between breaks has its share of ``base`` steps, each halved ``level`` times; rows that have
+    fewer are filled up with steps of no duration.
+    """
+    rows = []
+    for inner in breaks:
+        ends = np.concatenate([[0.0], inner, [1.0]])
+        length = np.diff(ends)
+        each = np.maximum(np.ceil(length * base).astype(int), 1) << level
+        duration = np.repeat(length / each, each)
+        number = np.concatenate([np.arange(m) for m in each])
+        rows.append((np.repeat(ends[:-1], each) + duration * number, duration))
+    longest = max(len(duration) for _, duration in rows)
+    out = np.zeros((2, len(rows), longest))
+    out[0] = 1.0
+    for i, (start, duration) in enumerate(rows):
+        out[:, i, : len(start)] = start, duration
+    return out[0], out[1]
+
+
+def _through(frame: Frame, period, start, duration, tangents, states) -> np.ndarray:
+    """Monodromy matrices (m, 2 n, 2 n) with the given steps."""
+    m, n = len(period), len(frame.square)
+    dt = duration * period[:, None]
+    fractions = start[..., None] + duration[..., None] * (0.5 + _GAUSS * np.array([-1.0, 1.0]))
+    square = (len(frame.rows), len(frame.rows))
+    kappa = frame.kappa(tangents(fractions.reshape(m, -1), states)).reshape(m, -1, 2, *square)
+    gyration = frame.rows @ frame.rows.T
+    weight = (2.0 - np.sqrt(3.0)) / 12.0 * dt[..., None, None, None] ** 2
+    kicks = 0.5 * dt[..., None, None, None] * (kappa - weight * (kappa @ gyration @ kappa))
+    scale = _scales(frame)
+    back = (frame.rows / scale).T
+    drift = _modal_drift if frame.diagonal else _coupled_drift
+    outer, inner = dt * (0.5 - _GAUSS), dt * (2.0 * _GAUSS)
+    between = outer.copy()
+    between[:, 1:] += outer[:, :-1]
+    move = drift(frame, scale, np.stack([between, inner], axis=-1).reshape(m, -1))
+    state = np.tile(np.eye(2 * n), (m, 1, 1))
+    for step, kick in enumerate(np.moveaxis(kicks.reshape(m, -1, *square), 1, 0)):
+        state = move(step, state)
+        state[:, n:] -= back @ (kick @ (frame.rows @ state[:, :n]))
+    return drift(frame, scale, outer[:, -1:])(0, state)
+
+
+def _scales(frame: Frame) -> np.ndarray:
+    """Angular frequencies (n,) that bring modal velocities to the size of the motions."""
+    natural = np.sqrt(np.abs(frame.square))
+    return np.where(natural > 1e-6 * natural.max(), natural, natural.max() or 1.0)
+
+
+def _modal_drift(frame: Frame, scale, durations):
+    """Exact motion of uncoupled damped modes over the durations (m, steps): a function (step, state)."""
+    half = 0.5 * np.diag(frame.damping)
+    root = np.sqrt((frame.square - half**2).astype(complex))
+
+    def move(step: int, state: np.ndarray) -> np.ndarray:
+        h = durations[:, step, None]
+        sine, cosine = (np.sinc(root * h / np.pi) * h).real, np.cos(root * h).real
+        decay = np.exp(-half * h)
+        q, u = np.split(state, 2, axis=1)
+        stay, turn = decay * (cosine + half * sine), decay * sine * scale
+        fall, keep = -decay * sine * frame.square / scale, decay * (cosine - half * sine)
+        return np.concatenate(
+            [stay[..., None] * q + turn[..., None] * u, fall[..., None] * q + keep[..., None] * u], axis=1
+        )
+
+    return move
+
+
+def _coupled_drift(frame: Frame, scale, durations):
+    """As :func:`_modal_drift` for damping and gyroscopic terms that couple the modes."""
+    from scipy.linalg import expm
+
+    both = np.concatenate([np.ones_like(scale), scale])
+    matrix = frame.state_matrices(np.zeros((len(frame.rows),) * 2)) * both / both[:, None]
+    values, where = np.unique(durations, return_inverse=True)
+    steps, where = expm(matrix * values[:, None, None]), where.reshape(durations.shape)
+
+    def move(step: int, state: np.ndarray) -> np.ndarray:
+        return steps[where[:, step]] @ state
+
+    return move
+
+
+# States treated together, and instants of a piece at which tangents are compared.
+_BATCH_hill = 32
+_INSIDE = 7
+# Steps of the first sequence over one period beyond which a verdict is not sought, and the most entries of
+# stiffness matrices at these steps that are held at once.
+_MOST_STEPS = 20_000
+_MOST_ENTRIES = 4_000_000
+
+
+def floquet_verdict(
+    problem: NonlinearSystem,
+    solution: PeriodicSolution,
+    *,
+    method: str = "monodromy",
+    tolerance: float = 1e-7,
+    harmonics: int | None = None,
+    modes: int = 100,
+) -> FloquetVerdict:
+    """Stability of one periodic solution; see :func:`floquet_verdicts`."""
+    return floquet_verdicts(
+        problem, [solution], method=method, tolerance=tolerance, harmonics=harmonics, modes=modes
+    )[0]
+
+
+def floquet_verdicts(
+    problem: NonlinearSystem,
+    solutions: Sequence[PeriodicSolution],
+    *,
+    method: str = "monodromy",
+    tolerance: float = 1e-7,
+    harmonics: int | None = None,
+    modes: int = 100,
+) -> tuple[FloquetVerdict, ...]:
+    """Stability of periodic solutions of one problem.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    solutions : sequence of PeriodicSolution
+        All with the same lines. With two base frequencies or the frequency zero the verdict is "not
+        covered"; "not determined" where the fastest mode would need more than 20000 steps in a period.
+    method : str
+        ``"monodromy"``: exact exponentials where the tangents are constant in pieces, otherwise a splitting,
+        with steps that end where contacts open or close. ``"hill"``: eigenvalues of the harmonic operator.
+    tolerance : float
+        Relative error of the monodromy matrix.
+    harmonics : int, optional
+        Of Hill's method; by default twice those of the solution.
+    modes : int
+        Largest number of modes followed; the others count as static flexibility.
+
+    Raises
+    ------
+    CaseError
+        An unknown method, a tolerance that is not between 0 and 1 (E-TOLERANCE).
+    ConvergenceError
+        Modes left out that are too flexible.
+
+    Notes
+    -----
+    The position of a free motion (rotation of a free train) has the multiplier one and is left out; so is
+    its velocity where no damping feels it. Where one does, its multiplier ``exp(-c period)`` counts.
+    """
+    if method not in ("monodromy", "hill"):
+        raise CaseError(
+            f"stability by {method!r}", code="E-METHOD", key="method", limit='"monodromy" or "hill"'
+        )
+    tolerance = checked_tolerance(tolerance)
+    frame = frame_of(problem, modes=modes)
+    out = [_not_covered(solution) or _too_long(frame, solution) for solution in solutions]
+    covered = [i for i, verdict in enumerate(out) if verdict is None]
+    for first in range(0, len(covered), _BATCH_hill):
+        part = covered[first : first + _BATCH_hill]
+        chosen = [solutions[i] for i in part]
+        if method == "hill":
+            found = [_by_hill(frame, problem, solution, harmonics) for solution in chosen]
+        else:
+            found = _by_monodromy(frame, problem, chosen, tolerance)
+        for i, verdict in zip(part, found):
+            out[i] = verdict
+    return tuple(out)
+
+
+def judged(
+    problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], **options
+) -> tuple[PeriodicSolution, ...]:
+    """The solutions with their verdicts; options as for :func:`floquet_verdicts`.
+
+    Where the modes kept do not carry the motion the verdict says "not determined".
+    """
+    try:
+        verdicts = floquet_verdicts(problem, solutions, **options)
+    except ConvergenceError as error:
+        verdicts = (open_verdict(f"not determined: {error.message}"),) * len(solutions)
+    return tuple(replace(solution, verdict=verdict) for solution, verdict in zip(solutions, verdicts))
+
+
+def _not_covered(solution: PeriodicSolution) -> FloquetVerdict | None:
+    if solution.orders.shape[1] > 1:
+        reason = "not covered: a solution with several base frequencies is not periodic"
+    elif not solution.converged:
+        reason = "not covered: the solution did not converge"
+    elif solution.frequency[0] == 0.0:
+        reason = "not covered: the frequency zero has no period"
+    else:
+        return None
+    return open_verdict(reason)
+
+
+def _too_long(frame: Frame, solution: PeriodicSolution) -> FloquetVerdict | None:
+    with np.errstate(over="ignore"):
+        steps = float(frame.steps(2.0 * np.pi / np.abs(solution.frequency[0])))
+    if steps <= _MOST_STEPS:
+        return None
+    return open_verdict(
+        f"not determined: {steps:.3g} steps in a period at {solution.frequency[0]:.3g} rad/s, "
+        f"at most {_MOST_STEPS}: raise the frequency or keep fewer modes"
+    )
+
+
+def require_period(frequency) -> None:
+    """Refuse the single base frequency zero, which has no period to judge stability over.
+
+    Parameters
+    ----------
+    frequency : float or (n_bases,) array
+        [rad/s]; several ones are let through, their verdict is "not covered".
+
+    Raises
+    ------
+    CaseError
+        The only base frequency is zero (E-FREQUENCY).
+    """
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    if frequency.size == 1 and frequency.ravel()[0] == 0.0:
+        raise CaseError(
+            "stability needs a period, and the base frequency is zero", code="E-FREQUENCY", key="frequency",
+            value=0.0, limit="> 0 rad/s",
+            remedy="give a positive frequency, or solve without stability: solve_harmonic_balance, "
+            "stability=False of a curve",
+        )  # fmt: skip
+
+
+def tangents_of(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution]):
+    """Function ``(fraction (m, s), states (m,)) -> tangents (m, s, n_c, n_c)`` [N/m] along the solutions."""
+    lines = np.stack([solution.deflection for solution in solutions])
+    orders = solutions[0].orders[:, 0]
+
+    def tangents(fraction, states):
+        phase = 2.0 * np.pi * fraction
+        wave = np.exp(1j * phase)[..., None] ** orders
+        x = (wave @ np.swapaxes(lines[states], 1, 2)).real
+        return element_forces(problem, x, phase[..., None])[1]
+
+    return tangents
+
+
+def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[FloquetVerdict]:
+    period = np.array([2.0 * np.pi / abs(solution.frequency[0]) for solution in solutions])
+    tangents = tangents_of(problem, solutions)
+    breaks = tangent_jumps(tangents, np.arange(len(solutions)))
+    exact = [_constant_pieces(tangents, i, inner) for i, inner in enumerate(breaks)]
+    out = [
+        None if pieces is None else _exact_verdict(frame, T, inner, pieces)
+        for T, inner, pieces in zip(period, breaks, exact)
+    ]
+    open_states = np.array([i for i, pieces in enumerate(exact) if pieces is None], int)
+    for rest in _portions(frame, period, open_states):
+        moved = passage(
+            frame, period[rest], lambda f, states, rest=rest: tangents(f, rest[states]),
+            [breaks[i] for i in rest], tolerance=tolerance,
+        )  # fmt: skip
+        values = np.linalg.eigvals(moved.matrix)
+        for i, multipliers, error in zip(rest, values, moved.error):
+            out[i] = verdict_of(multipliers, period[i], "splitting", float(error), tolerance, **_free(frame))
+    return out
+
+
+def _portions(frame: Frame, period, states: np.ndarray) -> list[np.ndarray]:
+    """The states in portions whose stiffness matrices are held at once; long periods stand together."""
+    states = states[np.argsort(period[states], kind="stable")]
+    out, first = [], 0
+    entries = 2 * max(len(frame.rows), 1) ** 2 * frame.steps(period[states])
+    for last in range(1, len(states) + 1):
+        if last == len(states) or entries[last] * (last + 1 - first) > _MOST_ENTRIES:
+            out.append(states[first:last])
+            first = last
+    return out
+
+
+def _constant_pieces(tangents, state: int, inner: np.ndarray) -> np.ndarray | None:
+    """Tangents (pieces, n_c, n_c) of a state whose tangents are constant between the breaks."""
+    ends = np.concatenate([[0.0], inner, [1.0]])
+    inside = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(_INSIDE) + 0.5) / _INSIDE
+    values = tangents(inside.reshape(1, -1), np.array([state]))[0]
+    values = values.reshape(*inside.shape, *values.shape[1:])
+    spread = np.abs(values - values[:, :1]).max(initial=0.0)
+    return values[:, 0] if spread <= 1e-13 * np.abs(values).max(initial=0.0) else None
+
+
+def _exact_verdict(frame: Frame, period: float, inner, pieces) -> FloquetVerdict:
+    durations = np.diff(np.concatenate([[0.0], inner, [1.0]])) * period
+    unit = frame.fastest or 1.0
+    both = np.concatenate([np.ones(len(frame.square)), np.full(len(frame.square), unit)])
+    matrices = frame.state_matrices(frame.kappa(pieces)) * both / both[:, None]
+    multipliers = np.linalg.eigvals(monodromy(matrices, durations))
+    return verdict_of(multipliers, period, "exact exponentials", 0.0, np.inf, **_free(frame))
+
+
+def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int | None) -> FloquetVerdict:
+    count = 2 * int(np.abs(solution.orders).max()) if harmonics is None else int(harmonics)
+    if count < 1:
+        raise CaseError("Hill's method needs a harmonic", code="E-HARMONICS", value=count, limit=">= 1")
+    omega = abs(float(solution.frequency[0]))
+    samples = max(512, 16 * count)
+    fraction = np.arange(samples)[None] / samples
+    kappa = frame.kappa(tangents_of(problem, [solution])(fraction, np.array([0]))[0])
+    exponents = hill_exponents(frame, kappa, omega, harmonics=count)
+    period = 2.0 * np.pi / omega
+    return verdict_of(np.exp(exponents * period), period, "Hill", np.nan, np.inf, **_free(frame))
+
+
+def _free(frame: Frame) -> dict:
+    """What the verdict has to know of free motions."""
+    return {"positions": frame.positions, "velocities": frame.positions, "drift": frame.drift}
+
+
+def hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:
+    """Floquet exponents (2 n,) [1/s] by Hill's method.
+
+    ``z = exp(lambda t) sum_h z_h exp(i h omega t)`` in the first-order form gives the eigenvalues of the
+    block Toeplitz matrix ``A_(h - m) - i h omega``. Of every exponent it holds copies ``lambda + i k omega``;
+    those with the most symmetric eigenvectors are the converged ones (Moore, SIAM J. Numer. Anal. 42, 2005):
+    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each.
+
+    Parameters
+    ----------
+    frame : Frame
+    kappa : (samples, n_c, n_c) array
+        Change of stiffness from the reference over one period [N/m].
+    omega : float
+        Base frequency [rad/s].
+    harmonics : int
+    """
+    n, orders = len(frame.square), np.arange(-harmonics, harmonics + 1)
+    lines = np.fft.fft(kappa, axis=0) / len(kappa)
+    both = np.concatenate([np.ones(n), np.full(n, omega)])
+    change = np.zeros((4 * harmonics + 1, 2 * n, 2 * n), complex)
+    for number in range(-2 * harmonics, 2 * harmonics + 1):
+        change[number, n:, :n] = -frame.rows.T @ lines[number] @ frame.rows
+    change[0] += frame.state_matrices(np.zeros_like(lines[0].real))
+    change *= both / both[:, None]
+    size = 2 * n * len(orders)
+    matrix = change[orders[:, None] - orders].swapaxes(1, 2).reshape(size, size)
+    matrix[range(size), range(size)] -= 1j * omega * np.repeat(orders, 2 * n)
+    values, vectors = np.linalg.eig(matrix)
+    weight = (np.abs(vectors.reshape(len(orders), 2 * n, -1)) ** 2).sum(axis=1)
+    centre = np.abs(orders @ weight) / weight.sum(axis=0)
+    return _one_copy_each(values[np.argsort(centre, kind="stable")], omega, 2 * n)
+
+
+def _one_copy_each(values: np.ndarray, omega: float, count: int) -> np.ndarray:
+    """The first ``count`` values of which none is another one shifted by a multiple of ``i omega``."""
+    chosen: list[complex] = []
+    for value in values:
+        shift = (value - np.array(chosen)) / (1j * omega)
+        turns = np.round(shift.real)
+        if not np.any((np.abs(shift - turns) < 1e-4) & (turns != 0)):
+            chosen.append(value)
+        if len(chosen) == count:
+            break
+    return np.array(chosen)

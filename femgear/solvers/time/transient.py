@@ -1,0 +1,377 @@
+"""Motion in time of a system with nonlinear elements: one call for steps and for adaptive integration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.time import adaptive
+from femgear.solvers.time.adaptive import checked_start, motion_scale
+from femgear.solvers.time.modal_steps import modal_scheme
+from femgear.solvers.time.newmark import (
+    RULES,
+    StepRule,
+    generalised_alpha,
+    highest_frequency,
+    march_times,
+    rule_scheme,
+    stability_limit,
+)
+from femgear.system.elements import GearMeshes, PiecewiseSprings
+from femgear.system.entries import checked_numbers, checked_tolerance
+from femgear.system.nonlinear import NonlinearSystem, checked_bases, drift_note, element_forces, tabulated_law
+
+# Steps in the shortest natural period when no step is given: average acceleration errs by 0.2 % of it.
+_STEPS_A_PERIOD = 40
+# Largest local error of a step, relative to the motion, that goes without a word.
+_COARSE = 1e-3
+# Local error of a step, relative to the motion, above which there is no solution.
+_WRONG = 1.0
+# Phases at which the largest mesh stiffness is looked for.
+_PHASES = 256
+METHODS = (*RULES, "newmark", "generalised alpha", "modal", *adaptive.METHODS)
+
+
+@dataclass(frozen=True)
+class TransientResponse:
+    """Motion at the instants asked for.
+
+    Parameters
+    ----------
+    time : (n_times,) array
+        [s].
+    displacement, velocity : (n_times, n) arrays
+        Not a number after a step that did not converge.
+    deflection, force : (n_times, n_columns) arrays
+        ``W^T q`` [m] and the forces of the elements [N].
+    method : str
+    converged : bool
+        Every step converged, and none errs by more than the whole motion (``error`` up to 1). A free system
+        whose load is not balanced converges too: the message says that its mean drifts.
+    residual : float
+        Largest violation of the column equations relative to the deflections; zero for explicit methods.
+    error : float
+        Largest estimated local error of a step relative to the amplitude of the motion, in the norm of the
+        mass matrix; the tolerance for adaptive methods.
+    steps : int
+    iterations : int
+        Newton iterations of all steps, zero for adaptive methods.
+    factorisations : int
+    message : str
+    """
+
+    time: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+    deflection: np.ndarray
+    force: np.ndarray
+    method: str
+    converged: bool
+    residual: float
+    error: float
+    steps: int
+    iterations: int
+    factorisations: int
+    message: str
+
+    def __post_init__(self):
+        for name in ("time", "displacement", "velocity", "deflection", "force"):
+            array = np.array(getattr(self, name), float)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+
+def solve_transient(
+    problem: NonlinearSystem,
+    frequency,
+    times,
+    *,
+    start=None,
+    method: str = "average acceleration",
+    step: float | None = None,
+    gamma: float = 0.5,
+    beta: float = 0.25,
+    radius: float = 0.8,
+    count: int | None = None,
+    tolerance: float | None = None,
+    max_iterations: int = 30,
+    events: bool = False,
+    scale: float | None = None,
+) -> TransientResponse:
+    """Integrate in time from ``times[0]`` on.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    frequency : float or (n_bases,) array
+        Base frequencies of the elements and forces [rad/s]; the phases are zero at time zero.
+    times : (n_times,) array
+        Ascending instants at which the motion is wanted [s]; the first is the start.
+    start : pair of (n,) arrays, optional
+        Displacement and velocity at the start; at rest without deflection when not given.
+    method : str
+        "average acceleration", "linear acceleration", "Fox-Goodwin", "central difference", "newmark" with
+        ``gamma`` and ``beta``, "generalised alpha" with ``radius`` (see `newmark`), "modal" (exact linear
+        part, see `modal_steps`), or SciPy's "DOP853", "Radau", "LSODA".
+    step : float, optional
+        Of the fixed-step methods [s], shortened to divide the time evenly; a 40th of the shortest natural
+        period when not given. Between steps a cubic of displacements and velocities is used.
+    gamma, beta, radius : float
+    count : int, optional
+        Modes of "modal"; all when not given.
+    tolerance : float, optional
+        Relative: of the column equations in a step (1e-10 when not given) or of the local error (1e-9).
+    max_iterations : int
+        Newton iterations a step.
+    events : bool
+        Adaptive methods stop at contact changes, see `adaptive`.
+    scale : float, optional
+        Size of the motion [m] to which the tolerance of adaptive methods refers; estimated when not given.
+
+    Returns
+    -------
+    TransientResponse
+
+    Raises
+    ------
+    CaseError
+        A step beyond the stability limit, instants that do not ascend, unknown methods, a start that
+        does not fit (E-START), more base frequencies than the problem has (E-FREQUENCY).
+    ConvergenceError
+        A mass matrix that is not positive definite, an adaptive integrator that gives up.
+    """
+    times = _checked_times(times)
+    if tolerance is not None:
+        tolerance = checked_tolerance(tolerance)
+    q, v = checked_start(problem, start)
+    frequency = checked_bases(problem, frequency)
+    if method in adaptive.METHODS:
+        options = {"tolerance": tolerance or 1e-9, "events": events, "scale": scale}
+        return _adaptive(problem, frequency, times, q, v, method, options)
+    if events:
+        raise CaseError(
+            f"method {method} steps over contact changes", code="E-METHOD", key="events",
+            limit=", ".join(adaptive.METHODS), remedy="take an adaptive method",
+        )  # fmt: skip
+    rule = _rule(method, gamma, beta, radius)
+    number, step = _steps(problem, frequency, rule, times[-1] - times[0], step)
+    scheme = modal_scheme(problem, step, count=count) if rule is None else rule_scheme(problem, rule, step)
+    options = {"tolerance": tolerance or 1e-10, "max_iterations": max_iterations}
+    return _stepped(problem, scheme, frequency, times, (q, v), number, method, options)
+
+
+def fixed_step_scheme(
+    problem: NonlinearSystem,
+    frequency,
+    method: str,
+    step: float,
+    *,
+    gamma=0.5,
+    beta=0.25,
+    radius=0.8,
+    count=None,
+):
+    """The rule of a fixed-step method, factorised; arguments as for `solve_transient`."""
+    rule = _rule(method, gamma, beta, radius)
+    _steps(problem, np.atleast_1d(frequency), rule, step, step)
+    return modal_scheme(problem, step, count=count) if rule is None else rule_scheme(problem, rule, step)
+
+
+def start_state(scheme, start, theta, law):
+    """State and column forces of a scheme at displacement and velocity (n,), phases theta (1, n_bases)."""
+    return scheme.start(np.asarray(start[0], float), np.asarray(start[1], float), theta, law)
+
+
+def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
+    """Largest stiffness (n_columns,) of every column over the phases, for the stability of steps [N/m].
+
+    Meshes count with the top of k(t), piecewise springs with their steepest part, others as their reference.
+    """
+    turns = np.random.default_rng(0).random((_PHASES, len(np.atleast_1d(frequency))))
+    turns[:, 0] = np.arange(_PHASES) / _PHASES
+    total = np.zeros(problem.system.W.shape[1])
+    for element in problem.elements:
+        top = element.reference
+        if isinstance(element, GearMeshes):
+            top = element.stiffness.at(2.0 * np.pi * turns).max(axis=0)[:, None]
+        if isinstance(element, PiecewiseSprings):
+            top = np.full((len(element.columns), 1), element.slopes.max())
+        np.add.at(total, element.columns, top)
+    return total
+
+
+def _rule(method, gamma, beta, radius) -> StepRule | None:
+    if method in RULES:
+        return RULES[method]
+    if method == "newmark":
+        return StepRule(gamma, beta)
+    if method == "generalised alpha":
+        return generalised_alpha(radius)
+    if method == "modal":
+        return None
+    raise CaseError(f"no method {method}", code="E-METHOD", key="method", limit=", ".join(METHODS))
+
+
+def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
+    """Number and length of the steps; refuses a length beyond the stability limit of the rule."""
+    highest = highest_frequency(problem, column_stiffness(problem, frequency))
+    period = 2.0 * np.pi / highest if highest else np.inf
+    if step is None:
+        fastest = max(highest, np.abs(frequency).max(initial=0.0))
+        step = 2.0 * np.pi / fastest / _STEPS_A_PERIOD if fastest else span / 100.0
+    step = checked_numbers(step, "step", code="E-STEP", unit="s").item()
+    if not (np.isfinite(step) and step > 0.0):
+        raise CaseError(f"a time step of {step} s", code="E-STEP", key="step", limit="above 0 s")
+    number = max(1, int(np.ceil(span / step * (1.0 - 1e-12))))
+    step = span / number
+    limit = np.inf if rule is None else stability_limit(rule)
+    if np.isnan(limit):
+        raise CaseError("a step rule of unknown stability", code="E-STEP-RULE")
+    if step > limit * period:
+        raise CaseError(
+            f"a step of {step:.6g} s is {step / period:.4g} of the shortest natural period, {period:.6g} s",
+            code="E-STEP", key="step", limit=f"h / T up to {limit:.4g}, {limit * period:.6g} s",
+            remedy="shorten the step, or take average acceleration, which is stable for any",
+        )  # fmt: skip
+    return number, step
+
+
+def _stepped(problem, scheme, frequency, times, start, number, method, options) -> TransientResponse:
+    """March with a fixed step and interpolate at the instants."""
+    begin, step = times[0], scheme.step
+    first = begin * frequency[None]
+    state, g = start_state(scheme, start, first, tabulated_law(problem, first))
+    # where each instant lies: in which step, and where in it
+    place = np.clip((times - begin) / step, 0.0, number)
+    near = np.rint(place)
+    place = np.where(np.abs(place - near) < 1e-9 * np.maximum(near, 1.0), near, place)
+    index = np.minimum(place.astype(int), number - 1)
+    q, v = (np.full((len(times), len(start[0])), np.nan) for _ in range(2))
+    x = np.full((len(times), len(g)), np.nan)
+    steps = iterations = 0
+    residual = error = size = 0.0
+    for done, block, theta in march_times(
+        problem, scheme, frequency, state, g, begin=begin, step=step, count=number, **options
+    ):
+        known = slice(0, block.steps + 1)
+        states, excess, theta = block.states[known], block.excess[known], theta[known]
+        inside = (index >= done) & (index < done + block.steps)
+        if np.any(inside):
+            motion = scheme.motion(states, excess, theta)
+            at = place[inside] - done
+            q[inside], v[inside] = _between(at, motion, step)
+            x[inside] = _columns(problem, scheme, states, excess, theta, at, q[inside])
+        if block.steps:
+            error = max(error, float(scheme.local_error(states, excess).max()))
+            # the instants asked for may all lie at one phase: the size is that of all steps
+            size = max(size, _amplitude(problem, scheme.motion(states, excess, theta)[0]))
+        steps, iterations = steps + block.steps, iterations + block.iterations
+        residual = max(residual, block.residual)
+    theta = times[:, None] * frequency
+    force = element_forces(problem, x, theta)[0]
+    relative = error / size if size else 0.0
+    converged, message = _verdict(steps, number, begin + steps * step, relative, step)
+    message += drift_note(problem) if converged else ""
+    return TransientResponse(
+        times, q, v, x, force, method, converged, residual, relative, steps, iterations,
+        scheme.factorisations, message,
+    )  # fmt: skip
+
+
+def _between(at, motion, step) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and velocity at fractional steps, cubic in q and v; in v and a where a is known."""
+    q, v, a = motion
+    k = np.minimum(at.astype(int), len(q) - 2)
+    s = (at - k)[:, None]
+
+    def cubic(value, slope):
+        rise = value[k + 1] - value[k]
+        left, right = step * slope[k], step * slope[k + 1]
+        inner = s * (1.0 - s) * ((1.0 - s) * (left - rise) + s * (rise - right))
+        return np.where(s == 1.0, value[k + 1], value[k] + s * rise + inner)
+
+    if a is not None:
+        return cubic(q, v), cubic(v, a)
+    return cubic(q, v), (1.0 - s) * v[k] + s * v[k + 1]
+
+
+def _columns(problem, scheme, states, excess, theta, at, q) -> np.ndarray:
+    """Deflections at fractional steps; at the steps themselves those that the rule has solved for."""
+    on_step = at == np.rint(at)
+    x = q @ problem.system.W
+    if np.any(on_step):
+        k = at[on_step].astype(int)
+        x[on_step] = scheme.columns(states[k], excess[k], theta[k])
+    return x
+
+
+def _amplitude(problem, q) -> float:
+    """Largest distance from the mean displacement, in the norm of the mass matrix."""
+    q = q[np.all(np.isfinite(q), axis=1)]
+    if not len(q):
+        return 0.0
+    away = q - q.mean(axis=0)
+    return float(np.sqrt(np.einsum("ti,ij,tj->t", away, problem.system.M, away, optimize=True).max()))
+
+
+def _verdict(steps, number, time, error, step) -> tuple[bool, str]:
+    if steps < number:
+        return False, (
+            f"the column equations did not converge in the step after {time:.6g} s: shorten the step of "
+            f"{step:.3g} s or smooth the contact"
+        )
+    if not error <= _WRONG:
+        return False, (
+            f"too coarse: a step errs by {error:.2g} of the motion; shorten the step of {step:.3g} s"
+        )
+    if error > _COARSE:
+        return (
+            True,
+            f"coarse: a step errs by {error:.2g} of the motion; a shorter step than {step:.3g} s is better",
+        )
+    return True, "every step converged"
+
+
+def _adaptive(problem, frequency, times, q, v, method, options) -> TransientResponse:
+    motion = adaptive.flow(problem, frequency)
+    y = motion.state(q, v)
+    options["scale"] = options["scale"] or motion_scale(motion, (q, v))
+    found, steps = sampled(
+        adaptive.trajectory(motion, y, times[0], times[-1], method=method, **options), times, y
+    )
+    q, v, x = (part.T for part in motion.split(found.T))
+    force = element_forces(problem, x, times[:, None] * frequency)[0]
+    return TransientResponse(
+        times, q, v, x, force, method, True, 0.0, options["tolerance"], steps, 0, 1,
+        f"{method} with a relative tolerance of {options['tolerance']:.3g}" + drift_note(problem),
+    )  # fmt: skip
+
+
+def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
+    """States (n_times, size) of an adaptive integration at ascending instants, and the number of its steps.
+
+    ``pieces`` comes from `adaptive.trajectory`; instants before its first step have the state ``start``.
+    """
+    found, filled, steps = np.empty((len(times), len(start))), 0, 0
+    for begin, end, dense in pieces:
+        early = int(np.searchsorted(times, begin, side="right")) if not steps else filled
+        found[filled:early] = start
+        last = int(np.searchsorted(times, end, side="right"))
+        if last > early:
+            found[early:last] = dense(times[early:last]).T
+        filled, steps = max(last, early), steps + 1
+    if filled < len(times):
+        # the end of the last step, but for rounding
+        found[filled:] = dense(times[filled:]).T if steps else start
+    return found, steps
+
+
+def _checked_times(times) -> np.ndarray:
+    times = checked_numbers(times, "times", code="E-TIMES", unit="s").copy()
+    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
+        raise CaseError(
+            "instants must be finite and ascend", code="E-TIMES", key="times", limit="two instants or more"
+        )
+    return times

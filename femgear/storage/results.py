@@ -1,0 +1,510 @@
+"""Results on disk: one folder a run, one NetCDF file a stage, a manifest with checksums.
+
+The manifest of a results folder: what a run wrote, with checksums, and whether it came to its end.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from femgear import __version__
+from femgear.case.case import read_case
+from femgear.case.sections import Case
+from femgear.errors import StorageError
+from femgear.storage.files import (
+    checked_name,
+    checksum,
+    exclusive_lock,
+    is_safe_path,
+    read_dataset,
+    storage_errors,
+    write_text,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FORMAT = 1
+MANIFEST = "manifest.json"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a run wrote.
+
+    Parameters
+    ----------
+    complete : bool
+        Whether the run came to its end.
+    files : mapping of str to str
+        SHA-256 of every file, by its path inside the folder.
+    timings : mapping of str to float
+        Seconds a stage took.
+    convergence : mapping
+        What each stage says about its convergence.
+    versions : mapping of str to str
+        femgear and the libraries that computed.
+    format : int
+    """
+
+    complete: bool
+    files: Mapping[str, str] = field(default_factory=dict)
+    timings: Mapping[str, float] = field(default_factory=dict)
+    convergence: Mapping[str, object] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+    format: int = FORMAT
+
+    def __post_init__(self):
+        for name in ("files", "timings", "convergence", "versions"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+
+def read_manifest(folder: str | os.PathLike) -> Manifest:
+    """Manifest of a results folder.
+
+    Raises
+    ------
+    StorageError
+        Missing, not a femgear manifest, of a newer format, or naming files outside the folder.
+    """
+    path = Path(folder) / MANIFEST
+    remedy = "name a folder that femgear run wrote"
+    with storage_errors(path):
+        if not path.is_file() or path.stat().st_size > 10_000_000:
+            raise StorageError(
+                "no manifest of reasonable size", code="E-MANIFEST", file=str(path), remedy=remedy
+            )
+        text = path.read_bytes()
+    try:
+        data = json.loads(text)
+        version = data.pop("femgear_format")
+    except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
+        raise StorageError(
+            "not a femgear manifest", code="E-MANIFEST", file=str(path), remedy=remedy
+        ) from None
+    if type(version) is not int or not 1 <= version <= FORMAT:
+        raise StorageError(
+            "written by another version of femgear",
+            code="E-FORMAT",
+            file=str(path),
+            value=version,
+            limit=f"1 to {FORMAT}",
+        )
+    try:
+        manifest = Manifest(format=version, **data)
+    except (TypeError, ValueError):
+        raise StorageError(
+            "not a femgear manifest", code="E-MANIFEST", file=str(path), remedy=remedy
+        ) from None
+    for name in manifest.files:
+        if not is_safe_path(name):
+            raise StorageError(
+                "names a file outside the folder", code="E-MANIFEST", file=str(path), value=name
+            )
+    return manifest
+
+
+def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> None:
+    """Write ``manifest.json``; the last file of a run."""
+    data = {
+        "femgear_format": manifest.format,
+        "complete": manifest.complete,
+        "files": dict(manifest.files),
+        "timings": dict(manifest.timings),
+        "convergence": _plain(dict(manifest.convergence)),
+        "versions": dict(manifest.versions),
+    }
+    write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", Path(folder) / MANIFEST)
+
+
+def _plain(value: object) -> object:
+    """JSON value of nested tables, lists, arrays and numbers."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def verify(folder: str | os.PathLike) -> tuple[str, ...]:
+    """Files of the manifest that are missing or changed."""
+    folder = Path(folder)
+    files = read_manifest(folder).files
+    return tuple(
+        n for n, digest in files.items() if not (folder / n).is_file() or checksum(folder / n) != digest
+    )
+
+
+def versions() -> dict[str, str]:
+    """Versions of femgear, Python and the libraries that compute."""
+    import platform
+    from importlib.metadata import version
+
+    libraries = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
+    return {"femgear": __version__, "python": platform.python_version(), **{n: version(n) for n in libraries}}
+
+
+STAGES = ("static", "stress", "modes", "dynamics", "housing", "branch", "response", "transient", "spectrum")
+CASE, LOCK = "case.toml", ".lock"
+RUNNING, FINISHED = ".running", ".finished"
+
+
+@dataclass(frozen=True)
+class Results:
+    """A results folder; every file is read, and its checksum tested, when it is first asked for."""
+
+    folder: Path
+    manifest: Manifest
+
+    @cached_property
+    def case(self) -> Case:
+        """The case as run."""
+        return read_case(self._checked(CASE))
+
+    @cached_property
+    def static(self) -> xr.Dataset:
+        """Static transmission error, mesh stiffness, load sharing."""
+        return self.stage("static")
+
+    @cached_property
+    def stress(self) -> xr.Dataset:
+        """Root stresses, contact pressures, load spectra."""
+        return self.stage("stress")
+
+    @cached_property
+    def modes(self) -> xr.Dataset:
+        """Natural frequencies and mode shapes."""
+        return self.stage("modes")
+
+    @cached_property
+    def dynamics(self) -> xr.Dataset:
+        """Periodic response at every speed."""
+        return self.stage("dynamics")
+
+    @cached_property
+    def housing(self) -> xr.Dataset:
+        """Signal and orders of the fixed sensor."""
+        return self.stage("housing")
+
+    @cached_property
+    def branch(self) -> xr.Dataset:
+        """Periodic responses of a planar set to its weight, over the weight's frequency."""
+        return self.stage("branch")
+
+    @cached_property
+    def response(self) -> xr.Dataset:
+        """Responses of a planar set to weight and mesh frequency at every speed."""
+        return self.stage("response")
+
+    @cached_property
+    def transient(self) -> xr.Dataset:
+        """Motion of a drivetrain in time."""
+        return self.stage("transient")
+
+    @cached_property
+    def spectrum(self) -> xr.Dataset:
+        """Spectra and lines of the mesh forces of a drivetrain."""
+        return self.stage("spectrum")
+
+    def stage(self, name: str) -> xr.Dataset:
+        """Contents of the file of one stage."""
+        return read_dataset(self._checked(f"{name}.nc"))
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Stages that the folder holds."""
+        return tuple(stage for stage in STAGES if f"{stage}.nc" in self.manifest.files)
+
+    def _checked(self, name: str) -> Path:
+        path = self.folder / name
+        if name not in self.manifest.files:
+            _refuse_incomplete(self)
+            raise StorageError(
+                "the run did not write this file",
+                code="E-RESULTS-MISSING",
+                file=str(path),
+                limit=", ".join(self.manifest.files) or "nothing was written",
+            )
+        if checksum(path) != self.manifest.files[name]:
+            raise StorageError(
+                "the file is not the one that the run wrote (SHA-256 differs from the manifest)",
+                code="E-RESULTS-CHANGED",
+                file=str(path),
+                remedy="run the case again",
+            )
+        return path
+
+
+def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
+    """Results of a run; of an interrupted one those stages that are complete, with a warning.
+
+    Parameters
+    ----------
+    folder : path-like
+    partial : bool
+        Accept the results of an interrupted run.
+
+    Returns
+    -------
+    Results
+
+    Raises
+    ------
+    StorageError
+        No folder, no manifest, a broken one or one of a newer femgear. ``E-RESULTS-INCOMPLETE``: an
+        interrupted run and not ``partial``.
+    """
+    folder = Path(folder)
+    _refuse_missing(folder)
+    results = Results(folder, read_manifest(folder))
+    if not partial:
+        _refuse_incomplete(results)
+    elif not results.manifest.complete:
+        warnings.warn(f"{folder}: {_interrupted(results)}", stacklevel=2)
+    return results
+
+
+def _refuse_missing(folder: Path) -> None:
+    if not folder.is_dir():
+        raise StorageError("no such results folder", code="E-RESULTS-MISSING", file=str(folder))
+
+
+def _refuse_incomplete(results: Results) -> None:
+    if results.manifest.complete:
+        return
+    folder = results.folder
+    case = folder / CASE if CASE in results.manifest.files else "CASE"
+    raise StorageError(
+        _interrupted(results),
+        code="E-RESULTS-INCOMPLETE",
+        file=str(folder),
+        remedy=f"run it again: femgear run {case} -o {folder}",
+    )
+
+
+def _interrupted(results: Results) -> str:
+    stages = f"after: {', '.join(results.stages)}" if results.stages else "before a stage was complete"
+    return f"the run was interrupted {stages}"
+
+
+def folder_lock(folder: str | os.PathLike):
+    """Context in which this process alone writes into a results folder.
+
+    Raises
+    ------
+    StorageError
+        ``E-LOCKED`` while another run holds the folder (readers need no lock); no such folder.
+    """
+    _refuse_missing(Path(folder))
+    return exclusive_lock(Path(folder) / LOCK)
+
+
+@contextmanager
+def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Path]:
+    """Folder for a run to write into, locked; old results stay until the new ones are complete.
+
+    A run that replaces results is given a folder inside, whose files take their place at the end; should it
+    fail or be interrupted, the old ones are as they were.
+
+    Parameters
+    ----------
+    folder : path-like
+        Created where it does not exist (its last name must be safe, see `checked_name`).
+    force : bool
+        Replace the results of a complete earlier run.
+
+    Yields
+    ------
+    Path
+        Made ready as by `prepare_output`.
+
+    Raises
+    ------
+    StorageError
+        As `prepare_output`; ``E-LOCKED`` while another run writes into the folder.
+    """
+    folder = Path(folder)
+    _make(folder)
+    with folder_lock(folder):
+        if (folder / FINISHED).is_dir():
+            _publish(folder)  # what a run could not bring to its end because it was killed
+        _remove_tree(folder / RUNNING)
+        if not (force and _is_complete(folder)):
+            yield prepare_output(folder)
+            return
+        _refuse_changed(folder, read_manifest(folder))
+        try:
+            with storage_errors(folder):
+                (folder / RUNNING).mkdir()
+            yield prepare_output(folder / RUNNING)
+            if read_manifest(folder / RUNNING).complete:
+                with storage_errors(folder):
+                    os.replace(folder / RUNNING, folder / FINISHED)
+                _publish(folder)
+        finally:
+            _remove_tree(folder / RUNNING)
+
+
+def _publish(folder: Path) -> None:
+    """Give the new files their places, the manifest last; may be repeated after an interruption."""
+    source = folder / FINISHED
+    if (source / MANIFEST).is_file():
+        new, old = read_manifest(source), read_manifest(folder)
+        with storage_errors(folder):
+            for name in new.files:
+                if (source / name).is_file():
+                    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                    os.replace(source / name, folder / name)
+            _remove_unchanged(folder, {name: d for name, d in old.files.items() if name not in new.files})
+            os.replace(source / MANIFEST, folder / MANIFEST)
+    _remove_tree(source)
+
+
+def _remove_tree(path: Path) -> None:
+    with storage_errors(path):
+        if path.is_dir():
+            shutil.rmtree(path)
+
+
+def _make(folder: Path) -> None:
+    """Create a folder, or refuse one that is not for results."""
+    if not folder.exists():
+        checked_name(folder.resolve().name)
+    with storage_errors(folder):
+        if folder.exists() and not folder.is_dir():
+            raise StorageError("exists and is not a folder", code="E-OUTPUT", file=str(folder))
+        folder.mkdir(parents=True, exist_ok=True)
+        foreign = any(path.name != LOCK for path in folder.iterdir())
+    if foreign and not (folder / MANIFEST).is_file():
+        raise StorageError(
+            "the folder holds files but no femgear results",
+            code="E-OUTPUT",
+            file=str(folder),
+            remedy="name a new folder",
+        )
+
+
+def _is_complete(folder: Path) -> bool:
+    return (folder / MANIFEST).is_file() and read_manifest(folder).complete
+
+
+def _refuse_changed(folder: Path, manifest: Manifest) -> None:
+    """Refuse to replace results in which somebody has changed a file."""
+    changed = [
+        n for n, digest in manifest.files.items() if (folder / n).exists() and _differs(folder / n, digest)
+    ]
+    if changed:
+        raise StorageError(
+            f"{', '.join(changed)} changed since the run wrote {'it' if len(changed) == 1 else 'them'}",
+            code="E-OUTPUT",
+            file=str(folder),
+            remedy="name a new folder, or move the changed files away",
+        )
+
+
+def _differs(path: Path, digest: str) -> bool:
+    return not path.is_file() or checksum(path) != digest
+
+
+def prepare_output(folder: str | os.PathLike) -> Path:
+    """Make a folder ready for a run; only unchanged files of an interrupted run are ever removed.
+
+    Parameters
+    ----------
+    folder : path-like
+        Created where it does not exist (its last name must be safe, see `checked_name`).
+
+    Returns
+    -------
+    Path
+        The folder, with a manifest that says that the run is not complete.
+
+    Raises
+    ------
+    StorageError
+        ``E-OUTPUT``: the folder holds other people's files (no manifest), complete results, or files of an
+        interrupted run that were changed.
+    """
+    folder = Path(folder)
+    _make(folder)
+    if (folder / MANIFEST).is_file():
+        manifest = read_manifest(folder)
+        if manifest.complete:
+            raise StorageError(
+                "the folder holds results already",
+                code="E-OUTPUT",
+                file=str(folder),
+                remedy="name a new folder, or replace them with --force",
+            )
+        _refuse_changed(folder, manifest)
+        with storage_errors(folder):
+            _remove_unchanged(folder, manifest.files)
+    write_manifest(folder, Manifest(complete=False))
+    return folder
+
+
+def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
+    for name, digest in files.items():
+        path = folder / name
+        # a link inside the folder must not lead the removal out of it
+        inside = path.resolve() == folder.resolve() / name
+        if inside and path.is_file() and checksum(path) == digest:
+            path.unlink()
+
+
+def record(
+    folder: str | os.PathLike,
+    names: list[str],
+    *,
+    timings: Mapping[str, float],
+    convergence: Mapping[str, object],
+    complete: bool = False,
+) -> Manifest:
+    """Write the manifest of what a run has written so far; see `finish`.
+
+    Parameters
+    ----------
+    complete : bool
+        Whether the run came to its end.
+    """
+    files = {name: checksum(Path(folder) / name) for name in names}
+    manifest = Manifest(
+        complete=complete, files=files, timings=timings, convergence=convergence, versions=versions()
+    )
+    write_manifest(folder, manifest)
+    return manifest
+
+
+def finish(
+    folder: str | os.PathLike,
+    names: list[str],
+    *,
+    timings: Mapping[str, float],
+    convergence: Mapping[str, object],
+) -> Manifest:
+    """Write the manifest of a run that came to its end.
+
+    Parameters
+    ----------
+    folder : path-like
+    names : list of str
+        Files that the run wrote, as paths inside the folder.
+    timings : mapping of str to float
+        Seconds a stage.
+    convergence : mapping
+        Numbers, texts, arrays and tables of these; numbers that are not finite are stored as null.
+    """
+    return record(folder, names, timings=timings, convergence=convergence, complete=True)

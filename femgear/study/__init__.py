@@ -1,0 +1,108 @@
+"""Design maps: transmission error over torque and relief, load sharing over pin errors, derivatives.
+
+Optimisation over entries of the case file: objectives, limits, searches, Pareto fronts, sweeps."""
+
+from femgear.case.case import with_values
+from femgear.study.linearised import LinearContact
+from femgear.study.names import NAMES, named_quantity, parse_limit, parse_variable
+from femgear.study.objectives import (
+    Quantity,
+    contact_pressure,
+    contact_ratio,
+    housing_level,
+    mesh_force,
+    root_stress,
+    tip_thickness,
+    transmission_error,
+)
+from femgear.study.problem import Limit, Problem
+from femgear.study.relief import (
+    HarrisMap,
+    ReliefGrid,
+    ReliefOptimum,
+    harris_map,
+    optimise_relief,
+    pin_error,
+    relief_amount,
+    relief_grid,
+    relief_length,
+    relief_starts,
+    tooth_pitch_error,
+    two_pair_length,
+    with_tip_relief,
+)
+from femgear.study.search import METHODS, Optimum, ParetoFront, minimise, pareto_front
+from femgear.study.sensitivity import (
+    Sensitivity,
+    Tolerance,
+    linearise,
+    peak_to_peak_slopes,
+    pin_sensitivities,
+    sensitivity,
+    sharing_factor_slopes,
+)
+from femgear.study.sharing import (
+    Sharing,
+    SharingModel,
+    pin_samples,
+    sharing_model,
+    sharing_of_samples,
+    walked_shares,
+)
+from femgear.study.sweep import Sweep, parse_over, sweep, sweep_into
+from femgear.study.variables import Variable
+
+__all__ = [
+    "METHODS",
+    "NAMES",
+    "HarrisMap",
+    "Limit",
+    "LinearContact",
+    "Optimum",
+    "ParetoFront",
+    "Problem",
+    "Quantity",
+    "ReliefGrid",
+    "ReliefOptimum",
+    "Sensitivity",
+    "Sharing",
+    "SharingModel",
+    "Sweep",
+    "Tolerance",
+    "Variable",
+    "contact_pressure",
+    "contact_ratio",
+    "harris_map",
+    "housing_level",
+    "linearise",
+    "mesh_force",
+    "minimise",
+    "named_quantity",
+    "optimise_relief",
+    "pareto_front",
+    "parse_limit",
+    "parse_over",
+    "parse_variable",
+    "peak_to_peak_slopes",
+    "pin_error",
+    "pin_samples",
+    "pin_sensitivities",
+    "relief_amount",
+    "relief_grid",
+    "relief_length",
+    "relief_starts",
+    "root_stress",
+    "sensitivity",
+    "sharing_factor_slopes",
+    "sharing_model",
+    "sharing_of_samples",
+    "sweep",
+    "sweep_into",
+    "tip_thickness",
+    "tooth_pitch_error",
+    "transmission_error",
+    "two_pair_length",
+    "walked_shares",
+    "with_tip_relief",
+    "with_values",
+]

@@ -1,0 +1,556 @@
+"""Transmission error over torque for several reliefs (Harris map), and the relief for one torque.
+
+S. L. Harris, "Dynamic loads on the teeth of spur gears", Proc. IMechE 172 (1958): a relief takes off the tips
+what the teeth bend under one torque, and the transmission error is then nearly constant under that torque.
+
+Parameters of the deviations: functions of one number that return deviations, for `derivatives`.
+
+The tip relief with the least transmission error at one torque, and whether it is a minimum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from femgear.contact.assembly import mesh_pairs
+from femgear.contact.cycle import walk_either_flank
+from femgear.contact.supports import RIGID, Supports
+from femgear.errors import CaseError
+from femgear.gears.deviations import SetDeviations, common_period, no_deviations
+from femgear.gears.modifications import FlankForm, TipRelief
+from femgear.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    from femgear.contact.assembly import Bodies
+    from femgear.gears.planetary import PlanetarySet
+
+LARGEST_LENGTH = 1.3
+"""Longest relief in lengths of two-pair contact; longer ones reach the pitch point of common sets."""
+
+
+@dataclass(frozen=True, eq=False)
+class HarrisMap:
+    """Transmission error over torque.
+
+    Parameters
+    ----------
+    torques : (T,) array
+        Torque on the sun [N m].
+    peak_to_peak : (variants, 2, T) array
+        Of the transmission error of the sun-planet and the planet-ring meshes, the largest of each kind [m].
+    overall : (variants, T) array
+        Of the transmission error from sun to ring [m].
+    residual : float
+        Largest residual of all contact problems.
+    """
+
+    torques: np.ndarray
+    peak_to_peak: np.ndarray
+    overall: np.ndarray
+    residual: float
+
+
+@dataclass(frozen=True, eq=False)
+class ReliefGrid:
+    """Transmission error peak to peak of the sun-planet meshes over two parameters of the tip relief.
+
+    Parameters
+    ----------
+    amounts : (A,) array
+        [m]
+    lengths : (L,) array
+        In lengths of two-pair contact, see `relief_starts`.
+    torques : (T,) array
+        On the sun [N m].
+    peak_to_peak : (T, A, L) array
+        [m]
+    unmodified : (T,) array
+        Without the relief [m].
+    """
+
+    amounts: np.ndarray
+    lengths: np.ndarray
+    torques: np.ndarray
+    peak_to_peak: np.ndarray
+    unmodified: np.ndarray
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Peak to peak over that without relief, (T, A, L)."""
+        return self.peak_to_peak / self.unmodified[:, None, None]
+
+
+def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[float, float]:
+    """Roll lengths on sun and planet where a tip relief of their mesh starts [m].
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    length : float
+        Along the path of contact, in lengths ``(epsilon - 1) p_b`` of two-pair contact at either end: 1
+        starts at the ends of single-pair contact.
+
+    Returns
+    -------
+    sun, planet : float
+
+    Raises
+    ------
+    CaseError
+        E-RANGE: a length outside 0.05 to 1.3.
+    """
+    if not 0.05 <= length <= LARGEST_LENGTH:
+        raise CaseError(
+            f"a relief of {length} lengths of two-pair contact is not plausible",
+            code="E-RANGE",
+            value=length,
+            limit=f"0.05 to {LARGEST_LENGTH}",
+        )
+    pair = mesh_pairs(planetary_set)[0]
+    begin, end = pair.path
+    along = length * (end - begin - planetary_set.sun.base_pitch)
+    return float(pair.pitch_roll_1 + end - along), float(pair.pitch_roll_2 - begin - along)
+
+
+def with_tip_relief(
+    deviations: SetDeviations | None,
+    planetary_set: PlanetarySet,
+    *,
+    amount: float,
+    length: float = 1.0,
+    power: float = 1.0,
+    back: bool = False,
+) -> SetDeviations:
+    """Deviations with one more tip relief, on the sun and on the flanks of the planets that touch it.
+
+    Parameters
+    ----------
+    deviations : SetDeviations, optional
+        None for ideal gears.
+    planetary_set : PlanetarySet
+    amount : float
+        At the tips of sun and planet [m].
+    length : float
+        See `relief_starts`.
+    power : float
+        1 linear, 2 parabolic.
+    back : bool
+        The flanks of the planets that touch the sun under a negative torque.
+    """
+    found = no_deviations(planetary_set) if deviations is None else deviations
+    if amount == 0:
+        return found
+    sun, planet = relief_starts(planetary_set, length=length)
+    side = "planet_ring_side" if back else "planet_sun_side"
+    new = {"sun": TipRelief(amount, sun, power=power), side: TipRelief(amount, planet, power=power)}
+    forms = {n: FlankForm((*getattr(found, n).modifications, relief)) for n, relief in new.items()}
+    return replace(found, **forms)
+
+
+@one_blas_thread()
+def harris_map(
+    planetary_set: PlanetarySet,
+    bodies: Bodies,
+    *,
+    torques,
+    deviations: Sequence[SetDeviations | None],
+    positions: int = 32,
+    contact: str = "profile",
+    supports: Supports = RIGID,
+    progress: Callable[[int, int], None] | None = None,
+) -> HarrisMap:
+    """Transmission error peak to peak over torque for a list of deviations.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    bodies : Bodies
+        Flank compliances; they serve all mesh cycles.
+    torques : sequence of float
+        On the sun [N m], not zero.
+    deviations : sequence of SetDeviations or None
+        One a curve; the record spans the common period of each.
+    positions : int
+        In one mesh period.
+    contact, supports
+        See `contact.cycle.walk_mesh_cycle`.
+    progress : callable, optional
+        Called with (mesh cycles done, mesh cycles).
+
+    Returns
+    -------
+    HarrisMap
+
+    Raises
+    ------
+    CaseError
+        E-TORQUE: a torque of zero, or none.
+    ContactError
+    """
+    torques = np.array(torques, float)
+    if not len(torques) or not (np.isfinite(torques).all() and torques.all()):
+        raise CaseError("every torque of the map must differ from zero", code="E-TORQUE", value=torques)
+    N = planetary_set.n_planets
+    peaks = np.zeros((len(deviations), 2, len(torques)))
+    overall, residual = np.zeros((len(deviations), len(torques))), 0.0
+    for v, variant in enumerate(deviations):
+        periods = 1 if variant is None else common_period(variant, planetary_set)[0]
+        for t, torque in enumerate(torques):
+            cycle = walk_either_flank(
+                planetary_set,
+                bodies,
+                sun_torque=float(torque),
+                positions=positions,
+                contact=contact,
+                deviations=variant,
+                supports=supports,
+                periods=periods,
+            )
+            peak = np.ptp(cycle.deflection, axis=1)
+            peaks[v, :, t] = peak[:N].max(), peak[N:].max()
+            overall[v, t] = np.ptp(cycle.sun_arc)
+            residual = max(residual, float(cycle.residual.max()))
+            if progress is not None:
+                progress(v * len(torques) + t + 1, peaks[:, 0].size)
+    return HarrisMap(torques, peaks, overall, residual)
+
+
+@one_blas_thread()
+def relief_grid(
+    planetary_set: PlanetarySet,
+    bodies: Bodies,
+    *,
+    amounts,
+    lengths,
+    torques,
+    deviations: SetDeviations | None = None,
+    power: float = 1.0,
+    positions: int = 32,
+    contact: str = "profile",
+    supports: Supports = RIGID,
+    progress: Callable[[int, int], None] | None = None,
+) -> ReliefGrid:
+    """Transmission error of the sun-planet meshes over amount and length of their tip relief.
+
+    Parameters
+    ----------
+    amounts : (A,) sequence
+        [m]
+    lengths : (L,) sequence
+        In lengths of two-pair contact.
+    torques : (T,) sequence
+        On the sun [N m], of one sign.
+    planetary_set, bodies, deviations, power, positions, contact, supports, progress
+        As for `with_tip_relief` and `harris_map`.
+
+    Returns
+    -------
+    ReliefGrid
+    """
+    amounts, lengths, torques = (np.array(a, float) for a in (amounts, lengths, torques))
+    back = loads_back(torques)
+    variants = [deviations]
+    variants += [
+        with_tip_relief(deviations, planetary_set, amount=a, length=length, power=power, back=back)
+        for a in amounts
+        for length in lengths
+    ]
+    found = harris_map(
+        planetary_set,
+        bodies,
+        torques=torques,
+        deviations=variants,
+        positions=positions,
+        contact=contact,
+        supports=supports,
+        progress=progress,
+    ).peak_to_peak[:, 0]
+    peaks = found[1:].T.reshape(len(torques), len(amounts), len(lengths))
+    return ReliefGrid(amounts, lengths, torques, peaks, found[0])
+
+
+def loads_back(torques: np.ndarray) -> bool:
+    """Whether torques are negative; E-TORQUE (CaseError) where their signs differ."""
+    if (torques > 0).any() and (torques < 0).any():
+        raise CaseError("torques of both signs load different flanks", code="E-TORQUE", value=torques)
+    return bool((torques < 0).any())
+
+
+Parameter = Callable[[float], "SetDeviations"]
+
+
+def pin_error(
+    deviations: SetDeviations, *, planet: int, direction: Literal["radial", "tangential"]
+) -> Parameter:
+    """Displacement [m] of one planet's axis, on top of the deviations.
+
+    Parameters
+    ----------
+    deviations : SetDeviations
+    planet : int
+        1 to N.
+    direction : {"radial", "tangential"}
+        Outwards and counter-clockwise positive.
+
+    Raises
+    ------
+    CaseError
+        E-RANGE: no such planet or direction.
+    """
+    N = len(deviations.pin_errors)
+    ways = ("radial", "tangential")
+    if not 1 <= planet <= N or direction not in ways:
+        raise CaseError(
+            "no such pin error", code="E-RANGE", value=(planet, direction), limit=f"1 to {N}, {ways}"
+        )
+    unit = np.zeros((N, 2))
+    unit[planet - 1, ways.index(direction)] = 1.0
+    return lambda value: replace(deviations, pin_errors=deviations.pin_errors + value * unit)
+
+
+def tooth_pitch_error(
+    deviations: SetDeviations,
+    planetary_set: PlanetarySet,
+    *,
+    gear: Literal["sun", "planet", "ring"],
+    tooth: int,
+    planet: int = 1,
+) -> Parameter:
+    """Displacement [m] of one tooth along the reference circle, counter-clockwise, on top of the deviations.
+
+    As one entry of ``cumulative_pitch`` of the case file: the tooth moves as a whole, its left flank towards
+    its mate and its right flank away from it; along the line of action by r_b/r of that.
+
+    Parameters
+    ----------
+    deviations : SetDeviations
+    planetary_set : PlanetarySet
+    gear : {"sun", "planet", "ring"}
+    tooth : int
+        Counter-clockwise from 0, see `gears.deviations`.
+    planet : int
+        Which of them, 1 to N.
+
+    Raises
+    ------
+    CaseError
+        E-RANGE: no such gear, tooth or planet.
+    """
+    s, names = planetary_set, ("sun", "planet", "ring")
+    found = getattr(s, gear) if gear in names else None
+    if found is None or not 0 <= tooth < found.teeth or not 1 <= planet <= s.n_planets:
+        limit = "a tooth 0 to z - 1 of sun, planet 1 to N or ring"
+        raise CaseError("no such tooth", code="E-RANGE", value=(gear, planet, tooth), limit=limit)
+    along = found.base_radius / found.reference_radius
+    place = (planet - 1, tooth) if gear == "planet" else tooth
+    signs = (
+        {"planet_pitch": -1.0, "planet_ring_side_pitch": 1.0} if gear == "planet" else {f"{gear}_pitch": -1.0}
+    )
+
+    def variant(value: float) -> SetDeviations:
+        arrays = {name: np.array(getattr(deviations, name)) for name in signs}
+        for name, sign in signs.items():
+            arrays[name][place] += sign * along * value
+        return replace(deviations, **arrays)
+
+    return variant
+
+
+def relief_amount(deviations, planetary_set: PlanetarySet, *, length: float, **options) -> Parameter:
+    """Amount [m] of the tip relief of `relief.with_tip_relief`; options are its ``power`` and ``back``."""
+    base = no_deviations(planetary_set) if deviations is None else deviations
+    return lambda value: with_tip_relief(base, planetary_set, amount=value, length=length, **options)
+
+
+def relief_length(deviations, planetary_set: PlanetarySet, *, amount: float, **options) -> Parameter:
+    """Length of the same relief along the path of contact, in lengths of two-pair contact."""
+    base = no_deviations(planetary_set) if deviations is None else deviations
+    return lambda value: with_tip_relief(base, planetary_set, amount=amount, length=value, **options)
+
+
+def two_pair_length(planetary_set: PlanetarySet) -> float:
+    """Length of two-pair contact of sun and planet at either end, ``(epsilon - 1) p_b`` [m]."""
+
+    longer, shorter = (relief_starts(planetary_set, length=length)[0] for length in (0.5, 1.0))
+    return 2.0 * (longer - shorter)
+
+
+AMOUNT_STEP, LENGTH_STEP = 0.1e-6, 0.05e-3
+"""Steps [m] of the points around the optimum, of amount and of length along the path of contact."""
+
+SMALLEST_GAIN = 1e-4
+"""Gain [um] under which a neighbour counts as no better."""
+
+
+@dataclass(frozen=True)
+class ReliefOptimum:
+    """The relief with the least transmission error peak to peak at one torque.
+
+    Parameters
+    ----------
+    torque : float
+        On the sun [N m].
+    amount : float
+        [m]
+    length : float
+        In lengths of two-pair contact.
+    peak_to_peak, unmodified : float
+        With the relief and without it [m].
+    evaluations : int
+        Mesh cycles.
+    amount_slopes, length_slopes : (float, float)
+        Rise of the peak to peak [m/m] towards less and towards more, of amount and of length along the path
+        of contact, over `AMOUNT_STEP` and `LENGTH_STEP`; NaN where the range searched ends there.
+    minimum : bool
+        None of the points one step away, alone or in both parameters at once, lies lower; False where
+        the search ran out of mesh cycles.
+    """
+
+    torque: float
+    amount: float
+    length: float
+    peak_to_peak: float
+    unmodified: float
+    evaluations: int
+    amount_slopes: tuple[float, float]
+    length_slopes: tuple[float, float]
+    minimum: bool
+
+    @property
+    def ratio(self) -> float:
+        """Peak to peak over that without relief."""
+        return self.peak_to_peak / self.unmodified
+
+    @property
+    def at_end(self) -> tuple[str, ...]:
+        """Names of the parameters that lie at an end of the range searched."""
+        pairs = ("amount", self.amount_slopes), ("length", self.length_slopes)
+        return tuple(name for name, slopes in pairs if np.isnan(slopes).any())
+
+
+@one_blas_thread()
+def optimise_relief(
+    planetary_set: PlanetarySet,
+    bodies: Bodies,
+    grid: ReliefGrid,
+    *,
+    torque: float,
+    deviations: SetDeviations | None = None,
+    power: float = 1.0,
+    positions: int = 32,
+    contact: str = "profile",
+    supports: Supports = RIGID,
+    max_evaluations: int = 240,
+) -> ReliefOptimum:
+    """Best relief at one torque, by Nelder and Mead's simplex from the best point of the grid.
+
+    The peak to peak has kinks where another position becomes the extreme one, so no gradient is used. The
+    simplex may collapse where the function still falls (K. I. M. McKinnon, SIAM J. Optim. 9, 1998, 148-158),
+    as it does on kinks and bounds. The eight neighbours one step away are therefore tried, and the search
+    begins again from the best of them until none lies lower.
+
+    The search stays within the lengths of the grid and under its largest amount; amounts go down to a
+    hundredth of its smallest.
+
+    Parameters
+    ----------
+    grid : ReliefGrid
+        Over the same set, with `torque` among its torques.
+    torque : float
+        On the sun [N m].
+    max_evaluations : int
+        Mesh cycles after which the search is not begun again.
+    planetary_set, bodies, deviations, power, positions, contact, supports
+        As for `relief_grid`.
+
+    Returns
+    -------
+    ReliefOptimum
+    """
+    t = int(np.abs(grid.torques - torque).argmin())
+    options = {"torques": [torque], "positions": positions, "contact": contact, "supports": supports}
+    known: dict[tuple[float, float], float] = {}
+
+    def peak(point) -> float:
+        place = float(point[0]), float(point[1])
+        if place not in known:
+            relief = {"amount": place[0] * 1e-6, "length": place[1], "power": power, "back": torque < 0}
+            variant = with_tip_relief(deviations, planetary_set, **relief)
+            found = harris_map(planetary_set, bodies, deviations=[variant], **options)
+            known[place] = float(found.peak_to_peak[0, 0, 0]) * 1e6
+        return known[place]
+
+    unit = two_pair_length(planetary_set)
+    step = np.array([AMOUNT_STEP * 1e6, LENGTH_STEP / unit])
+    point, value, around = _descend(peak, *_frame(grid, t), step, lambda: max_evaluations - len(known))
+    slopes = _slopes(point, value, around)
+    return ReliefOptimum(
+        torque=float(torque),
+        amount=float(point[0]) * 1e-6,
+        length=float(point[1]),
+        peak_to_peak=value * 1e-6,
+        unmodified=float(grid.unmodified[t]),
+        evaluations=len(known),
+        amount_slopes=slopes[0],
+        length_slopes=(slopes[1][0] * 1e-6 / unit, slopes[1][1] * 1e-6 / unit),
+        minimum=min(around.values()) >= value - SMALLEST_GAIN,
+    )
+
+
+def _frame(grid: ReliefGrid, t: int):
+    """Best point of the grid in micrometres and lengths, the bounds of the search, sizes of the simplex."""
+    a, b = np.unravel_index(grid.peak_to_peak[t].argmin(), grid.peak_to_peak[t].shape)
+    start = np.array([grid.amounts[a] * 1e6, grid.lengths[b]])
+    low = np.array([grid.amounts.min() * 1e4, grid.lengths.min()])
+    high = np.array([grid.amounts.max() * 1e6, grid.lengths.max()])
+    cells = np.maximum([len(grid.amounts) - 1, len(grid.lengths) - 1], 1)
+    return start, (low, high), 0.4 * np.array([np.ptp(grid.amounts) * 1e6, np.ptp(grid.lengths)]) / cells
+
+
+def _descend(peak: Callable, start, bounds, sizes, step, left: Callable[[], int]):
+    """Simplex and neighbours in turn: the best point, its value, the values of its neighbours by place."""
+    from scipy.optimize import minimize
+
+    point, size = start, np.maximum(sizes, step)
+    while True:
+        # the simplex has to lie within the bounds
+        size = np.minimum(size, 0.5 * (bounds[1] - bounds[0]))
+        inwards = np.where(point + size > bounds[1], -size, size)
+        simplex = point + np.vstack([np.zeros(2), np.diag(inwards)])
+        found = minimize(
+            peak,
+            point,
+            method="Nelder-Mead",
+            bounds=list(zip(*bounds)),
+            options={"initial_simplex": simplex, "maxfev": max(left(), 3), "xatol": 0.01, "fatol": 1e-3},
+        )
+        around = {place: peak(place) for place in _neighbours(found.x, bounds, step)}
+        best = min(around, key=around.get)
+        if around[best] >= found.fun - SMALLEST_GAIN or left() <= 0:
+            return found.x, float(found.fun), around
+        point, size = np.array(best), 2.0 * step
+
+
+def _neighbours(point, bounds, step):
+    """Up to eight places one step away, on the bound where the step would leave it."""
+    sides = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+    for side in sides:
+        place = np.clip(point + np.array(side) * step, *bounds)
+        # closer than a tenth of the step is the end of the range
+        if np.all((np.abs(place - point) > 0.1 * step) | (np.array(side) == 0)):
+            yield float(place[0]), float(place[1])
+
+
+def _slopes(point, value: float, around):
+    """Rises per unit of the first and of the second parameter, (less, more) each; NaN without a neighbour."""
+    rises = [[np.nan, np.nan], [np.nan, np.nan]]
+    for place, found in around.items():
+        away = np.array(place) - point
+        (moved,) = np.nonzero(away)
+        if len(moved) == 1:
+            rises[moved[0]][int(away[moved[0]] > 0)] = float((found - value) / abs(away[moved[0]]))
+    return [tuple(pair) for pair in rises]

@@ -1,0 +1,457 @@
+"""Load sharing of thousands of sets that differ by the positions of their planet pins, at one mesh position.
+
+At one position the contact of a planet with sun and ring is a curve, path deflection over path force, as both
+meshes of a planet carry the same force F_n. The contact problem gives it at a list of loads. With the linear
+compliance C between different planets through their common bodies and supports,
+
+    w_n = c_n(F_n) + (C F)_n + e_n - (G q)_n >= 0,   F_n >= 0,   F_n w_n = 0,   G^T F = load
+
+with separations ``e`` from the pins, and the sun's rotation and free axis motions ``q``: the contact problem
+again with one unknown a planet. What is lost is the change of C with the loads, see
+`samples.SharingModel.coupling_change`; where all planets carry the same force nothing is lost.
+
+Load sharing of many samples at once from the load-deflection curves of the planets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.cycle import walk_either_flank
+from femgear.contact.sides import mirrored_set
+from femgear.contact.solve import solve_contact
+from femgear.contact.supports import RIGID, Supports, moving_members
+from femgear.errors import CaseError, ContactError
+from femgear.gears.deviations import SetDeviations, mesh_normals, mirrored_deviations, no_deviations
+from femgear.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    from femgear.contact.assembly import Bodies
+    from femgear.gears.planetary import PlanetarySet
+
+SOFTEST = 1e-10
+"""Spring on every motion, over the stiffness of a planet: it holds motions that no loaded planet holds."""
+
+
+@dataclass(frozen=True, eq=False)
+class SharingModel:
+    """Load over deflection of every planet at one position, for `sharing_of_samples`.
+
+    Parameters
+    ----------
+    load : float
+        Sum of the sun-planet mesh forces, sun torque over base radius [N].
+    force : (K,) array
+        Path forces from 0 to `load` [N].
+    deflection : (N, K) array
+        ``c_n``: sum of the approaches of both meshes of a planet [m], rising with the force.
+    coupling : (N, N) array
+        Compliance between planets through gears and sprung members [m/N].
+    approach : (N, 1 + m) array
+        G: approach of each path per unit rotation of the sun (as an arc) and per unit free motion.
+    pin : (N, 2) array
+        Separation of the path per unit radial and tangential displacement of the planet's axis.
+    coupling_change : float
+        Largest change of the coupling through the gears over the loads of `force`, over the compliance of a
+        planet's path under the mean load.
+    """
+
+    load: float
+    force: np.ndarray
+    deflection: np.ndarray
+    coupling: np.ndarray
+    approach: np.ndarray
+    pin: np.ndarray
+    coupling_change: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sharing:
+    """Load sharing of all samples.
+
+    Parameters
+    ----------
+    share : (S, N) array
+        Shares in the sun's torque.
+    motions : (S, 1 + m) array
+        Rotation of the sun as an arc, and free motions [m].
+    residual : float
+        Largest violation: separation of loaded planets over the largest deflection, imbalance and overlap
+        likewise.
+    one_by_one : int
+        Samples that Newton's method left to the general contact solver.
+    """
+
+    share: np.ndarray
+    motions: np.ndarray
+    residual: float
+    one_by_one: int
+
+    @property
+    def factor(self) -> np.ndarray:
+        """Load sharing factor K_gamma = N max share (mesh load factor of ISO 6336-1), (S,)."""
+        return self.share.shape[1] * self.share.max(axis=1)
+
+    @property
+    def open_planets(self) -> np.ndarray:
+        """Planets without load, (S, N)."""
+        return self.share <= 0.0
+
+
+@one_blas_thread()
+def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sharing:
+    """Load sharing for many sets of pin errors at once.
+
+    Newton's method on all samples together; a planet whose force turns negative opens, one that would
+    overlap closes. Samples that have not settled go to `contact.solve.solve_contact` one by one.
+
+    Parameters
+    ----------
+    model : SharingModel
+    pins : (S, N, 2) array
+        Radial (outwards) and tangential (counter-clockwise) displacements of the planet axes [m].
+    max_steps : int
+        Of Newton's method.
+
+    Returns
+    -------
+    Sharing
+
+    Raises
+    ------
+    CaseError
+        E-RANGE: pin errors of another shape, or not finite.
+    ContactError
+        E-CONTACT-CONVERGENCE
+    """
+    pins = np.asarray(pins, float)
+    N, m = model.approach.shape
+    if pins.ndim != 3 or pins.shape[1:] != (N, 2) or not np.isfinite(pins).all():
+        raise CaseError(
+            f"pin errors of shape {pins.shape} or not finite", code="E-RANGE", limit=f"(samples, {N}, 2)"
+        )
+    separation = (pins * model.pin).sum(axis=2)
+    curves, forces = _Curves.of(model), np.full((len(pins), N), model.load / N)
+    motions, active = np.zeros((len(pins), m)), np.ones((len(pins), N), bool)
+    left = np.arange(len(pins))
+    for _ in range(max_steps):
+        if not len(left):
+            break
+        new, moved, closed = _newton(model, curves, separation[left], forces[left], active[left])
+        step = np.abs(new - forces[left]).max(axis=1)
+        settled = (step < 1e-11 * model.load) & (closed == active[left]).all(axis=1)
+        forces[left], motions[left], active[left] = new, moved, closed
+        left = left[~settled]
+    for sample in left:
+        forces[sample], motions[sample] = _one(model, curves, separation[sample])
+    residual = _residual(model, curves, separation, forces, motions)
+    if not residual < 1e-6:
+        raise ContactError(
+            f"load sharing of {len(pins)} samples ends with a residual of {residual:.3g}",
+            code="E-CONTACT-CONVERGENCE",
+            limit="1e-6",
+        )
+    return Sharing(forces / model.load, motions, residual, len(left))
+
+
+@dataclass(frozen=True)
+class _Curves:
+    """Monotone piecewise cubics through the curves, straight beyond their ends."""
+
+    value: tuple
+    slope: tuple
+    last: float
+
+    @classmethod
+    def of(cls, model: SharingModel) -> _Curves:
+        from scipy.interpolate import PchipInterpolator
+
+        if not np.all(np.diff(model.deflection, axis=1) > 0):
+            raise ContactError("the deflection of a planet falls with its load", code="E-CONTACT-COMPLIANCE")
+        found = [PchipInterpolator(model.force, row) for row in model.deflection]
+        return cls(tuple(found), tuple(f.derivative() for f in found), float(model.force[-1]))
+
+    def at(self, forces):
+        """Deflections and their slopes at (S, N) forces."""
+        inside = np.clip(forces, 0.0, self.last)
+        slope = np.stack([f(inside[:, n]) for n, f in enumerate(self.slope)], axis=1)
+        value = np.stack([f(inside[:, n]) for n, f in enumerate(self.value)], axis=1)
+        return value + slope * (forces - inside), slope
+
+
+def _newton(model, curves, separation, forces, active):
+    """One step of all samples: forces, motions, and the planets that then carry."""
+    S, N = forces.shape
+    G, m = model.approach, model.approach.shape[1]
+    unit = float(model.deflection[:, -1].mean() / model.load)
+    value, slope = curves.at(forces)
+    matrix = np.zeros((S, N + m, N + m))
+    matrix[:, :N, :N] = model.coupling / unit
+    matrix[:, np.arange(N), np.arange(N)] += slope / unit
+    matrix[:, :N, N:] = -G
+    matrix[:, N:, :N] = G.T
+    matrix[:, np.arange(N, N + m), np.arange(N, N + m)] = SOFTEST
+    right = np.zeros((S, N + m))
+    right[:, :N] = (slope * forces - value - separation) / unit
+    right[:, N] = model.load
+    sample, planet = np.nonzero(~active)
+    matrix[sample, planet] = 0.0
+    matrix[sample, planet, planet] = 1.0
+    right[sample, planet] = 0.0
+    found = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+    new, motions = found[:, :N], found[:, N:] * unit
+    gap = model.deflection[:, 0] + new @ model.coupling + separation - motions @ G.T
+    closed = np.where(active, new > 0.0, gap < 0.0)
+    return np.where(closed, new, 0.0), motions, closed
+
+
+def _one(model, curves, separation):
+    """Forces and motions of one sample: linear contact problems about the last forces until they settle."""
+    N, m = model.approach.shape
+    load = np.zeros(m)
+    load[0] = model.load
+    forces = np.full((1, N), model.load / N)
+    for step in range(200):
+        value, slope = curves.at(forces)
+        gap = (value - slope * forces)[0] + separation
+        state = solve_contact(model.coupling + np.diag(slope[0]), gap, model.approach, load)
+        change = np.abs(state.loads - forces[0]).max()
+        forces = forces + (state.loads - forces) * (1.0 if step < 30 else 0.5)
+        if change < 1e-10 * model.load:
+            return state.loads, state.motions
+    raise ContactError("the load sharing of a sample does not settle", code="E-CONTACT-CONVERGENCE")
+
+
+def _residual(model, curves, separation, forces, motions) -> float:
+    """Largest violation of contact and equilibrium over all samples."""
+    value, _ = curves.at(forces)
+    gap = value + forces @ model.coupling + separation - motions @ model.approach.T
+    gap = np.where(forces > 0, np.abs(gap), np.maximum(-gap, 0.0)).max() / model.deflection[:, -1].max()
+    load = np.zeros(model.approach.shape[1])
+    load[0] = model.load
+    balance = np.abs(forces @ model.approach - load).max() / model.load
+    return float(max(gap, balance))
+
+
+MOST_SAMPLES = 1_000_000
+
+
+def pin_samples(n_planets: int, *, samples: int, radial: float, tangential: float, seed: int) -> np.ndarray:
+    """Normally distributed, independent pin errors (S, N, 2): radial and tangential [m].
+
+    Parameters
+    ----------
+    n_planets, samples : int
+    radial, tangential : float
+        Standard deviations [m].
+    seed : int
+        Of NumPy's default generator; the same seed gives the same samples.
+
+    Raises
+    ------
+    CaseError
+        E-RANGE: no samples or more than a million, negative deviations.
+    """
+    if not 1 <= samples <= MOST_SAMPLES:
+        raise CaseError(
+            "the number of samples is not usable", code="E-RANGE", value=samples, limit=f"1 to {MOST_SAMPLES}"
+        )
+    scale = np.array([radial, tangential], float)
+    if not (np.isfinite(scale).all() and (scale >= 0).all()):
+        raise CaseError("a standard deviation is negative", code="E-RANGE", value=scale, limit="0 m or more")
+    return np.random.default_rng(seed).standard_normal((samples, n_planets, 2)) * scale
+
+
+@one_blas_thread()
+def sharing_model(
+    planetary_set: PlanetarySet,
+    bodies: Bodies,
+    *,
+    sun_torque: float,
+    position: int = 0,
+    positions: int = 8,
+    contact: str = "profile",
+    supports: Supports = RIGID,
+    deviations: SetDeviations | None = None,
+    loads: int = 40,
+    progress: Callable[[int, int], None] | None = None,
+) -> SharingModel:
+    """Load-deflection curves of all planets at one position, from the contact problem at several loads.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    bodies : Bodies
+    sun_torque : float
+        [N m]; the curves reach to where one planet carries all of it.
+    position, positions : int
+        Number of the position among those of one mesh period.
+    contact, supports, deviations
+        As for `contact.cycle.walk_mesh_cycle`; samples add to the pin errors of the deviations.
+    loads : int
+        Points of a curve.
+    progress : callable, optional
+        Called with (loads done, loads).
+
+    Returns
+    -------
+    SharingModel
+        For a negative torque of the mirrored set, with planets and signs of the original.
+
+    Raises
+    ------
+    CaseError
+        E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
+    ContactError
+    """
+    if not (np.isfinite(sun_torque) and sun_torque):
+        raise CaseError("without torque there is nothing to share", code="E-TORQUE", value=sun_torque)
+    if not 0 <= position < positions:
+        raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {positions - 1}")
+    if supports.planet_clearance:
+        raise CaseError(
+            "the load sharing of samples knows no clearance of the planet bearings",
+            code="E-SUPPORT",
+            key="planet.bearing_clearance",
+            value=f"{supports.planet_clearance * 1e6:.6g} um",
+            limit="0 um",
+            remedy='set it to zero, or solve single cases with static.members = "elastic"',
+        )
+    solved, order = planetary_set, np.arange(planetary_set.n_planets)
+    if sun_torque < 0:
+        solved, order = mirrored_set(planetary_set)
+        if deviations is not None:
+            deviations = mirrored_deviations(deviations, planetary_set, solved, order)
+        position = -position
+    N = solved.n_planets
+    load = abs(sun_torque) / solved.sun.base_radius
+    # planets open and close at small loads, where a line contact changes most
+    force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
+    place = {"positions": np.array([position / positions]), "contact": contact, "deviations": deviations}
+    deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
+    for k, one in enumerate(force):
+        deflection[:, k], coupling[k] = _paths(solved, bodies, max(one, 1e-9 * load), place)
+        if progress is not None:
+            progress(k + 1, len(force))
+    mean = int(np.abs(force - load / N).argmin())
+    between = coupling[mean]
+    change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
+    deflection -= np.outer(between.sum(axis=1), force)
+    return _placed(
+        solved, order, load, force, deflection, between, supports, float(change), mirrored=sun_torque < 0
+    )
+
+
+def _placed(s, order, load, force, deflection, between, supports, change, *, mirrored) -> SharingModel:
+    """The model with supports and directions, its planets in the original order."""
+    N = s.n_planets
+    members = moving_members(s, supports)
+    path = members.approach[:N] + members.approach[N:]
+    sprung, free = path[:, ~members.free], path[:, members.free]
+    coupling = between + (sprung / members.stiffness[~members.free]) @ sprung.T
+    back = np.argsort(order)
+    pin = pin_directions(s)
+    return SharingModel(
+        load=load,
+        force=force,
+        deflection=deflection[back],
+        coupling=coupling[np.ix_(back, back)],
+        approach=np.column_stack([np.ones(N), free])[back],
+        pin=(pin * np.array([1.0, -1.0]) if mirrored else pin)[back],
+        coupling_change=change,
+    )
+
+
+def pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
+    """Separation of every path per unit radial and tangential displacement of its pin, (N, 2).
+
+    ``(n_sp - n_pr) . u`` with the normals of `gears.deviations.mesh_normals`.
+    """
+    s, N = planetary_set, planetary_set.n_planets
+    normals = mesh_normals(s)
+    psi = np.asarray(s.planet_angles)
+    radial = np.stack([np.cos(psi), np.sin(psi)], axis=1)
+    tangential = np.stack([-np.sin(psi), np.cos(psi)], axis=1)
+    along = normals[:N] - normals[N:]
+    return np.stack([(along * radial).sum(axis=1), (along * tangential).sum(axis=1)], axis=1)
+
+
+def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
+    """Path deflections (N,) and compliance between planets (N, N) with the same force in all meshes."""
+    N = s.n_planets
+    share, nearest = force, 3.0 * force / (10e9 * bodies.face_width)
+    for _ in range(8):
+        setup = mesh_windows(
+            s,
+            bodies,
+            share=share,
+            cells=36,
+            nearest=nearest,
+            **place,
+        )
+        # the record of the windows begins at the position
+        problem = assemble_contact(setup, bodies, 0)
+        mesh = problem.mesh[:, None] == np.arange(2 * N)
+        state = solve_contact(problem.H, problem.gap, mesh.astype(float), np.full(2 * N, force))
+        overflow = problem.touches_window_end(state.active, setup)
+        gap = setup.smallest_gap[:, 0]
+        outside = ~setup.near[:, 0] & (gap < state.motions[:, None])
+        outside = outside.any() and place["contact"] == "profile"
+        if not overflow and not outside:
+            break
+        share *= 4.0 if overflow else 1.0
+        nearest *= 2.0 if outside else 1.0
+    else:
+        raise ContactError(
+            "the contact windows do not contain the contact after seven enlargements",
+            code="E-CONTACT-WINDOW",
+            remedy="reduce operation.torque or the errors",
+        )
+    loads = mesh * state.loads[:, None]
+    compliance = loads.T @ problem.H @ loads / force**2
+    between = compliance.reshape(2, N, 2, N).sum(axis=(0, 2))
+    np.fill_diagonal(between, 0.0)
+    return state.motions[:N] + state.motions[N:], between
+
+
+@one_blas_thread()
+def walked_shares(
+    planetary_set: PlanetarySet,
+    bodies: Bodies,
+    pins,
+    *,
+    sun_torque: float,
+    position: int = 0,
+    positions: int = 8,
+    contact: str = "profile",
+    supports: Supports = RIGID,
+    deviations: SetDeviations | None = None,
+) -> np.ndarray:
+    """Shares (S, N) of a few samples from the whole contact problem, to check `sharing_of_samples`.
+
+    Parameters
+    ----------
+    pins : (S, N, 2) array
+        See there.
+    planetary_set, bodies, sun_torque, position, positions, contact, supports, deviations
+        As for `sharing_model`.
+    """
+    base = no_deviations(planetary_set) if deviations is None else deviations
+    shares = []
+    for errors in np.asarray(pins, float):
+        cycle = walk_either_flank(
+            planetary_set,
+            bodies,
+            sun_torque=sun_torque,
+            positions=positions,
+            contact=contact,
+            supports=supports,
+            deviations=replace(base, pin_errors=base.pin_errors + errors),
+        )
+        shares.append(cycle.load_share[:, position])
+    return np.array(shares)

@@ -1,0 +1,327 @@
+"""Many cases: quantities over all combinations of values of some entries of the case file, resumable.
+
+A sweep from the words of a command line to its files.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import math
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from femgear.case.case import with_value
+from femgear.case.sections import Case
+from femgear.errors import CaseError
+from femgear.storage.files import storage_errors, write_text
+from femgear.study.names import named_quantity
+from femgear.study.objectives import Quantity
+from femgear.study.problem import Failure, Progress, open_designs
+from femgear.study.variables import Variable, split
+from femgear.threads import one_blas_thread
+
+LARGEST = 100_000
+"""Combinations at most."""
+MANY = 1000
+"""Combinations from which their time is estimated and said."""
+_WITHOUT_EFFECT = {"title", "format"}
+_TIMED = 3
+_RANGE = re.compile(r"(.+?)\.\.(.+?)/\s*(\d{1,6})\s*", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Quantities of all combinations.
+
+    Parameters
+    ----------
+    keys : tuple of str
+    points : tuple of tuple
+        Values as the case file holds them; the last key runs fastest.
+    quantities : tuple of Quantity
+    values : (points, quantities) array
+        [SI]; NaN where a case cannot be computed.
+    errors : tuple of str
+        Why, one a point; empty where it can.
+    computed : int
+        Cases computed now; a journal held the others.
+    seconds : float
+        What a case computed now took on average.
+    """
+
+    keys: tuple[str, ...]
+    points: tuple[tuple[object, ...], ...]
+    quantities: tuple[Quantity, ...]
+    values: np.ndarray
+    errors: tuple[str, ...]
+    computed: int
+    seconds: float
+
+    @property
+    def header(self) -> tuple[str, ...]:
+        """Names of the columns of `records`, units of quantities in brackets."""
+        return (*self.keys, *(f"{q.name} [{q.dimension.si}]" for q in self.quantities), "error")
+
+    def records(self) -> Iterator[tuple[object, ...]]:
+        """Rows of a table."""
+        for point, values, error in zip(self.points, self.values, self.errors, strict=True):
+            yield (*point, *(float(value) for value in values), error)
+
+
+@one_blas_thread()
+def sweep(
+    case: Case,
+    over: Mapping[str, Sequence[object]],
+    quantities: Sequence[Quantity],
+    *,
+    journal: str | Path | None = None,
+    cache: Path | None = None,
+    progress: Progress | None = None,
+) -> Sweep:
+    """Quantities of a case over values of entries of its file.
+
+    Parameters
+    ----------
+    case : Case
+    over : mapping of str to sequence
+        Values of dotted keys, as the case file would hold them; all combinations are computed.
+    quantities : sequence of Quantity
+    journal : path-like, optional
+        File that keeps every case; an interrupted sweep goes on from it.
+    cache, progress
+        As for `search.minimise`.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    CaseError
+        E-SWEEP: nothing to compute, or too much; values that the case file refuses.
+    """
+    keys, quantities = tuple(over), tuple(quantities)
+    count = check_sweep(case, over, quantities)
+    points = tuple(itertools.product(*over.values()))
+    table, errors = np.full((count, len(quantities)), np.nan), []
+    keyed, warned = [(key,) for key in keys], False
+    with open_designs(case, keyed, journal=journal, cache=cache) as designs:
+        for i, point in enumerate(points):
+            try:
+                found = designs.values(point, quantities)
+                table[i] = [found[quantity.name] for quantity in quantities]
+                errors.append("")
+            except Failure as failure:
+                errors.append(f"[{failure.error['code']}] {failure}")
+            if progress is not None:
+                progress("cases", i + 1, count)
+            if count >= MANY and i < count - 1 and not warned and designs.computed == _TIMED:
+                warned = True
+                _warn_of_time(count - i - 1, designs.seconds / _TIMED)
+        seconds = designs.seconds / max(designs.computed, 1)
+        return Sweep(keys, points, quantities, table, tuple(errors), designs.computed, seconds)
+
+
+def check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity]) -> int:
+    """Number of cases; what `sweep` refuses is refused."""
+    count = math.prod(len(values) for values in over.values()) if over else 0
+    if not (0 < count <= LARGEST and quantities):
+        raise CaseError(
+            f"{count} cases with {len(quantities)} quantities",
+            code="E-SWEEP",
+            limit=f"1 to {LARGEST} cases, at least one quantity",
+        )
+    for key, values in over.items():
+        if key.split(".")[0] in _WITHOUT_EFFECT:
+            raise CaseError(
+                f"{key} changes no quantity", code="E-SWEEP", key="--over", value=key,
+                limit="entries that the computation uses",
+            )  # fmt: skip
+        for value in values:
+            with_value(case, key, value)
+    check_stages(case, quantities, over)
+    return count
+
+
+def check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str] = ()) -> None:
+    """Refuse quantities that the case can never have.
+
+    Raises
+    ------
+    CaseError
+        E-NO-LOAD: what needs a torque without one; E-STAGE: a planar or helical case has no elastic ring.
+    """
+    stages = {quantity.stage for quantity in quantities}
+    elastic = [quantity.name for quantity in quantities if quantity.stage in ("dynamics", "housing")]
+    other = [name for name in ("planar", "helical") if getattr(case, name, None) is not None]
+    if elastic and other:
+        raise CaseError(
+            f"{elastic[0]} needs a case with an elastic ring", code="E-STAGE", key=other[0],
+            limit="transmission error, contact ratio, tip thickness, contact pressure, root stress",
+        )  # fmt: skip
+    # transmission errors may name a torque of their own
+    loaded = any(key.startswith("operation") for key in keys) or any("N m" in q.name for q in quantities)
+    if stages - {"gears"} and case.operation.torque == 0.0 and not loaded:
+        raise CaseError(
+            "without torque no tooth carries load", code="E-NO-LOAD", key="operation.torque",
+            limit="not zero for transmission errors, forces and stresses", remedy="give a torque",
+        )  # fmt: skip
+
+
+def _warn_of_time(left: int, seconds: float) -> None:
+    total = left * seconds
+    shown = f"{total / 3600.0:.1f} h" if total > 5400.0 else f"{total / 60.0:.1f} min"
+    print(
+        f"[W-SWEEP] {left} more cases of about {seconds:.2g} s each: {shown}; "
+        "an interrupted sweep goes on where it was",
+        file=sys.stderr,
+    )
+
+
+def parse_over(text: str) -> tuple[str, list[object]]:
+    """Key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``.
+
+    Raises
+    ------
+    CaseError
+        E-SWEEP: no key, no values, or a range of less than two.
+    """
+    key, equals, values = (part.strip() for part in text.partition("="))
+    if not (key and equals and values):
+        raise _not_over(text)
+    if match := _RANGE.fullmatch(values):
+        low, high = (_value(part) for part in match.groups()[:2])
+        if int(match[3]) < 2:
+            raise _not_over(text)
+        variable = Variable(key, low, high)
+        found = [variable.text(float(x)) for x in np.linspace(*variable.bounds, int(match[3]))]
+        return key, found
+    found = [_value(part) for part in values.split(",")]
+    if any(value == "" for value in found):
+        raise _not_over(text)
+    return key, found
+
+
+def _value(text: str) -> object:
+    """A value of the command line as the case file holds it: whole number, number, truth value or text."""
+    text = text.strip()
+    if text in ("true", "false"):
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text.strip("\"'")
+
+
+def _not_over(text: str) -> CaseError:
+    return CaseError(
+        "not a key with values",
+        code="E-SWEEP",
+        key="--over",
+        value=text,
+        limit="KEY=V1,V2,V3 or KEY=LOW..HIGH/COUNT with a count of 2 or more",
+        remedy='--over "operation.torque=50 N m, 100 N m" --over "sun.modifications[0].amount=0 um..12 um/7"',
+    )
+
+
+JOURNAL, TABLE, FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
+
+
+def sweep_into(
+    case: Case,
+    folder: Path,
+    *,
+    over: Sequence[str],
+    of: Sequence[str] = ("ste",),
+    speeds: tuple[str, str] | None = None,
+    cache: Path | None = None,
+    progress: Progress | None = None,
+) -> tuple[Sweep, list[str]]:
+    """Compute a sweep, or what is left of it, and write its table and figure.
+
+    Parameters
+    ----------
+    case : Case
+    folder : path
+        Created where it does not exist.
+    over : sequence of str
+        As `sweep.parse_over` takes them.
+    of : sequence of str
+        Quantities, see `names.NAMES`.
+    speeds : (str, str), optional
+        First and last speed of the input, for mesh forces and housing levels.
+    cache, progress
+        As for `search.minimise`.
+
+    Returns
+    -------
+    Sweep
+    list of str
+        Names of the files.
+
+    Raises
+    ------
+    CaseError
+        E-SWEEP, E-OBJECTIVE: what cannot be computed; nothing is written then.
+    StorageError
+    """
+    values = dict(parse_over(text) for text in over)
+    if len(values) < len(over):
+        raise CaseError("a key is given twice", code="E-SWEEP", key="--over", value=", ".join(over))
+    quantities = [named_quantity(words, speeds=speeds) for words in of]
+    check_sweep(case, values, quantities)
+    with storage_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    options = {"journal": folder / JOURNAL, "cache": cache, "progress": progress}
+    found = sweep(case, values, quantities, **options)
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(found.header)
+    for row in found.records():
+        writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
+    write_text(stream.getvalue(), folder / TABLE)
+    names = [TABLE, JOURNAL]
+    if np.isfinite(found.values).any():
+        _draw(found, [len(one) for one in values.values()], folder / FIGURE)
+        names.append(FIGURE)
+    return found, names
+
+
+def _draw(found: Sweep, counts: Sequence[int], path: Path) -> None:
+    """Curves over the last key, one for every combination of the others, at most twelve of them."""
+    from femgear.report.style import save_figure
+    from femgear.study.figures import sweep_curves
+
+    last = counts[-1]
+    scale = np.array([quantity.dimension.scale for quantity in found.quantities])
+    curves = (found.values / scale).reshape(-1, last, len(scale))
+    others = [point[:-1] for point in found.points[::last]]
+    names = [
+        ", ".join(f"{key} = {value}" for key, value in zip(found.keys, point, strict=False))
+        for point in others
+    ]
+    x, unit = _axis([point[-1] for point in found.points[:last]])
+    titles = [f"{q.name} [{q.dimension.shown}]".replace("[um]", "[µm]") for q in found.quantities]
+    axis = f"{found.keys[-1]} [{unit}]" if unit else found.keys[-1]
+    save_figure(sweep_curves(x, curves[:12], names=names[:12], axis=axis, quantities=titles), path)
+
+
+def _axis(values: Sequence[object]) -> tuple[Sequence[object], str]:
+    """Numbers and their unit where all values are numbers in one unit, else their texts."""
+    try:
+        parts = [split(value, "value") for value in values]
+    except CaseError:
+        return [str(value) for value in values], ""
+    units = {unit for _, unit in parts}
+    if len(units) > 1:
+        return [str(value) for value in values], ""
+    return [number for number, _ in parts], units.pop()

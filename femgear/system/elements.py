@@ -1,0 +1,468 @@
+"""Springs between motions: gear meshes with play, bearings with clearance, polynomial and piecewise laws.
+
+An element acts on groups of columns of ``W`` and gives, for their deflections ``x = W^T q``, the forces
+``f(x, t)`` of ``M q'' + C q' + K q + W f = load`` and the tangents ``df/dx``, for all instants at once.
+
+Instants of a period at which tangents jump: contacts that open or close, steps of a stiffness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.system.entries import checked_numbers
+from femgear.system.series import FourierSeries, StepSeries, constant, series_of
+from femgear.system.system import MeshExcitation
+
+# Phases a harmonic at which the sign of a stiffness is looked at, and rounding of its size.
+_PHASES, _ROUNDING = 32, 1e-12
+
+
+class Element(Protocol):
+    """What a solver asks of an element.
+
+    ``columns`` (g, d) int array: g independent groups of d columns of ``W``. ``reference`` (g, d): a linear
+    stiffness [N/m] near which it works. ``evaluate(x, theta)``: from deflections x (..., g, d) [m] and phases
+    theta (..., n_bases) [rad], forces (..., g, d) [N] and tangents (..., g, d, d) [N/m].
+    """
+
+    columns: np.ndarray
+
+    @property
+    def reference(self) -> np.ndarray: ...
+
+    def evaluate(self, x, theta) -> tuple[np.ndarray, np.ndarray]: ...
+
+
+def positive_part(x, smoothing=0.0) -> tuple[np.ndarray, np.ndarray]:
+    """``max(x, 0)`` and its slope; with a smoothing length s, ``(x + sqrt(x^2 + s^2)) / 2``.
+
+    The smooth form differs by at most s / 2, at the corner (NREL/CP-5000-55355 smooths its contacts so).
+    """
+    if not np.any(smoothing):
+        closed = x > 0.0
+        return np.where(closed, x, 0.0), closed.astype(float)
+    root = np.sqrt(x * x + np.asarray(smoothing) ** 2)
+    return 0.5 * (x + root), 0.5 * (1.0 + x / root)
+
+
+@dataclass(frozen=True)
+class GearMeshes:
+    """Gear meshes ``phi(F) - phi(-F - k b)`` with ``F = force + k (x - deflection)`` and ``phi = max(., 0)``.
+
+    The tangent line of a loaded mesh, cut where the drive flanks part and taken up again when the teeth have
+    crossed the backlash. With ``separates`` false the line goes on into tension.
+
+    Parameters
+    ----------
+    columns : (g,) or (g, 1) int array
+    stiffness : FourierSeries or StepSeries
+        ``k`` of every mesh [N/m].
+    deflection : FourierSeries or StepSeries, optional
+        Deflection of the mesh at the state about which it is linear [m]; zero when not given. With `force`
+        zero this is the unloaded transmission error.
+    force : FourierSeries or StepSeries, optional
+        Force at that state [N]; zero when not given.
+    backlash : (g,) array or float
+        Total play along the line of action [m]; infinite when there is no back side.
+    smoothing : float
+        Length [m] over which contact sets in, see `positive_part`.
+    separates : bool
+        Whether the flanks part. Teeth that do cannot pull: their stiffness must not be negative anywhere.
+    """
+
+    columns: np.ndarray
+    stiffness: FourierSeries | StepSeries
+    deflection: FourierSeries | StepSeries | None = None
+    force: FourierSeries | StepSeries | None = None
+    backlash: np.ndarray | float = np.inf
+    smoothing: float = 0.0
+    separates: bool = True
+
+    def __post_init__(self):
+        columns = _columns(self.columns, 1)
+        backlash = np.broadcast_to(_numbers(self.backlash, "backlash", "E-BACKLASH"), len(columns)).copy()
+        object.__setattr__(self, "columns", columns)
+        object.__setattr__(self, "backlash", backlash)
+        for name in ("deflection", "force"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, constant(np.zeros(len(columns))))
+        _positive("smoothing length", self.smoothing)
+        if np.any(np.isnan(backlash)) or np.any(backlash < 0.0):
+            raise CaseError(
+                f"backlash of {backlash.min():.4g} m", code="E-BACKLASH", limit="0 m or more, or infinite"
+            )
+        for name in ("stiffness", "deflection", "force"):
+            series = getattr(self, name)
+            if not hasattr(series, "mean") or len(np.atleast_1d(series.mean)) != len(columns):
+                count = len(np.atleast_1d(series.mean)) if hasattr(series, "mean") else "no"
+                raise CaseError(
+                    f"{count} series of the mesh {name} for {len(columns)} meshes", code="E-SHAPE", key=name,
+                    remedy="give FourierSeries([[mean, ...], ...]) or StepSeries, one row a mesh",
+                )  # fmt: skip
+        if self.separates:
+            _check_pressing(self.stiffness)
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Mean mesh stiffness, (g, 1) [N/m]."""
+        return self.stiffness.mean[:, None]
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+        k = self.stiffness.at(theta)
+        line = self.force.at(theta) + k * (x[..., 0] - self.deflection.at(theta))
+        if not self.separates:
+            return line[..., None], np.broadcast_to(k, line.shape)[..., None, None]
+        force, slope = positive_part(line, self.smoothing * k)
+        if np.isfinite(self.backlash).any():
+            has_back = np.isfinite(self.backlash)
+            play = k * np.where(has_back, self.backlash, 0.0)
+            back, back_slope = positive_part(-line - play, self.smoothing * k)
+            force, slope = force - has_back * back, slope + has_back * back_slope
+        return force[..., None], (k * slope)[..., None, None]
+
+
+def gear_meshes(
+    excitation: MeshExcitation,
+    *,
+    harmonics: int,
+    columns=None,
+    separates: bool = True,
+    smoothing: float = 0.0,
+    orders: tuple[int, ...] = (1,),
+) -> GearMeshes:
+    """The meshes of a static record, each series cut to ``harmonics`` mesh harmonics.
+
+    Parameters
+    ----------
+    excitation : MeshExcitation
+        Its zero backlashes mean that there is no back side.
+    harmonics : int
+        Mesh harmonics kept.
+    columns : (g,) int array, optional
+        Columns of ``W``; the first ones when not given.
+    orders : tuple of int
+        Orders of the mesh frequency; the record's own period counts ``periods`` mesh periods, so with
+        ``periods`` above one the base frequency must be the mesh frequency over ``periods``.
+    """
+    count = harmonics * excitation.periods
+    names = ("stiffness", "deflection", "force")
+    series = {name: series_of(getattr(excitation, name), count, orders=orders) for name in names}
+    backlash = np.where(excitation.backlash > 0.0, excitation.backlash, np.inf)
+    columns = np.arange(len(excitation.stiffness)) if columns is None else columns
+    return GearMeshes(columns, **series, backlash=backlash, separates=separates, smoothing=smoothing)
+
+
+@dataclass(frozen=True)
+class RadialBearings:
+    """Bearings with radial clearance: a ring of one-sided radial springs.
+
+    With infinitely many springs ``F(r) = (2 k / pi) [r (p + sin p cos p) - 2 c sin p]``, ``cos p = c / r``,
+    beyond the clearance c, zero within (integral of the springs over the loaded arc; for c = 0 it is
+    ``k r``). With n springs each has the stiffness ``4 k / n``.
+
+    Parameters
+    ----------
+    columns : (g, 2) int array
+        x and y of the inner relative to the outer ring.
+    stiffness : (g,) array or float
+        ``k`` [N/m].
+    clearance : (g,) array or float
+        Radial, from the centred position [m].
+    springs : int, optional
+        Number of springs, the first on the x axis; the continuous limit when not given.
+    smoothing : float
+        Length over which a spring sets in [m]; only with a number of springs, the limit is smooth.
+    """
+
+    columns: np.ndarray
+    stiffness: np.ndarray | float
+    clearance: np.ndarray | float = 0.0
+    springs: int | None = None
+    smoothing: float = 0.0
+    directions: np.ndarray | None = field(init=False, default=None)
+
+    def __post_init__(self):
+        columns = _columns(self.columns, 2)
+        object.__setattr__(self, "columns", columns)
+        for name in ("stiffness", "clearance"):
+            value = np.broadcast_to(_numbers(getattr(self, name), name), len(columns)).copy()
+            if not np.all(np.isfinite(value)) or np.any(value < 0.0):
+                raise CaseError(f"bearing {name} of {value.min():.4g}", code="E-BEARING", limit="0 or more")
+            object.__setattr__(self, name, value)
+        _positive("smoothing length", self.smoothing)
+        if self.springs is None:
+            if self.smoothing:
+                raise CaseError(
+                    "a continuous bearing needs no smoothing", code="E-BEARING", key="smoothing",
+                    remedy="give a number of springs or no smoothing length",
+                )  # fmt: skip
+            return
+        if self.springs < 3:
+            raise CaseError(
+                f"a bearing of {self.springs} springs", code="E-BEARING", key="springs", limit="3 or more"
+            )
+        angle = 2.0 * np.pi * np.arange(self.springs) / self.springs
+        object.__setattr__(self, "directions", np.stack([np.cos(angle), np.sin(angle)], axis=1))
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Stiffness without clearance, (g, 2) [N/m]."""
+        return np.repeat(self.stiffness[:, None], 2, axis=1)
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 2) and tangents (..., g, 2, 2)."""
+        return self._continuous(x) if self.springs is None else self._discrete(x)
+
+    def _continuous(self, x):
+        r = np.hypot(x[..., 0], x[..., 1])
+        touching = (r > self.clearance) & (r > 0.0)
+        safe = np.where(touching, r, 1.0)
+        cosine = np.where(touching, self.clearance / safe, 1.0)
+        half = np.arccos(cosine)
+        sine = np.sqrt(1.0 - cosine * cosine)
+        factor = 2.0 * self.stiffness / np.pi
+        radial = np.where(touching, factor * (half + sine * cosine), 0.0)
+        secant = np.where(touching, radial - 2.0 * factor * cosine * sine, 0.0)
+        # at rest in the centre of a bearing without clearance the law is linear
+        centred = (self.clearance == 0.0) & ~touching
+        radial, secant = np.where(centred, self.stiffness, radial), np.where(centred, self.stiffness, secant)
+        unit = x / safe[..., None]
+        tangent = (radial - secant)[..., None, None] * unit[..., :, None] * unit[..., None, :]
+        return secant[..., None] * x, tangent + secant[..., None, None] * np.eye(2)
+
+    def _discrete(self, x):
+        each = 4.0 * self.stiffness / self.springs
+        stretch = x @ self.directions.T - self.clearance[:, None]
+        force, slope = positive_part(stretch, self.smoothing)
+        forces = (each[:, None] * force) @ self.directions
+        tangents = np.einsum("...gs,si,sj->...gij", each[:, None] * slope, self.directions, self.directions)
+        return forces, tangents
+
+
+@dataclass(frozen=True)
+class PolynomialSprings:
+    """``f = sum_d coefficients[d - 1] x^d``.
+
+    Parameters
+    ----------
+    columns : (g,) int array
+    coefficients : (g, degree) array
+        Of x, x^2, x^3, ... [N/m, N/m^2, ...].
+    """
+
+    columns: np.ndarray
+    coefficients: np.ndarray
+
+    def __post_init__(self):
+        columns = _columns(self.columns, 1)
+        table = np.atleast_2d(_numbers(self.coefficients, "coefficients"))
+        if not np.all(np.isfinite(table)):
+            raise CaseError(
+                f"coefficients {table.tolist()}", code="E-FINITE", key="coefficients", limit="finite numbers"
+            )
+        if len(table) != len(columns):
+            raise CaseError(
+                f"{len(table)} rows of coefficients for {len(columns)} springs", code="E-SHAPE",
+                limit="one row a spring",
+            )  # fmt: skip
+        object.__setattr__(self, "columns", columns)
+        object.__setattr__(self, "coefficients", table)
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Stiffness at rest, (g, 1) [N/m]."""
+        return self.coefficients[:, :1]
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+        x = x[..., 0]
+        force, slope = np.zeros_like(x), np.zeros_like(x)
+        for coefficient in self.coefficients.T[::-1]:
+            slope = slope * x + force + coefficient
+            force = (force + coefficient) * x
+        return force[..., None], slope[..., None, None]
+
+
+@dataclass(frozen=True)
+class PiecewiseSprings:
+    """Continuous piecewise linear springs without force at ``x = 0``.
+
+    Parameters
+    ----------
+    columns : (g,) int array
+    breaks : (m,) array
+        Ascending deflections where the slope changes [m].
+    slopes : (m + 1,) array
+        Slopes below, between and above the breaks [N/m].
+    smoothing : float
+        Length over which a slope changes [m], see `positive_part`; the force at rest stays zero.
+    """
+
+    columns: np.ndarray
+    breaks: np.ndarray
+    slopes: np.ndarray
+    smoothing: float = 0.0
+
+    def __post_init__(self):
+        columns = _columns(self.columns, 1)
+        breaks, slopes = np.atleast_1d(_numbers(self.breaks, "breaks")), _numbers(self.slopes, "slopes")
+        if not (np.all(np.isfinite(breaks)) and np.all(np.isfinite(slopes))):
+            raise CaseError(
+                f"breaks {breaks.tolist()} with slopes {slopes.tolist()}",
+                code="E-FINITE",
+                limit="finite numbers",
+            )
+        if len(slopes) != len(breaks) + 1 or np.any(np.diff(breaks) <= 0.0):
+            raise CaseError(
+                f"{len(slopes)} slopes with breaks {breaks.tolist()}", code="E-SHAPE",
+                limit="ascending breaks and one more slope than breaks",
+            )  # fmt: skip
+        _positive("smoothing length", self.smoothing)
+        for name, value in (("columns", columns), ("breaks", breaks), ("slopes", slopes)):
+            object.__setattr__(self, name, value)
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Mean of the lowest and the highest slope, (g, 1) [N/m]."""
+        return np.full((len(self.columns), 1), 0.5 * (self.slopes.min() + self.slopes.max()))
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
+        x = x[..., 0]
+        change = np.diff(self.slopes)
+        part, slope = positive_part(x[..., None] - self.breaks, self.smoothing)
+        rest, _ = positive_part(-self.breaks, self.smoothing)
+        force = self.slopes[0] * x + (part - rest) @ change
+        return force[..., None], (self.slopes[0] + slope @ change)[..., None, None]
+
+
+def _check_pressing(stiffness) -> None:
+    """Refuse a stiffness of parting teeth that is negative somewhere in its period."""
+    if isinstance(stiffness, StepSeries):
+        values, turn = stiffness.values, stiffness.breaks
+    elif isinstance(stiffness, FourierSeries):
+        count = stiffness.amplitudes.shape[1]
+        turn = np.arange(_PHASES * count) / (_PHASES * count)
+        wave = np.exp(2j * np.pi * turn[:, None] * np.arange(count))
+        values = (stiffness.amplitudes @ wave.T).real
+    else:
+        return  # values on a grid, of a series that has been checked
+    lowest = values.min(axis=1)
+    mesh = int(np.argmin(lowest))
+    if not lowest[mesh] >= -_ROUNDING * np.abs(values[mesh]).max():
+        instant = float(turn[np.argmin(values[mesh])])
+        raise CaseError(
+            f"the stiffness of mesh {mesh + 1} is {lowest[mesh]:.4g} N/m at {instant:.4g} of its period, and "
+            "its teeth part", code="E-STIFFNESS", key="stiffness", value=float(lowest[mesh]),
+            limit="0 N/m or more at every instant",
+            remedy="lower the fluctuation or keep other harmonics of k(t), or take separates=False for a "
+            "line that may pull",
+        )  # fmt: skip
+
+
+def _columns(columns, width: int) -> np.ndarray:
+    """Columns as a (g, width) integer array."""
+    array = np.array(columns)
+    array = array.reshape(-1, width) if array.ndim < 2 else array
+    if array.shape[1] != width or not np.issubdtype(array.dtype, np.integer) or np.any(array < 0):
+        raise CaseError(
+            f"columns {array.tolist()}", code="E-SHAPE", limit=f"groups of {width} column numbers of W"
+        )
+    array.setflags(write=False)
+    return array
+
+
+def _numbers(value, key: str, code: str = "E-SHAPE") -> np.ndarray:
+    """A copy of the numbers, without text."""
+    return checked_numbers(value, key, code=code, unit="").copy()
+
+
+def _positive(name: str, value: float) -> None:
+    value = _numbers(value, name, "E-SMOOTHING")
+    if not (np.isfinite(value) and value >= 0.0):
+        raise CaseError(f"{name} of {value} m", code="E-SMOOTHING", limit="0 m or more")
+
+
+# Intervals of a period that are searched, and the share of a change that must be unlike its neighbours'.
+_INTERVALS = 512
+_UNLIKE = 0.1
+# Jumps below this share of the largest tangent do not count.
+_SMALL = 1e-9
+# Halvings before and after which a change that stays is a jump, and halvings down to rounding.
+_FIRST, _SECOND, _LAST = 6, 12, 50
+# Times that an interval is searched for one more jump.
+_ROUNDS = 4
+
+
+def tangent_jumps(tangents: Callable, states: np.ndarray, *, intervals: int = _INTERVALS) -> list[np.ndarray]:
+    """Fractions of the period, for every state, at which its tangents jump; ascending, zero left out.
+
+    Tangents at equidistant instants; an interval whose change is unlike that of its neighbours is halved
+    towards the larger change. A smooth change shrinks with the interval, a jump stays. Two jumps that undo
+    each other within one interval are not seen.
+
+    Parameters
+    ----------
+    tangents : callable
+        ``(fraction (m, s), states (m,)) -> (m, s, n, n)``, periodic in the fraction.
+    states : (m,) int array
+    intervals : int
+        Number of equal intervals of the period.
+    """
+    states = np.asarray(states)
+    nodes = (np.arange(-1, intervals + 3) - 0.5) / intervals
+    # one interval more on both sides, for the neighbours
+    known = tangents(np.broadcast_to(nodes[1:-2], (len(states), intervals + 1)), states)
+    size = np.abs(known).max(axis=(1, 2, 3), initial=0.0)
+    change = np.diff(known, axis=1)
+    around = 0.5 * (np.roll(change, 1, axis=1) + np.roll(change, -1, axis=1))
+    unlike, change = (np.abs(a).max(axis=(2, 3), initial=0.0) for a in (change - around, change))
+    suspect = (unlike > _UNLIKE * change) & (change > _SMALL * size[:, None])
+    row, column = np.nonzero(suspect)
+    found = [[] for _ in states]
+    low, high = nodes[1:-2][column], nodes[2:-1][column]
+    for _ in range(_ROUNDS):
+        row, low, high, where = _halved(tangents, states, size, row, low, high)
+        if not len(row):
+            break
+        for i, fraction in zip(row, where % 1.0):
+            found[i].append(fraction)
+        gap = 4.0 * np.finfo(float).eps
+        low, high = np.concatenate([low, where + gap]), np.concatenate([where - gap, high])
+        row = np.concatenate([row, row])
+    return [_sorted(fractions) for fractions in found]
+
+
+def _halved(tangents, states, size, row, low, high):
+    """Jumps in intervals (k,) of the rows: rows, ends and places of those that hold one."""
+    a, b = low.copy(), high.copy()
+    before = np.full(len(row), np.inf)
+    for level in range(_LAST):
+        if not len(row):
+            break
+        middle = 0.5 * (a + b)
+        values = tangents(np.stack([a, middle, b], axis=1), states[row])
+        change = np.abs(np.diff(values, axis=1)).max(axis=(2, 3))
+        left = change[:, 0] >= change[:, 1]
+        a, b = np.where(left, a, middle), np.where(left, middle, b)
+        change = change.max(axis=1)
+        if level == _FIRST:
+            before = change
+        if level == _SECOND:
+            keep = (change > 0.5 * before) & (change > _SMALL * size[row])
+            row, low, high, a, b = (array[keep] for array in (row, low, high, a, b))
+    return row, low, high, b
+
+
+def _sorted(fractions) -> np.ndarray:
+    """Ascending fractions, those at the ends of the period and double ones left out."""
+    values = np.sort(np.asarray(fractions, float))
+    values = values[(values > 1e-13) & (values < 1.0 - 1e-13)]
+    return values[np.diff(values, prepend=-1.0) > 1e-13]

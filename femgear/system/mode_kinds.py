@@ -1,0 +1,331 @@
+"""What kind of mode a shape of the planetary set is, its phasing and its number of nodal diameters.
+
+With equal planets at equal angles the modes fall into classes of the cyclic group of order N (J. Lin and
+R. G. Parker, J. Vib. Acoust. 121, 1999, for the rigid ring): rotational (class 0), translational (class +-1)
+and planet modes (the other classes). The ring's nodal diameters n belong to class n mod N. One classification
+serves all models: they bring their shapes into `SetMotions`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.system.assembler import free_motions
+from femgear.system.lumped import PlanarSet, RigidSet, body_masses
+
+PURE = 0.99
+CLASSES = ("rotational", "translational", "planet")
+CENTRAL = ("carrier", "ring", "sun", "motor", "brake")
+
+
+@dataclass(frozen=True)
+class SetMotions:
+    """Motions of the bodies in every mode; coordinates that are held are zero.
+
+    Parameters
+    ----------
+    central : (b, 3, m) array
+        x, y and rotation of the bodies on the axis.
+    central_mass : (b, 3) array
+    planets : (N, 3, m) array
+        Radial, tangential and rotation.
+    planet_mass : (N, 3) array
+    planet_angles : (N,) array
+        [rad]
+    """
+
+    central: np.ndarray
+    central_mass: np.ndarray
+    planets: np.ndarray
+    planet_mass: np.ndarray
+    planet_angles: np.ndarray
+
+    @property
+    def weighted(self) -> np.ndarray:
+        """Planet motions whose squares are twice the kinetic energy, (N, 3, m)."""
+        return np.sqrt(self.planet_mass)[:, :, None] * self.planets
+
+
+def mode_kinds(shape, mass, dofs, *, frequency, ring_diameter, ring_slice, planet_angles):
+    """Kind and nodal diameter of every mode.
+
+    Parameters
+    ----------
+    shape : (n, m) array
+        Mode shapes.
+    mass : (n,) array
+        Diagonal mass matrix.
+    dofs : tuple of str
+    frequency : (m,) array
+        [Hz], zero for rigid-body modes.
+    ring_diameter : int array
+        Nodal diameter of every ring coordinate.
+    ring_slice : slice
+    planet_angles : (N,) array
+        [rad].
+
+    Returns
+    -------
+    kinds : tuple of str
+        ``rigid``, ``rotational``, ``translational``, ``planet``; ``ring, ...`` where the ring holds more than
+        half of the kinetic energy; ``mixed`` where no class holds 99 % of it.
+    nodal_diameter : (m,) int array
+        The one with most of the ring's kinetic energy; -1 where the ring holds less than a thousandth.
+    """
+    energy = mass[:, None] * np.abs(np.asarray(shape)) ** 2
+    total = energy.sum(axis=0)
+    ring = energy[ring_slice]
+    share = np.zeros((int(ring_diameter.max()) + 1, energy.shape[1]))
+    np.add.at(share, ring_diameter, ring)
+    classes = class_energies(set_motions(shape, mass, dofs, planet_angles))
+    N = len(planet_angles)
+    for n in range(len(share)):
+        classes[min(n % N, N - n % N, 2)] += share[n]
+    held = ring.sum(axis=0) > 0.5 * total
+    kinds = [
+        f"ring, {kind}" if on_ring and kind != "rigid" else kind
+        for kind, on_ring in zip(named_kinds(classes / total, frequency), held)
+    ]
+    moves = share.sum(axis=0) > 1e-3 * total
+    return tuple(kinds), np.where(moves, share.argmax(axis=0), -1)
+
+
+def set_motions(shape, mass, dofs: Sequence[str], planet_angles) -> SetMotions:
+    """Motions of the bodies by the names of their coordinates.
+
+    Parameters
+    ----------
+    shape : (n, m) array
+    mass : (n,) array
+        Diagonal mass matrix.
+    dofs : sequence of str
+        ``"sun: x"``, ``"carrier: rotation"`` or ``"ring: u"``, ``"planet 1: x"`` or ``"planet 1: radial"``;
+        other names and names that are missing do not count.
+    planet_angles : (N,) array
+        [rad]
+    """
+    shape, place = np.asarray(shape), {name: i for i, name in enumerate(dofs)}
+    planet_angles = np.asarray(planet_angles, float)
+
+    def rows(bodies, *axes):
+        found = [
+            [next((place[k] for a in axis if (k := f"{b}: {a}") in place), -1) for axis in axes]
+            for b in bodies
+        ]
+        found = np.array(found)
+        there = found >= 0
+        return np.where(there[..., None], shape[found], 0.0), np.where(there, np.asarray(mass)[found], 0.0)
+
+    planets = [f"planet {n + 1}" for n in range(len(planet_angles))]
+    turn = ("rotation", "u")
+    central, central_mass = rows(CENTRAL, ("x",), ("y",), turn)
+    if f"{planets[0]}: x" in place:
+        moved, planet_mass = rows(planets, ("x",), ("y",), turn)
+        c, s = np.cos(planet_angles)[:, None], np.sin(planet_angles)[:, None]
+        x, y = moved[:, 0], moved[:, 1]
+        moved = np.stack([c * x + s * y, c * y - s * x, moved[:, 2]], axis=1)
+    else:
+        moved, planet_mass = rows(planets, ("radial",), ("tangential",), turn)
+    return SetMotions(central, central_mass, moved, planet_mass, planet_angles)
+
+
+def class_energies(motions: SetMotions) -> np.ndarray:
+    """Twice the kinetic energy (3, m) of rotational, translational and planet motion, without units of time.
+
+    Lin and Parker (1999, section 4) for equal spacing: in a rotational mode the central members only turn and
+    all planets move alike; in a translational one they only translate, and the motion of planet n is ``p cos
+    psi_n + p' sin psi_n``; in a planet mode they rest, and the planets' motion is free of both patterns. The
+    same patterns are looked for at unequal spacing, where they are not independent: the classes then need not
+    add up to the whole, and a motion that no class explains reaches 99 % of it in none.
+    """
+    energy = motions.central_mass[:, :, None] * np.abs(motions.central) ** 2
+    psi, weighted = motions.planet_angles, motions.weighted
+    alike, waves = _harmonic(psi, 0), _harmonic(psi, 1)
+    rotational = energy[:, 2].sum(axis=0) + _inside(alike, weighted)
+    translational = energy[:, :2].sum(axis=(0, 1)) + _inside(waves, weighted)
+    both = _orthonormal(np.column_stack([alike, waves]))
+    planet = (np.abs(weighted) ** 2).sum(axis=(0, 1)) - _inside(both, weighted)
+    return np.array([rotational, translational, planet])
+
+
+def phase_shares(motions: SetMotions, *, signed: bool = False) -> np.ndarray:
+    """Shares of the cyclic harmonics in the planets' kinetic energy.
+
+    Parameters
+    ----------
+    motions : SetMotions
+    signed : bool
+        Tells harmonic j from N - j, motion ``exp(i j psi_n)`` from ``exp(-i j psi_n)``. Real shapes hold
+        equal parts of both.
+
+    Returns
+    -------
+    (N // 2 + 1, m) array, or (N, m) if signed
+        Harmonic 0: all planets in phase; j (with N - j): neighbours apart by the phase ``2 pi j / N``; N / 2:
+        neighbours in counter-phase. At equal spacing this is the discrete Fourier transform of the local
+        planet motions, and the shares add up to one. At unequal spacing the share of j is what the patterns
+        ``cos j psi_n`` and ``sin j psi_n`` explain; these overlap, so that the shares can add up to more than
+        one. NaN where the planets rest.
+
+    Raises
+    ------
+    CaseError
+        Signed shares of unequally spaced planets (E-SPACING).
+    """
+    weighted, N = motions.weighted, len(motions.planet_angles)
+    total = (np.abs(weighted) ** 2).sum(axis=(0, 1))
+    whole = total + np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
+    if signed:
+        if not equally_spaced(motions.planet_angles):
+            raise CaseError(
+                "harmonics j and N - j cannot be told apart for planets at unequal angles", code="E-SPACING",
+                limit="equal angles, in ascending order", remedy="take the shares without sign",
+            )  # fmt: skip
+        energy = (np.abs(np.fft.fft(weighted, axis=0)) ** 2).sum(axis=1) / N
+    else:
+        energy = np.array([_inside(_harmonic(motions.planet_angles, j), weighted) for j in range(N // 2 + 1)])
+    moves = total > 1e-12 * whole
+    return np.where(moves, energy / np.where(moves, total, 1.0), np.nan)
+
+
+def phasing(motions: SetMotions) -> tuple[str, ...]:
+    """Phasing of the planets in every mode.
+
+    A. Kahraman (J. Mech. Des. 116, 1994, 713-720): ``in phase``, ``sequentially phased j`` and
+    ``counter-phased`` where one harmonic of `phase_shares` holds 99 % and no other more than 1 %; ``mixed``
+    else, as for modes of unequally spaced planets; ``at rest``.
+    """
+    share, N = phase_shares(motions), len(motions.planet_angles)
+    names = ["in phase", *(f"sequentially phased {j}" for j in range(1, N // 2 + 1))]
+    if N % 2 == 0:
+        names[-1] = "counter-phased"
+    found = []
+    for one in share.T:
+        if np.isnan(one[0]):
+            found.append("at rest")
+            continue
+        best = int(one.argmax())
+        pure = one[best] >= PURE and np.all(np.delete(one, best) <= 1.0 - PURE)
+        found.append(names[best] if pure else "mixed")
+    return tuple(found)
+
+
+def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> np.ndarray:
+    """Orthogonal matrix Q (m, m): the modes ``shape @ Q`` have one phasing each, as far as they can.
+
+    Modes of one frequency may be mixed at will; with six planets and more the planet modes of several
+    harmonics coincide on a rigid ring. Within each frequency Q diagonalises ``sum_j j E_j``, E_j the planets'
+    energy in harmonic j, so that harmonics come apart where they are independent, as at equal spacing.
+
+    Parameters
+    ----------
+    motions : SetMotions
+        Of real mass-normalised shapes.
+    frequency : (m,) array
+        [Hz], ascending.
+    tolerance : float
+        Relative distance of frequencies that count as one.
+    """
+    frequency, weighted = np.asarray(frequency, float), motions.weighted
+    Q = np.eye(len(frequency))
+    starts = np.flatnonzero(np.diff(frequency) > tolerance * frequency[1:]) + 1
+    for group in np.split(np.arange(len(frequency)), starts):
+        order = np.zeros((len(group),) * 2)
+        for j in range(1, len(motions.planet_angles) // 2 + 1):
+            pattern = _harmonic(motions.planet_angles, j)
+            part = np.einsum("nk,nam->kam", pattern, weighted[:, :, group]).reshape(-1, len(group))
+            order += j * part.T @ part
+        # a single mode stays as it is, sign included
+        if len(group) > 1:
+            Q[np.ix_(group, group)] = np.linalg.eigh(order)[1]
+    return Q
+
+
+def named_kinds(share, frequency) -> tuple[str, ...]:
+    """``rigid``, the class with at least 99 % of the kinetic energy, or ``mixed``.
+
+    Parameters
+    ----------
+    share : (3, m) array
+        `class_energies` over the whole kinetic energy.
+    frequency : (m,) array
+        Zero for rigid-body modes.
+    """
+    best, most = share.argmax(axis=0), share.max(axis=0)
+    return tuple(
+        "rigid" if f == 0.0 else CLASSES[i] if value >= PURE else "mixed"
+        for f, i, value in zip(np.asarray(frequency), best, most)
+    )
+
+
+def motion_planes(dofs: Sequence[str]) -> np.ndarray:
+    """Rows (k, 2) of x and y, or radial and tangential, of every body that has both, for `whirl`."""
+    place = {name: i for i, name in enumerate(dofs)}
+    planes = []
+    for first, second in (("x", "y"), ("radial", "tangential")):
+        for name, i in place.items():
+            body, _, axis = name.partition(": ")
+            if axis == first and (partner := place.get(f"{body}: {second}")) is not None:
+                planes.append((i, partner))
+    return np.array(planes, int).reshape(-1, 2)
+
+
+def equally_spaced(planet_angles) -> bool:
+    """Whether planet n is at ``psi_1 + 2 pi (n - 1) / N``."""
+    psi, N = np.asarray(planet_angles, float), len(planet_angles)
+    return bool(np.abs(np.exp(1j * (psi - psi[0])) - np.exp(2j * np.pi * np.arange(N) / N)).max() < 1e-6)
+
+
+def _harmonic(planet_angles: np.ndarray, j: int) -> np.ndarray:
+    """Orthonormal basis of the patterns ``cos j psi_n`` and ``sin j psi_n`` over the planets."""
+    return _orthonormal(np.column_stack([np.cos(j * planet_angles), np.sin(j * planet_angles)]))
+
+
+def _orthonormal(patterns: np.ndarray) -> np.ndarray:
+    """Orthonormal basis of the patterns; two opposite planets know one wave only."""
+    left, size, _ = np.linalg.svd(patterns, full_matrices=False)
+    return left[:, size > 1e-9 * size[0]]
+
+
+def _inside(pattern: np.ndarray, weighted: np.ndarray) -> np.ndarray:
+    """Energy (m,) of the part of the planets' motion that lies in the patterns."""
+    return (np.abs(np.einsum("nk,nam->kam", pattern, weighted)) ** 2).sum(axis=(0, 1))
+
+
+def energy_shares(motions: SetMotions) -> np.ndarray:
+    """`class_energies` (3, m) over the whole kinetic energy."""
+    central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
+    return class_energies(motions) / (central + (np.abs(motions.weighted) ** 2).sum(axis=(0, 1)))
+
+
+def planar_motions(data: PlanarSet, shape) -> SetMotions:
+    """Motions of all bodies, held ones and planets fixed to their pins included.
+
+    Parameters
+    ----------
+    data : PlanarSet
+    shape : (n, m) array
+        In the coordinates of `planar_system`.
+
+    Raises
+    ------
+    CaseError
+        Shapes of another system (E-SHAPE).
+    """
+    full, mass = body_motions(data, free_motions(data), shape), body_masses(data)
+    return SetMotions(full[:3], mass[:3], full[3:], mass[3:], data.planet_angles)
+
+
+def body_motions(data: RigidSet, T: np.ndarray, shape) -> np.ndarray:
+    """Mode shapes (n, m) in all coordinates (N + 3, axes, m); `T` are the free motions (E-SHAPE)."""
+    shape = np.asarray(shape)
+    if shape.ndim != 2 or len(shape) != T.shape[1]:
+        raise CaseError(
+            f"mode shapes of shape {shape.shape}", code="E-SHAPE", limit=f"({T.shape[1]}, modes)"
+        )  # fmt: skip
+    bodies = data.n_planets + 3
+    return (T @ shape).reshape(bodies, len(T) // bodies, -1)

@@ -1,0 +1,490 @@
+"""Coefficients that repeat with the phases of one or several base frequencies.
+
+Harmonics of real periodic signals, ``x(t) = Re sum_{h=0..H} X_h exp(i h omega t)``, and their products.
+
+Coefficients that repeat with several base frequencies at once: sums of Fourier series.
+
+Lines of a spectrum over one or several base frequencies: the combinations ``orders . omega`` kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.system.entries import checked_numbers
+from femgear.system.system import MeshExcitation
+
+
+def harmonics_of(samples, count: int) -> np.ndarray:
+    """Harmonics 0 to ``count`` of equidistant samples of one period (end point excluded).
+
+    Parameters
+    ----------
+    samples : (..., n_positions) array
+    count : int
+        Highest harmonic kept.
+
+    Returns
+    -------
+    (..., count + 1) complex array
+        One-sided amplitudes: the mean, then twice the discrete Fourier coefficients.
+
+    Raises
+    ------
+    CaseError
+        With fewer than ``2 count + 1`` samples, which cannot tell the harmonics apart (Nyquist).
+    """
+    samples = np.asarray(samples, dtype=float)
+    positions = samples.shape[-1]
+    if positions < 2 * count + 1:
+        raise CaseError(
+            f"{positions} positions in a period cannot hold {count} harmonics",
+            code="E-HARMONICS", value=positions, limit=f"at least {2 * count + 1} positions",
+            remedy="compute more positions of the mesh cycle or keep fewer harmonics",
+        )  # fmt: skip
+    amplitudes = np.fft.rfft(samples, axis=-1)[..., : count + 1] * (2.0 / positions)
+    amplitudes[..., 0] *= 0.5
+    return amplitudes
+
+
+def sample(amplitudes, positions: int) -> np.ndarray:
+    """Values at ``positions`` equidistant instants of one period of (..., H + 1) one-sided harmonics."""
+    amplitudes = np.asarray(amplitudes)
+    spectrum = np.zeros((*amplitudes.shape[:-1], positions // 2 + 1), dtype=complex)
+    if amplitudes.shape[-1] > (positions + 1) // 2:
+        raise CaseError(
+            f"{positions} instants cannot show {amplitudes.shape[-1] - 1} harmonics",
+            code="E-HARMONICS", value=positions, limit=f"at least {2 * amplitudes.shape[-1] - 1}",
+            remedy="ask for more instants",
+        )  # fmt: skip
+    spectrum[..., : amplitudes.shape[-1]] = amplitudes * (0.5 * positions)
+    spectrum[..., 0] *= 2.0
+    return np.fft.irfft(spectrum, n=positions, axis=-1)
+
+
+def pad(amplitudes: np.ndarray, count: int) -> np.ndarray:
+    """The (..., h + 1) harmonics filled up with zeros, or cut, to (..., count + 1)."""
+    out = np.zeros((*amplitudes.shape[:-1], count + 1), dtype=complex)
+    kept = min(count + 1, amplitudes.shape[-1])
+    out[..., :kept] = amplitudes[..., :kept]
+    return out
+
+
+def product_matrix(factor: np.ndarray, count: int) -> np.ndarray:
+    """Real matrix that multiplies harmonics by a periodic factor, without aliasing.
+
+    With two-sided coefficients ``a_n`` of the factor, ``(a x)_h = sum_m a_{h-m} X_m + a_{h+m} conj(X_m)``
+    for h > 0 and half of it for h = 0: a Toeplitz and a Hankel part.
+
+    Parameters
+    ----------
+    factor : (..., n + 1) complex array
+        One-sided harmonics of the factor.
+    count : int
+        Highest harmonic of the other factor and of the product.
+
+    Returns
+    -------
+    (..., 2 (count + 1), 2 (count + 1)) array
+        Acts on, and gives, the interleaved column ``Re X_0, Im X_0 (zero), Re X_1, Im X_1, ...``.
+    """
+    size = count + 1
+    half = pad(factor, 2 * count) * 0.5
+    half[..., 0] *= 2.0
+    two_sided = np.concatenate([np.conj(half[..., :0:-1]), half], axis=-1)
+    h = np.arange(size)
+    toeplitz = two_sided[..., 2 * count + h[:, None] - h[None, :]]
+    hankel = two_sided[..., 2 * count + h[:, None] + h[None, :]]
+    columns = np.stack([toeplitz + hankel, 1j * (toeplitz - hankel)], axis=-1)
+    columns[..., 0, :, :] *= 0.5
+    rows = np.stack([columns.real, columns.imag], axis=-3)
+    return rows.reshape(*factor.shape[:-1], 2 * size, 2 * size)
+
+
+def multiply(matrix: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
+    """Harmonics of the product: ``matrix`` (n, L, L) of :func:`product_matrix`, amplitudes (n, ..., L/2)."""
+    amplitudes = np.ascontiguousarray(amplitudes, dtype=complex)
+    flat = amplitudes.view(float).reshape(amplitudes.shape[0], -1, matrix.shape[-1])
+    return np.matmul(flat, matrix.transpose(0, 2, 1)).view(complex).reshape(amplitudes.shape)
+
+
+def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stiffness, deflection and force of the meshes, each cut to ``count`` mesh harmonics.
+
+    Parameters
+    ----------
+    excitation : MeshExcitation
+    count : int
+        Mesh harmonics kept; a record of several periods keeps all its lines up to that frequency.
+
+    Returns
+    -------
+    stiffness, deflection, force : (n_meshes, count periods + 1) complex arrays
+        [N/m], [m], [N].
+
+    Raises
+    ------
+    CaseError
+        Numbers that are not finite, arrays that do not fit each other, too few positions.
+    """
+    if count < 1 or int(count) != count:
+        raise CaseError("at least one excitation harmonic is needed", code="E-HARMONICS", value=count)
+    arrays = (excitation.stiffness, excitation.deflection, excitation.force)
+    for name, array in zip(("stiffness", "deflection", "force"), arrays):
+        if array.ndim != 2 or array.shape != excitation.stiffness.shape:
+            raise CaseError(
+                f"mesh {name} has shape {array.shape}, mesh stiffness {excitation.stiffness.shape}",
+                code="E-SHAPE", limit="(n_meshes, n_positions), the same for all",
+            )  # fmt: skip
+        if not np.all(np.isfinite(array)):
+            raise CaseError(f"mesh {name} holds numbers that are not finite", code="E-FINITE")
+    if excitation.periods < 1:
+        raise CaseError("the record spans no period", code="E-HARMONICS", value=excitation.periods)
+    lines = int(count) * excitation.periods
+    return tuple(harmonics_of(array, lines) for array in arrays)
+
+
+@dataclass(frozen=True)
+class FourierSeries:
+    """``Re sum_h X_h exp(i h (orders . theta))`` with ``theta`` the phases of the base frequencies.
+
+    Parameters
+    ----------
+    amplitudes : (n, H + 1) complex array
+        One-sided harmonics of every coefficient.
+    orders : tuple of int
+        Multiples of the base frequencies that make the first harmonic: ``(0, 1)`` repeats with the second.
+    """
+
+    amplitudes: np.ndarray
+    orders: tuple[int, ...] = (1,)
+
+    def __post_init__(self):
+        given = checked_numbers(self.amplitudes, "amplitudes", code="E-SHAPE", unit="", kind=complex)
+        amplitudes = np.atleast_2d(given.copy())
+        if amplitudes.ndim != 2 or not amplitudes.size:
+            raise CaseError(
+                f"amplitudes of shape {amplitudes.shape}", code="E-SHAPE", key="amplitudes",
+                limit="one row of harmonics a coefficient",
+            )  # fmt: skip
+        if not np.all(np.isfinite(amplitudes)):
+            raise CaseError("a Fourier series holds numbers that are not finite", code="E-FINITE")
+        amplitudes.setflags(write=False)
+        object.__setattr__(self, "amplitudes", amplitudes)
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(n,) array."""
+        return self.amplitudes[:, 0].real
+
+    def at(self, theta) -> np.ndarray:
+        """Values (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
+        count = self.amplitudes.shape[1]
+        if count == 1:
+            return np.broadcast_to(self.mean, (*np.shape(theta)[:-1], len(self.mean)))
+        phase = phase_of(theta, self.orders)
+        return (np.exp(1j * phase[..., None] * np.arange(count)) @ self.amplitudes.T).real
+
+
+@dataclass(frozen=True)
+class StepSeries:
+    """Piecewise constant coefficients: ``values[:, i]`` from ``breaks[i]`` to the next break.
+
+    Parameters
+    ----------
+    values : (n, m) array
+    breaks : (m,) array
+        Ascending fractions of the period, the first zero.
+    orders : tuple of int
+        As for `FourierSeries`.
+    """
+
+    values: np.ndarray
+    breaks: np.ndarray
+    orders: tuple[int, ...] = (1,)
+
+    def __post_init__(self):
+        values, breaks = (
+            checked_numbers(getattr(self, name), name, code="E-SHAPE", unit="").copy()
+            for name in ("values", "breaks")
+        )
+        values = np.atleast_2d(values)
+        fits = values.ndim == 2 and breaks.ndim == 1 and len(breaks) == values.shape[1] > 0
+        if not fits or breaks[0] != 0.0 or not np.all(np.diff(breaks) > 0.0) or not breaks[-1] < 1.0:
+            raise CaseError(
+                f"values of shape {values.shape} with breaks {breaks.tolist()}", code="E-SHAPE", key="breaks",
+                limit="one value a break; breaks ascend from 0 to below 1",
+                remedy="values come first, one row a coefficient, then the fractions of the period at which "
+                "they start, such as StepSeries([[1.0, 2.0]], [0.0, 0.5])",
+            )  # fmt: skip
+        if not np.all(np.isfinite(values)):
+            raise CaseError("a step series holds numbers that are not finite", code="E-FINITE", key="values")
+        for name, array in (("values", values), ("breaks", breaks)):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(n,) array."""
+        return self.values @ np.diff(self.breaks, append=1.0)
+
+    def at(self, theta) -> np.ndarray:
+        """Values (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
+        turn = (phase_of(theta, self.orders) / (2.0 * np.pi)) % 1.0
+        return np.moveaxis(self.values[:, np.searchsorted(self.breaks, turn, side="right") - 1], 0, -1)
+
+
+def phase_of(theta, orders) -> np.ndarray:
+    """``orders . theta`` (...) [rad]; a base that theta lacks must have order zero."""
+    theta = np.asarray(theta, float)
+    known = theta.shape[-1]
+    if any(orders[known:]):
+        raise CaseError(
+            f"orders {tuple(orders)} name more base frequencies than the {known} that are given",
+            code="E-ORDERS", limit="one order a base frequency",
+        )  # fmt: skip
+    used = np.asarray(orders[:known], float)
+    return theta[..., : len(used)] @ used
+
+
+def constant(values) -> FourierSeries:
+    """Coefficients (n,) that do not change."""
+    return FourierSeries(np.atleast_1d(np.asarray(values, float))[:, None])
+
+
+def series_of(samples, count: int, *, orders: tuple[int, ...] = (1,)) -> FourierSeries:
+    """Fourier series with ``count`` harmonics of the samples (n, P) of one period."""
+    return FourierSeries(harmonics_of(np.atleast_2d(samples), count), orders)
+
+
+@dataclass(frozen=True)
+class SummedSeries:
+    """``sum_p parts[p]``, each with its own orders; elements take it where they take a `FourierSeries`.
+
+    Parameters
+    ----------
+    parts : tuple of FourierSeries
+        All of the same number of coefficients.
+    """
+
+    parts: tuple[FourierSeries, ...]
+
+    def __post_init__(self):
+        parts = tuple(self.parts)
+        sizes = {len(part.amplitudes) for part in parts if isinstance(part, FourierSeries)}
+        if len(sizes) != 1 or not all(isinstance(part, FourierSeries) for part in parts):
+            raise CaseError(
+                f"a sum of {len(parts)} series with {sorted(sizes)} coefficients", code="E-SHAPE",
+                limit="one Fourier series or more, all of one size",
+            )  # fmt: skip
+        object.__setattr__(self, "parts", parts)
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """1 for every base frequency that a part names."""
+        changing = [part.orders for part in self.parts if part.amplitudes.shape[1] > 1]
+        count = max(map(len, changing), default=1)
+        return tuple(int(any(o[b] for o in changing if len(o) > b)) for b in range(count))
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(n,) array."""
+        return np.sum([part.mean for part in self.parts], axis=0)
+
+    def at(self, theta) -> np.ndarray:
+        """Values (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
+        return sum(part.at(theta) for part in self.parts)
+
+
+def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np.ndarray, np.ndarray]:
+    """Lines of a series at given base frequencies, ascending; lines that coincide are added.
+
+    Parameters
+    ----------
+    series : FourierSeries or SummedSeries
+    frequency : float or (n_bases,) array
+        [rad/s]
+
+    Returns
+    -------
+    line_frequency : (L,) array
+        Not negative; the mean first [rad/s].
+    amplitude : (n, L) complex array
+        ``Re sum_l A_l exp(i omega_l t)``.
+    """
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
+        raise CaseError(
+            f"base frequencies of shape {frequency.shape}", code="E-FREQUENCY", key="frequency",
+            limit="finite numbers, one a base",
+        )  # fmt: skip
+    parts = series.parts if isinstance(series, SummedSeries) else (series,)
+    rates, lines = [np.zeros(1)], [np.zeros((len(parts[0].amplitudes), 1), complex)]
+    for part in parts:
+        base = float(np.dot(part.orders[: len(frequency)], frequency[: len(part.orders)]))
+        rate = base * np.arange(part.amplitudes.shape[1])
+        rates.append(np.abs(rate))
+        lines.append(np.where(rate < 0.0, part.amplitudes.conj(), part.amplitudes))
+    rates, lines = np.concatenate(rates), np.concatenate(lines, axis=1)
+    order = np.argsort(rates, kind="stable")
+    rates, lines = rates[order], lines[:, order]
+    first = np.flatnonzero(np.diff(rates, prepend=-np.inf) > 1e-9 * rates.max(initial=0.0))
+    total = np.add.reduceat(lines, first, axis=1)
+    total[:, 0] = total[:, 0].real
+    return rates[first], total
+
+
+# Fluctuation, relative to the mean, below which there is none.
+_ROUNDING = 1e-12
+# Difference of two line frequencies, relative to the highest one, below which they are one.
+_COINCIDE = 1e-9
+
+
+def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
+    """Mean and all combinations with ``sum_b |orders_b| <= harmonics``, no line twice.
+
+    Parameters
+    ----------
+    harmonics : int
+        Highest harmonic; with several bases the highest sum of orders.
+    bases : int
+        Number of base frequencies.
+
+    Returns
+    -------
+    (L, bases) int array
+        Line 0 is the mean; of a line and its mirror image only the one whose last order that is not zero is
+        positive.
+    """
+    if int(harmonics) != harmonics or harmonics < 0 or bases < 1:
+        raise CaseError(
+            f"{harmonics} harmonics of {bases} base frequencies", code="E-HARMONICS",
+            limit="whole numbers, at least one base frequency",
+        )  # fmt: skip
+    axes = np.meshgrid(*[np.arange(-harmonics, harmonics + 1)] * bases, indexing="ij")
+    orders = np.stack([axis.ravel() for axis in axes], axis=1)
+    return distinct_lines(orders[np.abs(orders).sum(axis=1) <= harmonics])
+
+
+def side_bands(carrier: int, mesh: int, bands: int) -> np.ndarray:
+    """Lines of the extended harmonic balance: carrier harmonics, mesh harmonics and their side bands.
+
+    ``m omega_1`` (m <= carrier), ``n omega_2`` (n <= mesh) and ``n omega_2 +- q omega_1`` (q <= bands), with
+    the carrier frequency first and the mesh frequency second (Guo, Keller and Parker, NREL/CP-5000-55355,
+    Eqs. 2-13; Eur. J. Mech. A/Solids 47, 2014, 45-57).
+
+    Returns
+    -------
+    (L, 2) int array
+        Line 0 is the mean. Lines whose frequencies coincide because the mesh frequency is a multiple of the
+        carrier frequency stay distinct: the phases are treated as independent.
+    """
+    for name, value in (("carrier harmonics", carrier), ("mesh harmonics", mesh), ("side bands", bands)):
+        if int(value) != value or value < 0:
+            raise CaseError(f"{value} {name}", code="E-HARMONICS", limit="whole numbers, 0 or more")
+    low = [(m, 0) for m in range(carrier + 1)]
+    high = [(q, n) for n in range(1, mesh + 1) for q in range(-bands, bands + 1)]
+    return distinct_lines(np.array(low + high))
+
+
+def distinct_lines(orders) -> np.ndarray:
+    """The lines without mirror images and repetitions, the mean first, sorted by their size.
+
+    Parameters
+    ----------
+    orders : (n, n_bases) int array
+
+    Returns
+    -------
+    (L, n_bases) int array
+    """
+    orders = np.atleast_2d(np.array(orders, int))
+    orders = np.vstack([np.zeros_like(orders[:1]), orders])
+    orders = np.unique(orders * mirror_sign(orders)[:, None], axis=0)
+    size = np.abs(orders).sum(axis=1)
+    return orders[np.lexsort((*orders.T, size))]
+
+
+def mirror_sign(orders: np.ndarray) -> np.ndarray:
+    """Sign (L,) of the last order of every line that is not zero; 1 for the mean."""
+    last = np.zeros(len(orders), int)
+    for column in orders.T:
+        last = np.where(column != 0, np.sign(column), last)
+    return np.where(last == 0, 1, last)
+
+
+def checked_lines(orders) -> np.ndarray:
+    """The lines as an (L, n_bases) integer array.
+
+    Raises
+    ------
+    CaseError
+        Orders that are not whole numbers, a first line that is not the mean, a line that is there twice.
+    """
+    array = np.array(orders)
+    array = array[:, None] if array.ndim == 1 else array
+    if array.ndim != 2 or not array.size or np.any(array != np.round(array)):
+        raise CaseError("lines must be an (L, n_bases) table of whole numbers", code="E-LINES")
+    array = array.astype(int)
+    if np.any(array[0]):
+        raise CaseError(
+            f"the first line has the orders {array[0].tolist()}", code="E-LINES", limit="zeros: the mean",
+            remedy="build the lines with harmonic_lines, side_bands or distinct_lines",
+        )  # fmt: skip
+    unique, count = np.unique(array * mirror_sign(array)[:, None], axis=0, return_counts=True)
+    if np.any(count > 1):
+        raise CaseError(
+            f"the line {unique[count > 1][0].tolist()} or its mirror image is there twice", code="E-LINES",
+            remedy="pass the lines through distinct_lines",
+        )  # fmt: skip
+    return array
+
+
+def line_tail(amplitudes: np.ndarray, orders: np.ndarray, *, rounding: float = _ROUNDING) -> float:
+    """Share of the fluctuating amplitude in the upper half of the lines (root of the energy ratio).
+
+    A line is in the upper half when ``sum_b |orders_b| / max |orders_b|`` is above half its largest value.
+    With a single line the share is one: nothing is known about the truncation. A fluctuation below
+    ``rounding`` of the mean is none, and its share is zero.
+    """
+    top = np.maximum(np.abs(orders).max(axis=0), 1)
+    size = (np.abs(orders) / top).sum(axis=1)
+    energy = np.sum(np.abs(amplitudes) ** 2, axis=0)
+    still, energy[0] = rounding**2 * energy[0], 0.0
+    total = energy.sum()
+    return float(np.sqrt(energy[size > 0.5 * size.max()].sum() / total)) if total > still else 0.0
+
+
+def coinciding_lines(orders: np.ndarray, frequency) -> tuple[int, int] | None:
+    """The first two lines whose frequencies agree to 1e-9 of the highest line, or none.
+
+    Parameters
+    ----------
+    orders : (L, n_bases) int array
+    frequency : (n_bases,) array
+        [rad/s]; with a single base frequency no two lines coincide.
+    """
+    if orders.shape[1] < 2:
+        return None
+    size = np.abs(orders @ np.asarray(frequency, float))
+    along = np.argsort(size, kind="stable")
+    near = np.flatnonzero(np.diff(size[along]) <= _COINCIDE * size.max())
+    if not len(near):
+        return None
+    one, other = sorted(along[near[0] : near[0] + 2].tolist())
+    return one, other
+
+
+def coincidence_note(orders: np.ndarray, frequency) -> str:
+    """What to know of a solution in which two lines have one frequency; empty where none have."""
+    found = coinciding_lines(orders, frequency)
+    if found is None:
+        return ""
+    one, other = (orders[line].tolist() for line in found)
+    return (
+        f" Lines {one} and {other} have one frequency: only their sum is an amplitude, and its split, as of "
+        "phases that are independent, converges slowly; take one base frequency and multiply the orders."
+    )

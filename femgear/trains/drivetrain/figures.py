@@ -1,0 +1,840 @@
+"""Figures of drivetrains: mesh stiffness, deviations, contact forces, spectra, side bands, sensitivity.
+
+Panels at places given in inches: looking for places takes matplotlib longer than drawing the figure.
+
+Figures of a drivetrain run, from modes.nc, transient.nc and spectrum.nc.
+
+Pictures of a drivetrain run: figures of all stages, and the lowest elastic modes in space.
+
+Where the bodies of a drivetrain stand in space, for drawings of mode shapes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from femgear.report.frequency import campbell
+from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
+from femgear.trains.drivetrain.data import Drivetrain, numbered
+from femgear.trains.drivetrain.model import DrivetrainModel, coordinates_of, free_coordinates
+from femgear.trains.drivetrain.results import _MOST_PANELS, chosen_meshes, symbols
+from femgear.trains.drivetrain.time import PASS_BAND
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.trains.drivetrain.section import DrivetrainCase
+    from femgear.trains.protocol import Progress
+
+# Inches: beside the panels, below the last, above the first, between two with and without numbers in between.
+_LEFT, _RIGHT, _BOTTOM, _TOP, _GAP, _SHARED = 0.95, 0.2, 0.95, 0.35, 0.75, 0.5
+# Room for a title of the figure, and for the names of lines.
+_TITLE, _NAMES = 0.3, 0.5
+# Columns of pixels of a panel, and instants a column from which a band is drawn.
+_PIXELS, _POINTS = 900, 4
+# Of the first curve, and of those behind it.
+_WIDTHS, _ALPHAS = (0.9, 2.4), (1.0, 0.5)
+# Distance of the names of two lines over the width of the axes.
+_NAME = 0.0165
+_LARGEST = 1e100
+# Least span of an ordinate that does not reach zero, over its largest value.
+_LEAST = 0.02
+
+
+def panels(
+    titles: Sequence[str],
+    *,
+    columns: int = 1,
+    width: float = 8.0,
+    height: float = 1.6,
+    x: str,
+    y: Sequence[str],
+    title: str = "",
+    named: bool = False,
+):
+    """A figure with one pair of axes a title.
+
+    Parameters
+    ----------
+    titles : sequence of str
+        Of the panels, row by row.
+    columns : int
+        One column shares its abscissa.
+    width, height : float
+        Of a panel [in].
+    x : str
+        Label below the panels.
+    y : sequence of str
+        Label of every panel.
+    title : str
+        Above all panels.
+    named : bool
+        Leave room for names of lines above the first panel.
+
+    Returns
+    -------
+    Figure
+    list of Axes
+    """
+    rows, gap = -(-len(titles) // columns), _SHARED if columns == 1 else _GAP
+    top, step = _TOP + bool(title) * _TITLE + named * _NAMES, _LEFT + width + _RIGHT
+    size = (columns * step, top + rows * height + (rows - 1) * gap + _BOTTOM)
+    figure, axes = Figure(figsize=size, layout="none"), []
+    for number in range(len(titles)):
+        row, column = divmod(number, columns)
+        left, bottom = column * step + _LEFT, size[1] - top - row * (height + gap) - height
+        place = (left / size[0], bottom / size[1], width / size[0], height / size[1])
+        axes.append(figure.add_axes(place, sharex=axes[0] if axes and columns == 1 else None))
+    for number, (ax, text) in enumerate(zip(axes, titles)):
+        last = number >= len(titles) - columns
+        ax.tick_params(labelsize=SIZE - 1, labelbottom=last or columns > 1)
+        ax.grid(True, color="0.88", linewidth=0.8)
+        ax.set_axisbelow(True)
+        ax.spines[["top", "right"]].set_visible(False)
+        label(ax, x if last else "", y[number])
+        ax.xaxis.set_label_coords(0.5, -0.34 / height)
+        ax.yaxis.set_label_coords(-0.68 / width, 0.5)
+        above = 6.0 + 72.0 * _NAMES * (named and not number)
+        ax.set_title(text, fontsize=SIZE, loc="left", y=1.0, pad=above)
+    if title:
+        figure.text(0.1 / size[0], 1.0 - 0.1 / size[1], title, fontsize=SIZE - 1, va="top")
+    return figure, axes
+
+
+def draw_over_time(ax, time, values, index: int, text: str) -> None:
+    """A line, or where there are many instants a column of pixels the band of its values.
+
+    Curves behind the first, ``index`` 0, are wider and lighter, so that all can be read.
+    """
+    style = {"color": COLOURS[index % len(COLOURS)], "zorder": 3.0 - 0.1 * index, "label": text}
+    if len(time) <= _POINTS * _PIXELS:
+        ax.plot(time, values, **_thickness(index), **style)
+        return
+    colour = style.pop("color")
+    where, low, high = band(time, values, _PIXELS)
+    ax.fill_between(where, low, high, facecolor=(colour, 0.3), edgecolor=colour, linewidth=0.7, **style)
+
+
+def draw_spectrum(ax, frequency, curves: Sequence[tuple]) -> None:
+    """Amplitudes (text, values (F,)) over a logarithmic axis of five decades."""
+    from matplotlib.ticker import NullLocator
+
+    top = 0.0
+    for index, (text, values) in enumerate(curves):
+        colour, top = COLOURS[index % len(COLOURS)], max(top, np.nanmax(values, initial=0.0))
+        ax.plot(frequency, values, color=colour, zorder=3.0 - 0.1 * index, label=text, **_thickness(index))
+    if top > 0.0:
+        ax.set_yscale("log")
+        ax.yaxis.set_minor_locator(NullLocator())
+        ax.set_ylim(1e-5 * top, 2.0 * top)
+
+
+def show_changes(ax) -> None:
+    """Ordinate that does not reach zero, with whole numbers at its ticks, and does not blow up rounding."""
+    low, high = ax.get_ylim()
+    least = 0.5 * _LEAST * max(abs(low), abs(high))
+    middle, half = 0.5 * low + 0.5 * high, max(0.5 * high - 0.5 * low, least)
+    ax.set_ylim(middle - half, middle + half)
+    ax.ticklabel_format(axis="y", useOffset=False)
+
+
+def _thickness(index: int) -> dict[str, float]:
+    return {"linewidth": _WIDTHS[min(index, 1)], "alpha": _ALPHAS[min(index, 1)]}
+
+
+def band(time, values, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Least and largest of values (n,) in `count` pieces of the time, which share their ends.
+
+    Returns
+    -------
+    middle, low, high : (count,) arrays
+    """
+    time, values = np.asarray(time), np.asarray(values)
+    first = np.linspace(0, len(time) - 1, count + 1).astype(int)
+    low, high = (one.reduceat(values, first[:-1]) for one in (np.minimum, np.maximum))
+    # a piece ends where the next one begins: steep curves leave no gaps
+    ends, middle = values[first[1:]], 0.5 * (time[first[:-1]] + time[first[1:]])
+    return middle, np.minimum(low, ends), np.maximum(high, ends)
+
+
+def drawable(values) -> np.ndarray:
+    """Without what no axis can hold: matplotlib multiplies the limits."""
+    values = np.array(values, float)
+    values[~(np.abs(values) < _LARGEST)] = np.nan
+    return values
+
+
+def name_lines(ax, lines: Sequence[tuple], width: float) -> None:
+    """Names (text, place) above the axes, moved aside as little as keeps them apart.
+
+    `width` is that of the axes in the units of the places.
+    """
+    if not lines:
+        return
+    lines = sorted(lines, key=lambda line: line[1])
+    at, apart = np.array([at for _, at in lines]), _NAME * width * np.arange(len(lines))
+    # pushed to the right, pushed to the left: the mean is as far apart
+    right = np.maximum.accumulate(at - apart) + apart
+    left = np.minimum.accumulate((at - apart)[::-1])[::-1] + apart
+    places = 0.5 * (right + left)
+    for (text, at), place in zip(lines, places):
+        ax.annotate(
+            text, (at, 1.0), (place, 1.06), xycoords=ax.get_xaxis_transform(), rotation=90,
+            textcoords=ax.get_xaxis_transform(), fontsize=SIZE - 3, ha="center", va="bottom",
+            arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
+
+
+def finished(figure):
+    """The figure with its legend."""
+    legend_below(figure)
+    return figure
+
+
+def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, title: str = ""):
+    """Mesh stiffness over the mesh period: the series and the rectangular wave that it stands for.
+
+    Parameters
+    ----------
+    phase : (n,) array
+        Fractions of the period.
+    curves, steps : sequences of (text, stiffness (n,) [N/m])
+        Series, and rectangular waves in the same order.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = panels(
+        [text for text, _ in curves], columns=len(curves), width=3.1, height=2.4, x="mesh period [1]",
+        y=[f"stiffness [{_unit(values)[1]}]" for _, values in curves], title=title,
+    )  # fmt: skip
+    for number, (ax, (_, values), (_, wave)) in enumerate(zip(axes, curves, steps)):
+        scale, colour = _unit(values)[0], COLOURS[number % len(COLOURS)]
+        ax.plot(phase, scale * np.asarray(wave), color=GREY, linewidth=1.4, label="rectangular")
+        ax.plot(phase, scale * np.asarray(values), color=colour, label="series")
+        ax.set_xlim(phase[0], phase[-1])
+    return finished(figure)
+
+
+def _unit(values) -> tuple[float, str]:
+    return (1e-9, "GN/m") if np.max(values) > 5e8 else (1e-6, "MN/m")
+
+
+def over_time(
+    time,
+    signals: Sequence[tuple],
+    *,
+    unit: str,
+    factor: float = 1.0,
+    columns: int = 1,
+    title: str = "",
+    zero: bool = True,
+):
+    """Signals of several runs over time, one panel each; the first run stands in front.
+
+    Where there are many more instants than pixels, the band between the least and the largest value of every
+    column of pixels is drawn.
+
+    Parameters
+    ----------
+    time : (n,) array
+        [s]
+    signals : sequence of (title, curves)
+        With curves a sequence of (text, values (n,)).
+    unit : str
+        After the factor, with the quantity.
+    columns : int
+    title : str
+        Above all panels.
+    zero : bool
+        Draw zero; False shows changes of what is far from it.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = panels(
+        [text for text, _ in signals], columns=columns, width=7.0 if columns == 1 else 5.2, x="time [s]",
+        y=[unit] * len(signals), title=title,
+    )  # fmt: skip
+    time = np.asarray(time)
+    for ax, (_, curves) in zip(axes, signals):
+        for index, (name, values) in enumerate(curves):
+            draw_over_time(ax, time, factor * drawable(values), index, name)
+        ax.set_xlim(time[0], time[-1])
+        if zero:
+            ax.axhline(0.0, color=GREY, linewidth=0.8)
+        else:
+            show_changes(ax)
+    return finished(figure)
+
+
+def spectra(
+    frequency,
+    signals: Sequence[tuple],
+    *,
+    lines: Sequence[tuple] = (),
+    unit: str,
+    factor: float = 1.0,
+    x: str = "",
+    title: str = "",
+):
+    """Amplitude spectra of several runs, one panel each, with named lines; the first run stands in front.
+
+    Parameters
+    ----------
+    frequency : (F,) array
+        [Hz] or orders.
+    signals : sequence of (title, curves)
+        With curves a sequence of (text, amplitude (F,)).
+    lines : sequence of (text, frequency)
+        Marked above the first panel and drawn through all.
+    unit : str
+    factor : float
+    x : str
+        Label of the abscissa, the frequency when not given.
+    title : str
+        Above all panels.
+
+    Returns
+    -------
+    Figure
+    """
+    frequency = np.asarray(frequency)
+    lines = [(text, at) for text, at in lines if frequency[0] <= at <= frequency[-1]]
+    figure, axes = panels(
+        [text for text, _ in signals], width=8.3, x=x or "frequency [Hz]", y=[unit] * len(signals),
+        title=title, named=bool(lines),
+    )  # fmt: skip
+    for ax, (_, curves) in zip(axes, signals):
+        draw_spectrum(ax, frequency, [(name, factor * drawable(values)) for name, values in curves])
+        for _, at in lines:
+            ax.axvline(at, color=GREY, linewidth=0.7, linestyle=":")
+    axes[0].set_xlim(frequency[0], frequency[-1])
+    name_lines(axes[0], lines, float(np.ptp(frequency)))
+    return finished(figure)
+
+
+def sensitivity(names: Sequence[str], quantities: Sequence[tuple], *, title: str = ""):
+    """What assumed inputs do: quantity at half and at twice the input over that at the input itself.
+
+    Parameters
+    ----------
+    names : (k,) sequence
+    quantities : sequence of (text, ratio (k, 2))
+
+    Returns
+    -------
+    Figure
+    """
+    count = len(names)
+    figure, axes = new_figure(
+        columns=len(quantities), width=3.6 * len(quantities) + 2.4, height=0.3 * count + 1.8, sharey=True
+    )
+    at = np.arange(count)[::-1]
+    for ax, (text, ratio) in zip(axes, quantities):
+        ratio = np.asarray(ratio, float)
+        for side, (colour, note) in enumerate(((COLOURS[0], "lower input"), (COLOURS[1], "higher input"))):
+            ax.barh(
+                at + 0.18 - 0.36 * side, ratio[:, side] - 1.0, height=0.34, left=1.0, color=colour, label=note
+            )
+        ax.axvline(1.0, color=BLACK, linewidth=0.8)
+        ax.set_yticks(at, names)
+        label(ax, "ratio [1]", title=text)
+    if title:
+        figure.suptitle(title, fontsize=SIZE)
+    legend_below(figure)
+    return figure
+
+
+def backlash_forces(time, curves: Sequence[tuple], *, title: str = ""):
+    """Mesh force over a short time with and without contact loss; the first run stands in front.
+
+    Parameters
+    ----------
+    time : (n,) array
+        [s]
+    curves : sequence of (text, force (n,) [N])
+
+    Returns
+    -------
+    Figure
+    """
+    return over_time(time, [(title, curves)], unit="mesh force [kN]", factor=1e-3)
+
+
+RPM = np.pi / 30.0
+# Harmonics of the mesh lines that are marked, and how far beyond the last of the highest line spectra reach.
+_HARMONICS = 3
+_REACH = 1.04 * _HARMONICS
+# Reach of side bands in turns or planetary mesh lines.
+_TURNS, _BESIDE = 8.0, 1.3
+# Fewer lines are no picture of side bands.
+_LEAST_LINES = 24
+
+
+def stiffness_figure(model: DrivetrainModel):
+    """Series of the mesh stiffness of every stage, and the rectangular wave.
+
+    Returns
+    -------
+    Figure
+    """
+    from femgear.system.series import FourierSeries
+    from femgear.trains.drivetrain.model import stiffness_levels
+
+    train, phase = model.train, np.linspace(0.0, 2.0, 1601)
+    names, row, waves = numbered(model.meshes), 0, []
+    # by position: the planetary stages come first, with all suns' meshes before the rings'
+    for stage in train.planetary:
+        planets = len(stage.planet_angles)
+        waves += [(row, stage.sun_mesh), (row + planets, stage.ring_mesh)]
+        row += 2 * planets
+    waves += [(row + i, stage.mesh) for i, stage in enumerate(train.parallel)]
+    curves, steps = [], []
+    for row, wave in waves[:_MOST_PANELS]:
+        text = names[row]
+        curves.append((text, FourierSeries(model.stiffness[row]).at(2.0 * np.pi * phase[:, None])[:, 0]))
+        low, high, share = stiffness_levels(wave)
+        inside = (phase + wave.phase + 0.5 * share) % 1.0 < share
+        steps.append((text, np.where(inside, high, low)))
+    return stiffness_series(phase, curves, steps, title=f"series of {model.stiffness.shape[1] - 1} terms")
+
+
+def campbell_figure(modes: xr.Dataset):
+    """Campbell diagram with the mesh lines of modes.nc.
+
+    Returns
+    -------
+    Figure
+    """
+    frequency = modes["campbell_frequency"].values
+    top = frequency.max()
+    critical = zip(modes["critical_speed"].values, modes["critical_frequency"].values)
+    return campbell(
+        modes["campbell_speed"].values, frequency, orders=modes["base_order"].values / 60.0,
+        order_names=[str(name) for name in modes["base"].values],
+        critical=[pair for pair in critical if pair[1] < top], speed_unit="rpm of the first body",
+    )  # fmt: skip
+
+
+def transient_figures(data: xr.Dataset) -> dict:
+    """Speeds, deviations and mesh forces over time, by name."""
+    bodies, names = ([str(name) for name in data[key].values] for key in ("body", "mesh"))
+    ends, meshes = sorted({0, len(bodies) - 1}), chosen_meshes(data)
+    shown = [i for i in range(len(bodies)) if i][-_MOST_PANELS:] or [0]
+    passed = _pass_band(data)
+    turned = [f"{bodies[i]}: rotation less the free spin" for i in shown]
+    figures = {
+        "transient_speeds": _signals(
+            data,
+            "speed",
+            ends,
+            [bodies[i] for i in ends],
+            unit="speed [rpm]",
+            factor=1.0 / RPM,
+            title=passed,
+            zero=False,
+        ),
+        "transient_deviations": _signals(
+            data, "deviation", shown, turned, unit="deviation [mrad]", factor=1e3, title=passed
+        ),
+    }
+    if meshes:
+        contact = "linear meshes keep contact"
+        if separates(data):
+            contact = f"meshes part, for up to {float(data['lost'].max()):.2%} of the time"
+        notes = (contact, passed, passed and "least and largest force of all steps in the table")
+        figures["transient_forces"] = _signals(
+            data, "mesh_force", meshes, [names[i] for i in meshes], unit="force [kN]", factor=1e-3,
+            title="; ".join(filter(None, notes)),
+        )  # fmt: skip
+    return figures
+
+
+def _signals(data: xr.Dataset, name: str, columns, titles, **options):
+    """Columns of a variable over time, those of all variants in one panel."""
+    values, variants = data[name].values, [str(text) for text in data["variant"].values]
+    panels = [
+        (title, [(text, values[v, :, i]) for v, text in enumerate(variants)])
+        for i, title in zip(columns, titles)
+    ]
+    return over_time(data["time"].values, panels, **options)
+
+
+def _pass_band(data: xr.Dataset) -> str:
+    """What the low pass of the records of transient.nc leaves."""
+    attrs = data.attrs
+    if attrs["filter"] == "none":
+        return ""
+    return f"low-passed to {0.5 * PASS_BAND / (attrs['step'] * attrs['every']):.4g} Hz"
+
+
+def separates(data: xr.Dataset) -> bool:
+    """Whether the meshes of transient.nc part and meet their back flanks."""
+    return data.attrs.get("contact") == "separating"
+
+
+def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> dict:
+    """Spectra over frequency, and side bands over orders, by name; none without meshes.
+
+    Parameters
+    ----------
+    data : Dataset
+        spectrum.nc
+    transient : Dataset, optional
+        transient.nc, for the speeds between which the spectra were taken.
+    """
+    meshes = chosen_meshes(data)
+    if not meshes:
+        return {}
+    lines = _mesh_lines(data)
+    frequency, hertz = data["frequency"].values, data["line_frequency"].values
+    top = min(PASS_BAND * frequency[-1], _REACH * max(hertz[line] for line in lines.values()))
+    low = frequency <= top
+    bases, short = [str(name).removesuffix(" mesh") for name in data["base"].values], symbols(data)
+    marks = [
+        (short[base] if h == 1 else f"{h} {short[base]}", h * hertz[line])
+        for base, line in lines.items()
+        for h in range(1, _HARMONICS + 1)
+    ]
+    (title, curves), *others = _panels(data, "amplitude", meshes, low)
+    title += f"      ({', '.join(f'{short[base]}: {bases[base]}' for base in lines)})"
+    from_to, changes = _speeds(data, transient)
+    figures = {
+        "mesh_force_spectrum": spectra(
+            frequency[low], [(title, curves), *others], lines=marks, unit="force [kN]", factor=1e-3,
+            title=f"{from_to}: lines smear over frequency, not over orders" if changes else from_to,
+        )
+    }  # fmt: skip
+    for base in lines:
+        if (figure := _side_bands(data, base, lines, from_to)) is not None:
+            figures[f"side_bands_{bases[base].replace(' ', '_')}"] = figure
+    return figures
+
+
+def _speeds(data: xr.Dataset, transient: xr.Dataset | None) -> tuple[str, bool]:
+    """Speeds of the first body in the spectra, and whether its change shifts a mesh line by a line."""
+    settle, mean = float(data.attrs["settle"]), float(data.attrs["speed"])
+    if transient is None or "spin" not in transient:
+        return f"after {settle:g} s, mean speed {mean / RPM:.4g} rpm", False
+    time, spin = transient["time"].values, transient["spin"].values[0]
+    speed = np.gradient(spin, time, edge_order=2)[time >= settle]
+    body, low, high = str(transient["body"].values[0]), speed.min(), speed.max()
+    hertz = data["line_frequency"].values[list(_mesh_lines(data).values())].max(initial=0.0)
+    if hertz * (high - low) / mean < float(data.attrs["resolution"]):
+        return f"after {settle:g} s, {body} at {mean / RPM:.4g} rpm", False
+    return f"after {settle:g} s, {body} from {low / RPM:.4g} to {high / RPM:.4g} rpm", True
+
+
+def _mesh_lines(data) -> dict[int, int]:
+    """Line of the mesh frequency, by the number of its base."""
+    orders = data["line_orders"].values
+    simple = np.flatnonzero(np.abs(orders).sum(axis=1) == 1)
+    meshes = set(data["mesh_base"].values.tolist())
+    pairs = [(int(np.flatnonzero(orders[line])[0]), line) for line in simple.tolist()]
+    return {base: line for base, line in pairs if base in meshes and orders[line, base] == 1}
+
+
+def _panels(data, name: str, meshes, kept):
+    values = data[name].values
+    variants = [str(text) for text in data["variant"].values]
+    return [
+        (str(data["mesh"].values[i]), [(text, values[v, i, kept]) for v, text in enumerate(variants)])
+        for i in meshes
+    ]
+
+
+def _side_bands(data, base: int, lines, title: str):
+    """Orders around a mesh line: turns of its own carrier, or mesh lines of the first planetary stage."""
+    planetary = int(data.attrs["planetary_stages"])
+    if not planetary:
+        return None
+    orders, order = data["line_orders"].values, data["line_order"].values
+    own = base < 2 * planetary
+    if own:
+        turn = np.flatnonzero((np.abs(orders).sum(axis=1) == 1) & (orders[:, base - 1] == 1))[0]
+        shift, text, width = order[turn], "turn", _TURNS * order[turn]
+    else:
+        shift, text = order[lines[1]], "f1"
+        width = _BESIDE * shift
+    centre, all_orders = order[lines[base]], data["order"].values
+    near = np.abs(all_orders - centre) <= width
+    if np.count_nonzero(near) < _LEAST_LINES:
+        return None
+    marks = [(f"{k:+d} {text}" if k else "mesh", centre + k * shift) for k in range(-3, 4)]
+    mesh = data["mesh_base"].values.tolist().index(base)
+    return spectra(
+        all_orders[near], _panels(data, "order_amplitude", [mesh], near),
+        lines=[mark for mark in marks if abs(mark[1] - centre) <= width], unit="force [kN]", factor=1e-3,
+        x="order of the first body [1]", title=title,
+    )  # fmt: skip
+
+
+def write_drivetrain_pictures(
+    folder: Path, case: DrivetrainCase, data: dict[str, xr.Dataset], *, progress: Progress | None = None
+) -> list[str]:
+    """Figures of the stages in `data`, by stage name; returns the names of the files.
+
+    Parameters
+    ----------
+    folder : path
+    case : DrivetrainCase
+    data : dict of str to Dataset
+        Contents of the stages' files.
+    progress : callable, optional
+        Called with ("pictures", done, total).
+    """
+    from femgear.report.style import save_figure
+    from femgear.trains.drivetrain.setup import case_model
+
+    model, figures, names = case_model(case), {}, []
+    if "modes" in data and len(model.meshes):
+        figures["stiffness_series"] = stiffness_figure(model)
+    if "modes" in data:
+        figures["campbell"] = campbell_figure(data["modes"])
+        names += mode_pictures(folder, model, data["modes"], case.simulation.modes)
+    if progress is not None:
+        progress("pictures", 1, 2)
+    if "transient" in data:
+        figures |= transient_figures(data["transient"])
+    if "spectrum" in data:
+        figures |= spectrum_figures(data["spectrum"], data.get("transient"))
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    if progress is not None:
+        progress("pictures", 2, 2)
+    return [*(f"{name}.png" for name in figures), *names]
+
+
+def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
+    """The lowest elastic modes as PNG files; returns their names.
+
+    Modes have the numbers of the table: the free spin, which is not drawn, is the first.
+    """
+    from femgear.trains.drivetrain.scene import ModeView, drivetrain_pictures
+
+    layout = drivetrain_layout(model.train)
+    wheels = [(w.centre, w.radius, w.width, w.body) for w in layout.wheels]
+    kinds, hertz = modes["kind"].values.astype(str), modes["frequency"].values
+    names, views = [], []
+    for mode in np.flatnonzero(kinds != "rigid")[:count].tolist():
+        shape = modes["shape"].values[:, mode]
+        title = f"mode {mode + 1}: {hertz[mode]:.2f} Hz, {kinds[mode]}"
+        names.append(f"drivetrain_mode_{mode + 1}.png")
+        moved = layout_motion(model, layout, shape)
+        views.append(ModeView(folder / names[-1], title, *moved, shaft_lines(model, layout, shape)))
+    if views:
+        drivetrain_pictures(views, wheels=wheels, centres=layout.centre, names=layout.names)
+    return names
+
+
+# Radius of bodies that carry no gear, and distance of wheels side by side, over the largest gear radius.
+_PLAIN, _BESIDE_layout = 0.9, 0.45
+# Phi of a shaft that shears and hardly bends: more does not show.
+_SHEAR_ALONE = 1e6
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A disc: name, centre (3,), radius and width [m]; index of the body's centre in `Layout.centre`."""
+
+    name: str
+    centre: np.ndarray
+    radius: float
+    width: float
+    body: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Discs, shafts between body centres, and places of all bodies.
+
+    ``centre`` (n_bodies, 3) [m], planets after the bodies; ``shafts`` pairs of body numbers. The drawing is a
+    scheme: bodies without gears get a radius, and two wheels of one body stand side by side.
+    """
+
+    names: tuple[str, ...]
+    centre: np.ndarray
+    wheels: tuple[Wheel, ...]
+    shafts: tuple[tuple[int, int], ...]
+
+
+def drivetrain_layout(train: Drivetrain) -> Layout:
+    """Places along z by shaft lengths, across it by centre distances."""
+    names = [body.name for body in train.bodies]
+    gears = [r for s in train.parallel for r in (s.first_radius, s.second_radius)]
+    gears += [stage.centre_distance for stage in train.planetary]
+    size = max(gears, default=0.3)
+    places = {names[0]: np.zeros(3)}
+    links = [(s.first, s.second, np.array([0.0, 0.0, s.length])) for s in train.shafts]
+    for s in train.parallel:
+        apart = s.first_radius + s.second_radius
+        beside = _BESIDE_layout * size if any(s.first == other.second for other in train.parallel) else 0.0
+        arm = [
+            apart * math.cos(s.direction),
+            apart * math.sin(s.direction),
+            s.first_offset - s.second_offset + beside,
+        ]
+        links.append((s.first, s.second, np.array(arm)))
+    links += [(s.carrier, s.sun, np.zeros(3)) for s in train.planetary]
+    for _ in names:
+        for first, second, arm in links:
+            if first in places:
+                places.setdefault(second, places[first] + arm)
+            elif second in places:
+                places[first] = places[second] - arm
+    centre = [places[name] for name in names]
+    wheels = _wheels(train, places, size)
+    for stage in train.planetary:
+        for p, angle in enumerate(stage.planet_angles):
+            arm = stage.centre_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
+            wheels.append(
+                Wheel(
+                    f"planet {p + 1}",
+                    places[stage.carrier] + arm,
+                    stage.planet_radius,
+                    0.2 * size,
+                    len(names),
+                )
+            )
+            names.append(
+                f"planet {p + 1}" if len(train.planetary) == 1 else f"planet of {stage.carrier} {p + 1}"
+            )
+            centre.append(places[stage.carrier] + arm)
+    shafts = tuple((names.index(s.first), names.index(s.second)) for s in train.shafts)
+    return Layout(tuple(names), np.array(centre), tuple(wheels), shafts)
+
+
+def _wheels(train: Drivetrain, places, size: float) -> list[Wheel]:
+    order = [body.name for body in train.bodies]
+    found = []
+    for stage in train.planetary:
+        plate = places[stage.carrier] - np.array([0.0, 0.0, 0.2 * size])
+        found.append((stage.carrier, plate, stage.centre_distance, 0.06 * size))
+        found.append((stage.sun, places[stage.sun], stage.sun_radius, 0.2 * size))
+    for stage in train.parallel:
+        other = places[stage.second] * np.array([0.0, 0.0, 1.0])
+        first = places[stage.first] * np.array([1.0, 1.0, 0.0]) + other
+        found.append((stage.first, first, stage.first_radius, 0.2 * size))
+        found.append((stage.second, places[stage.second], stage.second_radius, 0.2 * size))
+    geared = {name for name, *_ in found}
+    found += [(n, places[n], _PLAIN * size, 0.3 * size) for n in order if n not in geared]
+    return [Wheel(name, centre, radius, width, order.index(name)) for name, centre, radius, width in found]
+
+
+def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.ndarray, np.ndarray]:
+    """Translation and rotation vector (n, 3) of every place of the layout under a motion (n_free,).
+
+    Planets fixed to their pins follow the carrier, at its angle zero.
+    """
+    train = model.train
+    place, full = _all_coordinates(model, shape)
+    move, turn = np.zeros((2, len(layout.names), 3))
+    for row, body in enumerate(train.bodies):
+        x, y, *turns = full[place.body[body.name] : place.body[body.name] + 5]
+        move[row], turn[row] = (x, y, 0.0), turns
+    row = len(train.bodies)
+    for stage, planets in zip(train.planetary, place.planets):
+        at = [body.name for body in train.bodies].index(stage.carrier)
+        for planet in planets:
+            arm = layout.centre[row] - layout.centre[at]
+            move[row] = move[at] + np.cross(turn[at], arm)
+            turn[row] = *turn[at][:2], full[planet[2]]
+            row += 1
+    return move, turn
+
+
+def shaft_lines(
+    model: DrivetrainModel, layout: Layout, shape, *, points: int = 8
+) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """Centre lines of the shafts under a motion: places at rest and displacements, (k, 3) each.
+
+    A shaft passes through its stations, between them by the shape functions of its elements; one that is
+    modelled as a joint is drawn as the one element whose static stiffness the joint stands for.
+
+    Parameters
+    ----------
+    model : DrivetrainModel
+    layout : Layout
+        Of ``model.train``.
+    shape : (n_free,) array
+        Motion of the free coordinates.
+    points : int
+        Pieces of an element of a beam.
+
+    Returns
+    -------
+    tuple of (rest, displacement)
+        In the order of the shafts of the chain [m].
+    """
+    place, full = _all_coordinates(model, shape)
+    found = []
+    for shaft, inner, ends in zip(model.train.shafts, place.inner, layout.shafts):
+        first = np.array([place.body[shaft.first], *inner, place.body[shaft.second]])
+        stations = full[first[:, None] + np.arange(5)]
+        share, across = _beam_line(shaft, stations, points if shaft.elements else 3 * points)
+        one, two = layout.centre[list(ends)]
+        rest = one + share[:, None] * (two - one)
+        found.append((rest, np.column_stack([across, np.zeros(len(share))])))
+    return tuple(found)
+
+
+def _all_coordinates(model: DrivetrainModel, shape):
+    """Places of all coordinates, and their values (n,) under a motion of the free ones."""
+    place = coordinates_of(model.train)
+    T, _ = free_coordinates(model.train, place)
+    return place, T @ np.asarray(shape, float)
+
+
+def _beam_line(shaft, stations, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the length (k,) and displacements (k, 2) of a beam through its stations (n + 1, 5)."""
+    count = max(shaft.elements, 1)
+    length = shaft.length / count
+    share = np.linspace(0.0, 1.0, count * points + 1)
+    element = np.minimum(np.arange(len(share)) // points, count - 1)
+    ratio = shaft.section.shear_ratio(length) if shaft.elements else _joint_shear_ratio(shaft)
+    N = beam_shape(share * count - element, length, ratio)
+    # a tilt about y is the slope of x, one about x minus that of y
+    ends = np.stack([stations[element], stations[element + 1]], axis=1)
+    x = np.einsum("kn,kn->k", N, ends[:, :, [0, 3]].reshape(-1, 4))
+    y = np.einsum("kn,kn->k", N, (ends[:, :, [1, 2]] * np.array([1.0, -1.0])).reshape(-1, 4))
+    return share, np.column_stack([x, y])
+
+
+def _joint_shear_ratio(shaft) -> float:
+    """Phi of the Timoshenko shaft whose static stiffness is that of a joint's springs.
+
+    Bending ``E I / l`` and shear ``12 E I / ((1 + Phi) l^3)``, `femgear.system.shaft.joint_springs`. Under a
+    spherical joint no force crosses the shaft, which then bends to a parabola whatever Phi is.
+    """
+    springs = shaft.springs
+    if math.isinf(springs.shear):
+        return 0.0
+    return float(np.clip(12.0 * springs.bending / (springs.shear * shaft.length**2) - 1.0, 0.0, _SHEAR_ALONE))
+
+
+def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
+    """Deflection (k, 4) of a Timoshenko element per unit of (w, slope) at its first and second end.
+
+    Exact for an element without load; ``xi`` (k,) runs from 0 to 1, ``slope`` is the turn of the section.
+    These are the functions behind the consistent mass of `femgear.system.shaft.beam_element`
+    (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 11.3; Z. Friedman and
+    J. B. Kosmatka, Comput. Struct. 47, 1993, 473-481).
+    """
+    xi, phi = np.asarray(xi, float), shear_ratio
+    rest = 1.0 - xi
+    return np.stack([
+        1.0 - 3.0 * xi**2 + 2.0 * xi**3 + phi * rest,
+        length * (xi * rest**2 + 0.5 * phi * xi * rest),
+        3.0 * xi**2 - 2.0 * xi**3 + phi * xi,
+        -length * (xi**2 * rest + 0.5 * phi * xi * rest),
+    ], axis=-1) / (1.0 + phi)  # fmt: skip

@@ -1,0 +1,747 @@
+"""Results of a drivetrain case as xarray datasets: modes.nc, transient.nc, spectrum.nc.
+
+What the motion of a drivetrain says against itself.
+
+Tables of drivetrains: the chain of a case, and the numbers of a run.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.report.tables import Block
+from femgear.storage.dataset import RPM, dataset
+from femgear.trains.drivetrain.data import numbered
+from femgear.trains.drivetrain.time import (
+    GOOD_STEPS,
+    PASS_BAND,
+    frequency_shift,
+    highest_mesh,
+    mesh_mode,
+    shift_rate,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.solvers.linear.campbell import CampbellData
+    from femgear.system.system import Modes
+    from femgear.trains.drivetrain.data import TorqueHistory
+    from femgear.trains.drivetrain.model import DrivetrainModel
+    from femgear.trains.drivetrain.section import DrivetrainCase
+    from femgear.trains.drivetrain.spectra import AveragedSpectrum, MeshLine
+    from femgear.trains.drivetrain.time import DrivetrainRun, SpeedRange
+
+_MOST_PANELS = 6
+
+
+_PLANET = re.compile(r"(?:^|-)planet (\d+)(?: \d+)?(?:-ring of |$)")
+
+
+def chosen_meshes(data: xr.Dataset) -> list[int]:
+    """One mesh of every kind: of planet 1 of every planetary stage, and of every parallel stage."""
+    numbers = [_PLANET.search(str(name)) for name in data["mesh"].values]
+    return [i for i, found in enumerate(numbers) if found is None or found[1] == "1"][:_MOST_PANELS]
+
+
+def symbols(data: xr.Dataset) -> list[str]:
+    """Short names of the base frequencies of spectrum.nc: t, or t1 .., turns of carriers; f1 .. meshes."""
+    stages, found, meshes = int(data.attrs["planetary_stages"]), [], 0
+    for base in range(data.sizes["base"]):
+        if base < 2 * stages and base % 2 == 0:
+            found.append("t" if stages == 1 else f"t{base // 2 + 1}")
+        else:
+            meshes += 1
+            found.append(f"f{meshes}")
+    return found
+
+
+@dataclass(frozen=True)
+class DrivetrainModesResult:
+    """Modes at standstill with mean mesh stiffnesses, and over the speed with gyroscopic terms."""
+
+    model: DrivetrainModel
+    modes: Modes
+    campbell: CampbellData
+    speed: float
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of modes.nc."""
+
+        return drivetrain_modes_dataset(self)
+
+
+@dataclass(frozen=True)
+class TransientResult:
+    """Motion in time, by variant: with bending, and torsional where it is asked for."""
+
+    models: dict[str, DrivetrainModel]
+    runs: dict[str, DrivetrainRun]
+    torques: tuple[TorqueHistory, ...]
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of transient.nc."""
+
+        return transient_dataset(self)
+
+
+@dataclass(frozen=True)
+class SpectrumResult:
+    """Spectra of the mesh forces by variant, over frequency and order, and the named lines."""
+
+    transient: TransientResult
+    settle: float
+    speed: float
+    spectra: dict[str, AveragedSpectrum]
+    orders: dict[str, AveragedSpectrum]
+    lines: tuple[MeshLine, ...]
+    amplitudes: dict[str, np.ndarray]
+    order_distance: float
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of spectrum.nc."""
+
+        return spectrum_dataset(self)
+
+
+# Share of rotations in the kinetic energy above which a mode is torsional; bending below what is left.
+_TORSION = 0.9
+
+
+def _names(name: str, values, long_name: str) -> tuple:
+    """A coordinate of names, those that come again with a number."""
+    return (name,), numbered([str(value) for value in values]), "1", long_name
+
+
+def drivetrain_modes_dataset(result: DrivetrainModesResult) -> xr.Dataset:
+    """Contents of modes.nc of a drivetrain."""
+    modes, model, found = result.modes, result.model, result.campbell
+    members, energy, rotation = _energies(model, modes.shape)
+    bases = np.unique(model.mesh_base)
+    variables = {
+        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
+        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
+        "kind": (("mode",), _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
+        "rotation_share": (("mode",), rotation, "1", "share of rotations in the kinetic energy"),
+        "energy": (("member", "mode"), energy, "1", "share of the member in the kinetic energy"),
+        "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+        "mesh_stiffness": (("mesh",), model.mean_stiffness, "N/m", "mean mesh stiffness"),
+        "mesh_deflection": (
+            ("mesh", "mode"), modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode",
+        ),
+        "ratio": (("body",), list(model.ratio.values()), "1", "speed over that of the first body"),
+        "base_order": (("base",), model.base_ratio[bases], "1", "mesh frequency over the first body's turn"),
+        "mesh_frequency": (
+            ("base",), model.base_ratio[bases] * result.speed / (2 * np.pi), "Hz",
+            "mesh frequency at the speed of the operation",
+        ),
+        "campbell_frequency": (
+            ("campbell_speed", "branch"), found.frequency, "Hz", "natural frequency over the speed",
+        ),
+        "critical_speed": (
+            ("crossing",), [c.speed / RPM for c in found.critical], "rpm", "speed of a mesh line on a branch",
+        ),
+        "critical_frequency": (
+            ("crossing",), [c.frequency for c in found.critical], "Hz", "frequency there",
+        ),
+    }  # fmt: skip
+    coords = {
+        "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
+        "dof": _names("dof", model.system.dofs, "degree of freedom"),
+        "member": _names("member", members, "body, planet or shaft station"),
+        "mesh": _names("mesh", model.meshes, "gear mesh"),
+        "body": _names("body", model.ratio, "body"),
+        "base": _names("base", [model.bases[b] for b in bases], "mesh of a stage"),
+        "campbell_speed": (("campbell_speed",), found.speed / RPM, "rpm", "speed of the first body"),
+    }
+    attrs = {"title": "modes of the drivetrain, mean mesh stiffness", "unknowns": len(modes.shape)}
+    return dataset(variables, coords, attrs)
+
+
+def _energies(model, shape):
+    """Members, their shares of the kinetic energy (members, modes), and the share of rotations (modes,)."""
+    density = shape * (model.system.M @ shape)
+    density = density / density.sum(axis=0)
+    owner = [name.split(":")[0] for name in model.system.dofs]
+    members = list(dict.fromkeys(owner))
+    energy = np.zeros((len(members), shape.shape[1]))
+    np.add.at(energy, [members.index(one) for one in owner], density)
+    turning = [name.endswith(": rotation") for name in model.system.dofs]
+    return members, energy, density[turning].sum(axis=0)
+
+
+def _kinds(frequency, rotation) -> list[str]:
+    rigid = frequency < 1e-7 * frequency.max(initial=1e-300)
+    words = np.where(
+        rotation > _TORSION, "torsional", np.where(rotation < 1.0 - _TORSION, "bending", "mixed")
+    )
+    return [str(word) for word in np.where(rigid, "rigid", words)]
+
+
+def transient_dataset(result: TransientResult) -> xr.Dataset:
+    """Contents of transient.nc."""
+    runs = list(result.runs.values())
+    first, model = runs[0], next(iter(result.models.values()))
+    ratio = np.array(list(model.ratio.values()))
+    bodies, tvb = list(model.ratio), ("variant", "time", "body")
+    torque = np.zeros((len(first.time), len(bodies)))
+    for history in result.torques:
+        torque[:, bodies.index(history.body)] += history.at(first.time)
+    speed = [run.spin_speed[:, None] * ratio + run.velocity for run in runs]
+    negative = "on the back flank" if first.contact_loss else "where the linear mesh pulls"
+    books = {
+        "energy_error": ([run.ledger.error for run in runs], "error of the energy balance, relative"),
+        "momentum_error": ([run.momentum for run in runs], "error of the angular momentum, relative"),
+    }
+    variables = {
+        "spin": (
+            ("variant", "time"), [run.spin for run in runs], "rad",
+            "angle of the first body without its deviation",
+        ),
+        "speed": (tvb, speed, "rad/s", "speed of rotation"),
+        "deviation": (
+            tvb, [run.motion for run in runs], "rad", "rotation less that of the free spin, ratio times spin",
+        ),
+        "mesh_force": (
+            ("variant", "time", "mesh"), [run.force for run in runs], "N",
+            f"mesh force along the line of action; negative {negative}",
+        ),
+        "least_force": (
+            ("variant", "mesh"), [run.extremes[0] for run in runs], "N", "least mesh force at any step",
+        ),
+        "largest_force": (
+            ("variant", "mesh"), [run.extremes[1] for run in runs], "N", "largest mesh force at any step",
+        ),
+        "pulling": (
+            ("variant", "mesh"), [run.pulling for run in runs], "1", "share of steps with a negative force",
+        ),
+        "lost": (
+            ("variant", "mesh"), [run.lost for run in runs], "1", "share of steps in which no flank touches",
+        ),
+        "growth": (
+            ("variant",), [run.growth for run in runs], "1/s",
+            "mean rate of the logarithm of the free motion: above zero it grows",
+        ),
+        "gain": (
+            ("variant",), [run.gain for run in runs], "1",
+            "largest growth of the free motion between two instants of the run, as a factor",
+        ),
+        "torque": (("time", "body"), torque, "N m", "external torque"),
+        "ratio": (("body",), ratio, "1", "speed over that of the first body"),
+        **{name: (("variant",), values, "1", words) for name, (values, words) in books.items()},
+    }  # fmt: skip
+    coords = {
+        "variant": _names("variant", result.runs, "model"),
+        "time": (("time",), first.time, "s", "time"),
+        "body": _names("body", bodies, "body"),
+        "mesh": _names("mesh", first.meshes, "gear mesh"),
+    }
+    every = 1 if len(first.time) < 2 else round((first.time[1] - first.time[0]) / first.step)
+    attrs = {
+        "title": "motion of the drivetrain in time",
+        "step": first.step,
+        "steps": first.steps,
+        "every": every,
+        "contact": "separating" if first.contact_loss else "linear",
+        "damping_ratio": model.train.damping_ratio,
+        "filter": "linear-phase low pass, 0.8 to 1.0 of half the record rate, 80 dB" if every > 1 else "none",
+    }
+    return dataset(variables, coords, attrs)
+
+
+def spectrum_dataset(result: SpectrumResult) -> xr.Dataset:
+    """Contents of spectrum.nc."""
+    from femgear.trains.drivetrain.spectra import resolved_lines
+
+    transient = result.transient
+    model, variants = next(iter(transient.models.values())), list(result.spectra)
+    some, tracked = result.spectra[variants[0]], result.orders
+    length = min(len(one.frequency) for one in tracked.values())
+    order = tracked[variants[0]].frequency[:length]
+    lines, distance = result.lines, result.order_distance
+    variables = {
+        "amplitude": (
+            ("variant", "mesh", "frequency"), [result.spectra[v].amplitude for v in variants], "N",
+            "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values",
+        ),
+        "order_amplitude": (
+            ("variant", "mesh", "order"), [tracked[v].amplitude[:, :length] for v in variants], "N",
+            "amplitude of the mesh force over orders of the first body, one segment, peak values",
+        ),
+        "line_order": (("line",), [line.order for line in lines], "1", "order of the first body"),
+        "line_frequency": (
+            ("line",), [line.order * result.speed / (2 * np.pi) for line in lines], "Hz",
+            "frequency at the mean speed",
+        ),
+        "line_amplitude": (
+            ("variant", "line", "mesh"), [result.amplitudes[v] for v in variants], "N",
+            "amplitude of the line, peak value; NaN beyond the pass band",
+        ),
+        "line_orders": (
+            ("line", "base"), [line.orders for line in lines], "1", "multiples of the base frequencies",
+        ),
+        "mesh_base": (("mesh",), model.mesh_base, "1", "number of the base of the mesh stiffness"),
+        "resolved": (
+            ("line",), resolved_lines(model, lines, distance), "1",
+            "whether the record parts the line from its neighbours",
+        ),
+    }  # fmt: skip
+    coords = {
+        "variant": _names("variant", variants, "model"),
+        "mesh": _names("mesh", model.meshes, "gear mesh"),
+        "frequency": (("frequency",), some.frequency, "Hz", "frequency"),
+        "order": (("order",), order, "1", "order of the first body"),
+        "line": _names("line", [line.name for line in lines], "line"),
+        "base": _names("base", model.bases, "base frequency: turn of a carrier, or mesh"),
+    }
+    attrs = {
+        "title": "spectra of the mesh forces",
+        "window": some.window,
+        "segments": some.segments,
+        "overlap": 0.5,
+        "resolution": some.resolution,
+        "bandwidth": some.bandwidth,
+        "order_resolution": distance,
+        "settle": result.settle,
+        "speed": result.speed,
+        "planetary_stages": len(model.train.planetary),
+    }
+    return dataset(variables, coords, attrs)
+
+
+# The step rule keeps energy and momentum exactly: more is rounding that grew, or a motion that runs away.
+_BALANCE = 1e-6
+# Linear meshes: a free motion that grows by more than this over a run is no longer small.
+GROWN = 10.0
+# The same between any two instants of it.
+_GAINED = 1e3
+# A force that is rounding [N].
+_NOTHING = 1e-6
+
+
+def transient_warnings(data: xr.Dataset) -> Iterator[str]:
+    """What transient.nc says against itself."""
+    pulling, least = data["pulling"].values, data["least_force"].values
+    for v, variant in enumerate(data["variant"].values):
+        if pulling[v].any() and least[v].min() < -_NOTHING and not separating(data):
+            worst, lowest = int(np.argmax(pulling[v])), int(np.argmin(least[v]))
+            beside = "" if lowest == worst else f" {data['mesh'].values[lowest]}"
+            yield (
+                f"[W-PULL] {variant}: {data['mesh'].values[worst]} pulls for {pulling[v, worst]:.2%} of the "
+                f"time,{beside} with up to "
+                f"{-1e-3 * least[v, lowest]:.4g} kN: real teeth would part (simulation.contact_loss)"
+            )
+    yield from _parted_warnings(data)
+    yield from _growth_warnings(data)
+    for name, words in (("energy_error", "energy"), ("momentum_error", "angular momentum")):
+        if not (error := float(data[name].max())) <= _BALANCE:
+            yield f"[W-BALANCE] the balance of {words} misses {error:.1e} of its largest term"
+
+
+def _parted_warnings(data: xr.Dataset) -> Iterator[str]:
+    """Meshes whose flanks are apart at every step."""
+    if not separating(data):
+        return
+    meshes = data["mesh"].values
+    for variant, lost in zip(data["variant"].values, data["lost"].values):
+        if names := [str(mesh) for mesh, share in zip(meshes, lost) if share >= 1.0]:
+            yield (
+                f"[W-PARTED] {variant}: the teeth of {', '.join(names)} never touch and transmit nothing; "
+                "give torques or a start that close the flanks"
+            )
+
+
+def _growth_warnings(data: xr.Dataset) -> Iterator[str]:
+    if separating(data):
+        yield from _chaos_warnings(data)
+        return
+    duration, gains = float(data.attrs["steps"]) * float(data.attrs["step"]), largest_gains(data)
+    pulls = data["least_force"].values.min(axis=1, initial=0.0) < -_NOTHING
+    for (variant, rate), pulled in zip(growth_rates(data), pulls):
+        gain = gains.get(variant, math.nan)
+        if rate * duration > math.log(GROWN):
+            times = shown_factor(rate * duration / math.log(10.0))
+            found = f"grows with {rate:.4g} 1/s, {times} times over the run"
+        elif gain > _GAINED:
+            way = "grows slowly" if rate > 0.0 else "decays"
+            found = f"{way} in the mean, but grows {shown_factor(math.log10(gain))} times on the way"
+        else:
+            continue
+        senseless = gain > _GAINED and pulled
+        yield (
+            f"[W-GROWTH] {variant}: the free motion {found}: a parametric resonance"
+            f"{'; these forces mean nothing: real teeth part long before' if senseless else ''}; give more "
+            "damping or another speed, or contact_loss = true"
+        )
+
+
+def _chaos_warnings(data: xr.Dataset) -> Iterator[str]:
+    """Motions with contact loss that depend on every detail, steps included."""
+    duration = float(data.attrs["steps"]) * float(data.attrs["step"])
+    for variant, rate in growth_rates(data):
+        if rate * duration > math.log(GROWN):
+            yield (
+                f"[W-CHAOS] {variant}: neighbouring motions move apart with {rate:.4g} 1/s: times of contact "
+                "and peaks depend on every detail, the steps included; compare two values of simulation.rate"
+            )
+
+
+def separating(data: xr.Dataset) -> bool:
+    """Whether the meshes of transient.nc lose contact."""
+    return data.attrs.get("contact", "linear") == "separating"
+
+
+def growth_rates(data: xr.Dataset) -> Iterator[tuple[str, float]]:
+    """Variants and the rates of their free motions [1/s]; results of earlier runs have none."""
+    if "growth" in data:
+        yield from zip(map(str, data["variant"].values), map(float, data["growth"].values))
+
+
+def largest_gains(data: xr.Dataset) -> dict[str, float]:
+    """Largest growth of the free motion within the run, by variant; results of earlier runs have none."""
+    if "gain" not in data:
+        return {}
+    return dict(zip(map(str, data["variant"].values), map(float, data["gain"].values)))
+
+
+def shown_factor(power: float) -> str:
+    """Ten to a power that may be beyond all numbers."""
+    return f"{10.0**power:.3g}" if power < 300.0 else f"1e{power:.0f}" if math.isfinite(power) else "1e308"
+
+
+_SHOWN = 16
+# A speed that changes by more is worth a remark.
+_CHANGE = 2.0
+# Share by which steps may lower the frequency of a mode that the meshes drive, and a small one.
+_SHIFT, _SMALL_SHIFT = 1e-2, 1e-3
+
+
+def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
+    """Bodies, shafts, gear stages, operation and warnings of a drivetrain case.
+
+    Raises
+    ------
+    CaseError
+        As `femgear.trains.drivetrain.setup.check_drivetrain`.
+    """
+    from femgear.trains.drivetrain.setup import check_drivetrain
+
+    model = check_drivetrain(case)
+    return (
+        Block(case.title),
+        _bodies(case, model),
+        _shafts(model),
+        _stages(case, model),
+        _operation(case, model),
+        Block("Warnings", notes=drivetrain_warnings(case, model) or ("none",)),
+    )
+
+
+def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = None) -> tuple[str, ...]:
+    """What is allowed but deserves a look, in sentences; the model is made where it is not given.
+
+    Raises
+    ------
+    CaseError
+        As `femgear.trains.drivetrain.setup.check_drivetrain`, without a model.
+    """
+    from femgear.trains.drivetrain.setup import case_speeds, check_drivetrain
+
+    model = model or check_drivetrain(case)
+    speeds = case_speeds(case, model)
+    warned = (
+        _runaway(case, speeds),
+        _rates(case, model, speeds),
+        _spectra(case, model),
+        _undamped(case),
+    )
+    return (*case.notices, *(text for some in warned for text in some))
+
+
+def _undamped(case: DrivetrainCase) -> Iterator[str]:
+    """Runs in which nothing takes energy out of vibration."""
+    if case.simulation.damping_ratio == 0.0:
+        yield (
+            "[W-DAMPING] simulation.damping_ratio: 0, no damping at all: vibration of the start never dies "
+            "away, resonances grow until something else stops them, and teeth seem to part that would not; "
+            "gear trains are commonly computed with 0.02 to 0.05"
+        )
+
+
+def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
+    """Torques that change the speed more than a run is meant for."""
+    first = speeds.first
+    if speeds.highest <= _CHANGE * first and speeds.lowest >= first / _CHANGE:
+        return
+    rpm = [f"{value / RPM:.6g}" for value in (first, speeds.last, speeds.lowest, speeds.highest)]
+    between = (
+        "" if speeds.last in (speeds.lowest, speeds.highest) else f" ({rpm[2]} to {rpm[3]} rpm on the way)"
+    )
+    turns = " and turn it back" if speeds.lowest < 0.0 else ""
+    yield (
+        f"[W-SPEED] operation.torque: the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
+        f"{case.simulation.duration:g} s{between}{turns}; share = 1.0 on another body balances them"
+    )
+
+
+def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[str]:
+    """Steps and records that are too slow for the highest mesh frequency, at the fastest speed."""
+    from femgear.trains.drivetrain.setup import record_rate
+
+    name, top = highest_mesh(model, speeds.fastest)
+    rate, record = case.simulation.rate, record_rate(case, model)
+    where = f"{top:.4g} Hz"
+    if speeds.fastest > 1.01 * speeds.first:
+        where += f" at {speeds.fastest / RPM:.6g} rpm, the fastest"
+    if rate < GOOD_STEPS * top:
+        yield (
+            f"[W-RATE] simulation.rate: {rate / top:.3g} steps a period of the {name} ({where}) shift and "
+            f"damp it; take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz"
+        )
+    # modes above the last line of the mesh stiffness answer as springs
+    mode = mesh_mode(model, top * case.simulation.harmonics)
+    if (shift := frequency_shift(mode, rate)) > _SHIFT:
+        yield (
+            f"[W-RATE] simulation.rate: steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the "
+            f"meshes drive, by {shift:.2%}; {_up(shift_rate(mode, _SHIFT))} Hz lowers it by {_SHIFT:.0%}, "
+            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {_SMALL_SHIFT:.1%}"
+        )
+    if 0.5 * PASS_BAND * record < top:
+        yield (
+            f"[W-RECORD] simulation.record: records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, "
+            f"below the {name} ({where})"
+        )
+
+
+def _up(value: float) -> str:
+    """Three digits, rounded up."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return f"{math.ceil(value / unit) * unit:.12g}"
+
+
+def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
+    """Runs that stop before the spectra, which would be refused."""
+    from femgear.trains.drivetrain.setup import check_spectrum
+
+    if not len(model.meshes):
+        return
+    try:
+        check_spectrum(case, model)
+    except CaseError as error:
+        yield f"[W-SPECTRUM] {error.key}: {error.message}: the stage spectrum refuses this ({error.code})"
+
+
+def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
+    rows = []
+    for body in model.train.bodies:
+        held = [one for one in model.train.bearings if one.body == body.name]
+        rows.append(
+            (
+                body.name,
+                f"{body.inertia:.6g}",
+                f"{body.mass:.6g}",
+                f"{body.transverse_inertia:.6g}" if body.tilts else "-",
+                _spring(sum(one.radial for one in held), 3) if held else "-",
+                f"{model.ratio[body.name]:.6g}",
+                f"{model.ratio[body.name] * case.operation.speed / RPM:.4f}",
+            )
+        )
+    header = (
+        "", "inertia [kg m^2]", "mass [kg]", "about a diameter", "bearings [N/m]", "ratio", "speed [rpm]",
+    )  # fmt: skip
+    notes = (
+        f"{len(model.rigid)} degrees of freedom, {len(model.meshes)} meshes; inertia of the chain about the "
+        f"axis of {model.train.bodies[0].name} {model.inertia:.6g} kg m^2",
+    )
+    return Block("Bodies", header, tuple(rows), notes)
+
+
+def _shafts(model: DrivetrainModel) -> Block:
+    rows = []
+    for one in model.train.shafts:
+        s = one.springs
+        kind = f"beam, {one.elements} elements" if one.elements else "joint"
+        values = (_spring(value, 4) for value in (s.bending, s.torsion, s.shear))
+        rows.append((f"{one.first} - {one.second}", f"{one.length:.4g}", *values, kind))
+    header = ("", "length [m]", "bending [N m/rad]", "torsion [N m/rad]", "shear [N/m]", "model")
+    return Block("Shafts", header, tuple(rows))
+
+
+def _spring(stiffness: float, digits: int) -> str:
+    return "rigid" if math.isinf(stiffness) else f"{stiffness:.{digits}g}"
+
+
+def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
+    train, hertz = model.train, model.frequencies(case.operation.speed) / (2.0 * np.pi)
+    rows = []
+    for i, (one, given) in enumerate(zip(train.planetary, case.planetary)):
+        teeth = f"{given.sun_teeth} / {given.ring_teeth}, {len(one.planet_angles)} planets"
+        radii = f"{1e3 * one.sun_radius:.4f}, {1e3 * one.planet_radius:.4f}, {1e3 * one.ring_radius:.4f}"
+        contact = f"{one.sun_mesh.contact_ratio:.4g}, {one.ring_mesh.contact_ratio:.4g}"
+        stiffness = f"{one.sun_mesh.stiffness:.4g}, {one.ring_mesh.stiffness:.4g}"
+        ratio = model.ratio[one.sun] / model.ratio[one.carrier]
+        driver, line = one.driver or one.ends[0], f"{hertz[2 * i + 1]:.4f}"
+        rows.append((one.name, driver, teeth, radii, f"{ratio:.5g}", contact, stiffness, line))
+    for i, (one, given) in enumerate(zip(train.parallel, case.parallel)):
+        radii = f"{1e3 * one.first_radius:.4f}, {1e3 * one.second_radius:.4f}"
+        ratio = model.ratio[one.second] / model.ratio[one.first]
+        line = hertz[2 * len(train.planetary) + i]
+        rows.append(
+            (
+                one.name, one.driver or one.ends[0], f"{given.teeth[0]} / {given.teeth[1]}", radii,
+                f"{ratio:.5g}",
+                f"{one.mesh.contact_ratio:.4g}", f"{one.mesh.stiffness:.4g}", f"{line:.4f}",
+            )
+        )  # fmt: skip
+    header = (
+        "stage", "driver", "teeth", "pitch radii [mm]", "ratio", "contact ratio", "stiffness [N/m]",
+        "mesh [Hz]",
+    )  # fmt: skip
+    return Block("Gear stages", header, tuple(rows))
+
+
+def _operation(case: DrivetrainCase, model: DrivetrainModel) -> Block:
+    from femgear.trains.drivetrain.setup import case_speeds, record_rate, torque_histories
+
+    rows, drive = [], 0.0
+    for one in torque_histories(case, model.ratio):
+        low, high = one.values.min(), one.values.max()
+        text = f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}, {len(one.times)} points"
+        rows.append((one.body, text))
+        drive += float(one.values[0]) * model.ratio[one.body]
+    s = case.simulation
+    contact = "meshes part" if s.contact_loss else "meshes keep contact"
+    change, last = drive / model.inertia / RPM, case_speeds(case, model).last / RPM
+    notes = (
+        f"first body {case.operation.speed / RPM:.6g} rpm at the start, where the torques change it by "
+        f"{round(change, 6) + 0.0:.4g} rpm a second; {last:.6g} rpm at the end",
+        f"{s.duration:g} s at {s.rate:g} steps a second, {record_rate(case, model):g} records a second; "
+        f"{contact}",
+        _damping(s.damping_ratio),
+    )
+    return Block("Operation", ("torque on", "[N m]"), tuple(rows), notes)
+
+
+def _damping(ratio: float) -> str:
+    return f"damping {100.0 * ratio:g} % of critical in all modes" if ratio else "no damping"
+
+
+def describe_drivetrain_modes(data: xr.Dataset) -> Block:
+    """Table of modes.nc of a drivetrain."""
+    shown = min(data.sizes["mode"], _SHOWN)
+    energy, members = data["energy"].values, [str(name) for name in data["member"].values]
+    rows = []
+    for i in range(shown):
+        most = np.argsort(-energy[:, i])[:2]
+        where = ", ".join(f"{members[m]} {energy[m, i]:.0%}" for m in most)
+        share = f"{float(data['rotation_share'][i]):.1%}"
+        hertz = f"{float(data['frequency'][i]):.3f}"
+        rows.append((str(i + 1), hertz, str(data["kind"].values[i]), share, where))
+    top = float(data["frequency"].max())
+    notes = [f"{data.sizes['mode']} modes up to {top:.0f} Hz, the first {shown} shown"]
+    lines = zip(data["base"].values, data["mesh_frequency"].values)
+    if data.sizes["base"]:
+        notes.append("mesh lines: " + ", ".join(f"{name} {float(value):.3f} Hz" for name, value in lines))
+    header = ("mode", "frequency [Hz]", "kind", "rotation", "kinetic energy in")
+    return Block("Modes", header, tuple(rows), tuple(notes))
+
+
+def describe_transient(data: xr.Dataset) -> Block:
+    """Table of transient.nc: mesh forces, those of all steps beside the recorded ones, speeds, balances."""
+    rows, recorded = [], data["mesh_force"].values
+    mean, low, high = (getattr(recorded, name)(axis=1) for name in ("mean", "min", "max"))
+    least, largest, pulling = (data[name].values for name in ("least_force", "largest_force", "pulling"))
+    parts, thinned = separating(data), int(data.attrs["every"]) > 1
+    for v, variant in enumerate(data["variant"].values):
+        for m, mesh in enumerate(data["mesh"].values):
+            shown = (mean, least, largest, *((low, high) if thinned else ()))
+            forces = [f"{1e-3 * values[v, m]:.4f}" for values in shown]
+            shares = [f"{100.0 * pulling[v, m]:.2f}"]
+            if parts:
+                shares.insert(0, f"{100.0 * float(data['lost'][v, m]):.2f}")
+            rows.append((str(variant), str(mesh), *forces, *shares))
+    shares = ("no contact [% of time]", "back flank [% of time]") if parts else ("pulling [% of time]",)
+    records = ("least recorded [kN]", "largest recorded [kN]") if thinned else ()
+    header = ("model", "mesh", "mean [kN]", "least [kN]", "largest [kN]", *records, *shares)
+    speed, body = data["speed"].values[0], str(data["body"].values[0])
+    notes = [
+        f"{data.attrs['steps']} steps, at any of which least and largest force may be; {body} from "
+        f"{speed[0, 0] / RPM:.4f} to {speed[-1, 0] / RPM:.4f} rpm",
+        *_recorded(data, thinned),
+        *([_damping(float(data.attrs["damping_ratio"]))] if "damping_ratio" in data.attrs else []),
+        f"energy balance {float(data['energy_error'].max()):.1e}, angular momentum "
+        f"{float(data['momentum_error'].max()):.1e}",
+        *_growth_notes(data),
+    ]
+    if pulling.any() and not parts:
+        notes.append("these meshes are linear and keep contact: where they pull, real teeth part")
+    return Block("Transient", header, tuple(rows), tuple(notes))
+
+
+def _recorded(data: xr.Dataset, thinned: bool) -> Iterator[str]:
+    if thinned:
+        top = 0.5 * PASS_BAND / (float(data.attrs["step"]) * int(data.attrs["every"]))
+        yield (
+            f"recorded: what is left of them in files and pictures, every {data.attrs['every']}th step "
+            f"behind a low pass that ends at {top:.4g} Hz"
+        )
+
+
+def _growth_notes(data: xr.Dataset) -> Iterator[str]:
+    for variant, rate in growth_rates(data):
+        if not math.isfinite(rate):
+            continue
+        if separating(data):
+            words = "move apart: the motion is chaotic or unstable" if rate > 0.0 else "draw together"
+            yield f"{variant}: neighbouring motions {words} (Lyapunov exponent {rate:.4g} 1/s)"
+        else:
+            way = "grows" if rate > 0.0 else "decays"
+            text = f"{variant}: the free motion {way} with {abs(rate):.4g} 1/s in the mean"
+            gain = largest_gains(data).get(variant, math.nan)
+            yield f"{text}, at most {shown_factor(math.log10(gain))} times" if gain > GROWN else text
+
+
+def describe_spectrum(data: xr.Dataset) -> Block:
+    """Table of spectrum.nc: amplitudes of the named lines, of one mesh of every kind."""
+
+    meshes, amplitude = chosen_meshes(data), data["line_amplitude"].values
+    names, variants = symbols(data), [str(name) for name in data["variant"].values]
+    rows = []
+    for i, orders in enumerate(data["line_orders"].values):
+        mark = "" if bool(data["resolved"][i]) else " *"
+        cells = (" / ".join(_newtons(value) for value in amplitude[:, i, m]) for m in meshes)
+        rows.append((_combination(orders, names) + mark, f"{float(data['line_frequency'][i]):.3f}", *cells))
+    header = ("line", "[Hz]", *(f"{data['mesh'].values[m]} [N]" for m in meshes))
+    notes = [
+        ", ".join(f"{names[b]}: {name}" for b, name in enumerate(data["base"].values)),
+        f"amplitudes of the mesh forces after {float(data.attrs['settle']):g} s, peak values; frequencies at "
+        "the mean speed",
+    ]
+    if len(variants) > 1:
+        notes.append(f"in every cell: {' / '.join(variants)}")
+    if not data["resolved"].values.all():
+        notes.append("*: the record is too short to part this line from a neighbour")
+    return Block("Spectrum", header, tuple(rows), tuple(notes))
+
+
+def _newtons(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.4g}" if value >= 0.1 else "< 0.1"
+
+
+def _combination(orders, names) -> str:
+    """A line as the sum of base frequencies, the largest first: ``f1 - 2 t``."""
+    terms = ""
+    for base in sorted(
+        np.flatnonzero(orders), key=lambda base: (orders[base] < 0, names[base][0] == "t", -base)
+    ):
+        count, name = int(orders[base]), names[base]
+        size = name if abs(count) == 1 else f"{abs(count)} {name}"
+        terms += f" {'-' if count < 0 else '+'} {size}" if terms else size
+    return terms

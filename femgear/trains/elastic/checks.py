@@ -1,0 +1,302 @@
+"""What the pipeline refuses before it computes, and what it warns of afterwards.
+
+How far up the excitation of a periodic response reaches, and what the housing would feel beyond.
+
+Mesh stiffness jumps where tooth pairs begin and cease to carry: its harmonics fall like one over their order,
+while the acceleration of the housing grows towards the modes in which meshes are the springs. A fixed number
+of mesh harmonics ends below those modes at low speed. The excitation therefore ends at a frequency, the same
+at all speeds, and the level of the housing is computed again with twice that frequency.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case.case import set_deviations
+from femgear.case.checks import check_floating
+from femgear.case.sections import Case
+from femgear.errors import CaseError
+
+if TYPE_CHECKING:
+    from femgear.fe.reduction import CyclicModes
+    from femgear.gears.planetary import PlanetarySet
+
+HIGHEST_RESPONSE = 200e3
+"""The wavelength of shear in steel there is 16 mm: shorter waves are no matter of plane gear bodies [Hz]."""
+LOWEST = 20e3
+"""The excitation reaches the end of hearing at least [Hz]."""
+ABOVE_MESHES = 1.4
+"""And this many times the highest natural frequency of the rigid gears on their meshes."""
+STEP = 2500.0
+"""In whole steps, so that variants of one set are excited alike [Hz]."""
+HARMONICS = 512
+"""The record of the static state carries this many harmonics: the jumps are 2^-13 of a period wide. Slower
+speeds are excited less far, and `levels_below` tells what they lose."""
+MEMORY = 1.5e9
+"""Largest size of the lines and signals of a run [bytes]."""
+CHECKED = 12
+"""Speeds at which the level is computed again, at most."""
+NOTICEABLE = 1.0
+"""Change of the level that is worth a warning [dB]."""
+
+
+@dataclass(frozen=True)
+class FrequencyLimit:
+    """Harmonics of excitation and response at every speed, (n_speeds,) integer arrays.
+
+    Parameters
+    ----------
+    frequency : (n_speeds,) array
+        Highest excitation frequency [Hz].
+    """
+
+    excitation: np.ndarray
+    response: np.ndarray
+    frequency: np.ndarray
+
+
+def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
+    """Frequency to which the excitation reaches unless the case says less [Hz].
+
+    Parameters
+    ----------
+    case : Case
+    mesh_mode : float
+        Highest natural frequency of the rigid gears on their meshes [Hz].
+    mesh_frequency : float
+        Of the fastest speed [Hz].
+    """
+    lowest = STEP * math.ceil(max(LOWEST, ABOVE_MESHES * mesh_mode, 3 * mesh_frequency) / STEP)
+    given = max((case.dynamics.mesh_harmonics or 0) * mesh_frequency, case.dynamics.up_to or 0.0)
+    return max(min(lowest, 0.5 * HIGHEST_RESPONSE), given)
+
+
+def limited(
+    case: Case, gears: PlanetarySet, mesh_frequency, up_to: float, *, given: int | None = None
+) -> FrequencyLimit:
+    """Harmonics up to a frequency, or a given number of them.
+
+    Parameters
+    ----------
+    case : Case
+    gears : PlanetarySet
+    mesh_frequency : (n_speeds,) array
+        [Hz]
+    up_to : float
+        [Hz]; less at the lowest of so many speeds that their lines would fill the memory.
+    given : int, optional
+        Mesh harmonics of the excitation at all speeds.
+    """
+    frequency = np.asarray(mesh_frequency, float)
+    if given is None:
+        # lines of the sensor with their signal, modes, ring field and meshes, a harmonic of all speeds
+        size = len(frequency) * (144 * gears.ring.teeth + 8000 + 96 * gears.n_planets)
+        most = min(HARMONICS, max(int(MEMORY / size), 18))
+        excitation = np.clip(np.floor(up_to / frequency * (1 + 1e-12)), 1, most).astype(int)
+    else:
+        excitation = np.full(len(frequency), given)
+    # products with the low harmonics of the stiffness reach beyond the excitation
+    beyond = excitation + 2 * np.minimum(excitation, 6)
+    response = np.maximum(case.dynamics.response_harmonics or beyond, excitation)
+    return FrequencyLimit(excitation, response, excitation * frequency)
+
+
+def checked_speeds(count: int) -> np.ndarray:
+    """Numbers of the speeds at which the level is computed again: all of a few, the ends of many."""
+    return np.unique(np.linspace(0, count - 1, min(count, CHECKED)).round().astype(int))
+
+
+def levels_below(lines, frequency) -> np.ndarray:
+    """Level of the lines of a sensor at one speed up to each of the frequencies, over that of all lines.
+
+    Harmonics of a stiffness that jumps fall as one over their order, so that lines of a slower speed are
+    weaker and closer by the same factor: the share of the level below a frequency depends little on the
+    speed (within 1 dB from 250 to 60 rpm of the reference set).
+
+    Parameters
+    ----------
+    lines : SensorLines
+        Of one speed.
+    frequency : (n,) array
+        [Hz]
+    """
+    power = np.cumsum(np.abs(lines.acceleration) ** 2)
+    place = np.searchsorted(lines.frequency, frequency, side="right") - 1
+    return np.sqrt(power[place] / power[-1])
+
+
+def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[str, ...]:
+    """Warning where the level of the housing would change by `NOTICEABLE` or more.
+
+    Parameters
+    ----------
+    rpm, level_change, limit : (n_speeds,) arrays
+        Speeds of the input [rpm], change of the level [dB], nan where it was not computed, and highest
+        excitation frequencies [Hz].
+    compared_to : float
+        Frequency to which the excitation reached in the comparison [Hz].
+    """
+    known = np.where(np.isfinite(level_change), np.abs(level_change), 0.0)
+    if known.max(initial=0.0) < NOTICEABLE:
+        return ()
+    worst = int(known.argmax())
+    return (
+        f"[W-EXCITATION] at {rpm[worst]:.6g} rpm the excitation ends at {limit[worst]:.4g} Hz; up to "
+        f"{compared_to:.4g} Hz the level of the housing changes by {level_change[worst]:+.1f} dB. It does by "
+        f"{NOTICEABLE:g} dB or more at {int((known >= NOTICEABLE).sum())} of the "
+        f"{int(np.isfinite(level_change).sum())} speeds looked at: raise dynamics.up_to or "
+        "dynamics.mesh_harmonics, or leave the slowest speeds out, before levels are compared",
+    )
+
+
+def max_nodal_diameter(case: Case) -> int:
+    """Largest nodal diameter of the ring model; beyond half the teeth there are none."""
+    from femgear.trains.elastic.model import MAX_DIAMETER
+
+    return max(min(MAX_DIAMETER, case.ring.teeth // 2 - 1), 2)
+
+
+def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
+    """Mesh frequency of the fastest speed [Hz].
+
+    Raises
+    ------
+    CaseError
+        When the response reaches beyond what a plane model of the ring means anything for.
+    """
+    from femgear.gears.kinematics import speeds
+
+    fastest = speeds(gears, input=case.operation.input, fixed="ring", speed=max(case.operation.speeds))
+    harmonics = case.response_harmonics or 3
+    response = max(harmonics * fastest.mesh_frequency, case.dynamics.up_to or 0.0)
+    up_to = case.dynamics.up_to
+    if up_to is not None and up_to < fastest.mesh_frequency:
+        raise CaseError(
+            f"the excitation ends at {up_to:.6g} Hz, below the mesh frequency of the fastest speed: "
+            "nothing would excite the set there",
+            code="E-RANGE",
+            key="dynamics.up_to",
+            value=f"{up_to:.6g} Hz",
+            limit=f"{fastest.mesh_frequency:.6g} Hz or more",
+            remedy="raise it, or leave the highest speeds out",
+        )
+    if response > HIGHEST_RESPONSE:
+        allowed = max(case.operation.speeds) * HIGHEST_RESPONSE / response
+        raise CaseError(
+            f"{harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
+            code="E-FREQUENCY",
+            key="operation.speeds",
+            value=f"{max(case.operation.speeds) * 30 / np.pi:.6g} rpm",
+            limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed * 30 / np.pi:.4g} rpm here",
+            remedy="leave the highest speeds out, or fewer dynamics.response_harmonics",
+        )
+    return fastest.mesh_frequency
+
+
+def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
+    """Refuse what modes, dynamics and housing cannot represent, before anything is computed.
+
+    Raises
+    ------
+    CaseError
+        The ring is not the fixed member, there is no torque, the errors span several mesh periods, or the
+        response reaches beyond `HIGHEST_RESPONSE`.
+    """
+    from femgear.gears.deviations import common_period
+
+    if case.operation.fixed != "ring":
+        raise CaseError(
+            "modes, dynamics and housing need a fixed ring: it is the housing of this model",
+            code="E-FIXED-MEMBER",
+            key="operation.fixed",
+            value=case.operation.fixed,
+            limit='"ring"',
+            remedy="run with --only static, fix the ring, or write the section [planar]: rigid bodies, for "
+            "which any member may be the fixed one",
+        )
+    check_floating(case, gears, dynamic=True)
+    if case.operation.torque == 0:
+        raise CaseError(
+            "without torque no tooth carries load, so there is no mesh stiffness for the dynamic model",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero for modes, dynamics and housing",
+            remedy="give a torque, or run with --only static",
+        )
+    # whatever the longest record: one period cut out of many is no period
+    periods, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
+    if periods > 1:
+        raise CaseError(
+            f"the errors of this set span {periods} mesh periods; modes, dynamics and housing take one",
+            code="E-PERIODS",
+            key="operation.speeds",
+            limit="errors that repeat with every tooth",
+            remedy="run with --only static, or leave pitch errors and runouts out",
+        )
+    fastest_mesh_frequency(case, gears)
+
+
+def check_reach(case: Case, reach: float, mesh_frequency: float) -> None:
+    """Refuse a modal basis that was made for slower excitation.
+
+    Parameters
+    ----------
+    case : Case
+    reach : float
+        Frequency up to which the basis carries excitation [Hz].
+    mesh_frequency : float
+        Of the fastest speed [Hz].
+
+    Raises
+    ------
+    CaseError
+        E-OTHER-CASE.
+    """
+    wanted = case.dynamics.up_to or (case.mesh_harmonics or 3) * mesh_frequency
+    if wanted > reach * (1.0 + 1e-9):
+        raise CaseError(
+            f"the modal basis was made for excitation up to {reach:.4g} Hz, this case has {wanted:.4g} Hz",
+            code="E-OTHER-CASE",
+            key="operation.speeds" if case.dynamics.up_to is None else "dynamics.up_to",
+            limit=f"up to {reach:.4g} Hz",
+            remedy="compute the modes of this case",
+        )
+
+
+def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
+    """Refuse planets that run around the ring as fast as its waves.
+
+    A load that travels around a ring with the angular speed W meets the resonance of a mode of n nodal
+    diameters where ``n W = 2 pi f_n`` (S. C. Huang and W. Soedel, J. Sound Vib. 115, 1987, 253-274). The
+    model sees the ring from the carrier without the inertia terms of that motion: it holds far below.
+
+    Parameters
+    ----------
+    ring_modes : CyclicModes
+    carrier_speeds : sequence of float
+        [rad/s]
+
+    Raises
+    ------
+    CaseError
+        E-CRITICAL-SPEED: a carrier at or above the lowest ``2 pi f_n / n``.
+    """
+    wave = ring_modes.nodal_diameter > 0
+    critical = 2.0 * np.pi * ring_modes.frequency[wave] / ring_modes.nodal_diameter[wave]
+    lowest, fastest = int(np.argmin(critical)), float(np.max(np.abs(carrier_speeds)))
+    if fastest >= critical[lowest]:
+        rpm = 30.0 / np.pi
+        raise CaseError(
+            f"the carrier turns at {fastest * rpm:.6g} rpm, faster than the wave of "
+            f"{ring_modes.nodal_diameter[wave][lowest]} nodal diameters around the ring",
+            code="E-CRITICAL-SPEED",
+            key="operation.speeds",
+            value=f"{fastest * rpm:.6g} rpm of the carrier",
+            limit=f"below {critical[lowest] * rpm:.6g} rpm of the carrier",
+            remedy="leave the highest speeds out, or stiffen the ring or its foundation",
+        )

@@ -1,0 +1,539 @@
+"""A gear pair with backlash in dimensionless form: rotations, or rotations and two bearings.
+
+Lengths are counted in half backlashes b, forces in k b with the mean mesh stiffness k, times in 1 / omega_n,
+omega_n = sqrt(k / m_e), with the equivalent mass ``m_e = 1 / (r_1^2 / I_1 + r_2^2 / I_2)`` (A. Kahraman and
+R. Singh, J. Sound Vib. 142 (1990) 49-75, rotations; 146 (1991) 135-156, with bearings and k(t)). With the
+dynamic approach ``u = r_1 theta_1 - r_2 theta_2``, the displacements y_1, y_2 of the gears along the line of
+action and the error e(t), the relative deflection of the mesh is
+
+``x = u + y_1 - y_2 - e(t)``
+
+drive flanks touch above x = 1, back flanks below x = -1. In the coordinates (y_1, y_2, x) the error acts
+through the inertia of ``u = x + e - y_1 + y_2`` alone: ``x'' + 2 zeta x' + k(t) f(x) = F - e''`` without
+bearings. Time is scaled once more so that the tooth frequency is one for every frequency ratio Omega,
+``theta = Omega t``: M and C carry Omega^2 and Omega, and branches over Omega are branches over a parameter.
+
+Frequency ratios at which a branch of the dimensionless pair begins or ends to have impacts.
+
+A pair of gears on rigid shafts: two rotations and one mesh.
+
+A. Kahraman and R. Singh, Non-linear dynamics of a spur gear pair, J. Sound Vib. 142 (1990) 49-75, Eqs. (1) to
+(4): the deflection along the line of action is ``x = r_1 theta_1 - r_2 theta_2``, and with the mass
+``m_e = I_1 I_2 / (r_1^2 I_2 + r_2^2 I_1)`` it obeys ``m_e x'' + c x' + f(x, t) = T_1 / r_1``.
+
+Contact of meshes with backlash in a motion: always closed, impact on one flank, impact on both.
+
+A. Kahraman and R. Singh, J. Sound Vib. 142 (1990) 49-75, tell no impact, single-sided and double-sided impact
+apart by the range of the relative deflection.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.continuation.branches import Branch
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.solution import PeriodicSolution
+from femgear.system.elements import GearMeshes
+from femgear.system.entries import checked_count, checked_numbers
+from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
+from femgear.system.series import FourierSeries, constant
+from femgear.system.system import MechanicalSystem
+
+# deflections of drive and back contact in half backlashes
+DRIVE, BACK = 1.0, -1.0
+
+
+@dataclass(frozen=True)
+class PairBearings:
+    """Bearings of both gears along the line of action.
+
+    Parameters
+    ----------
+    mass : (float, float)
+        Of gears 1 and 2 over the equivalent mass m_e.
+    stiffness : (float, float)
+        Of their bearings over the mean mesh stiffness.
+    damping_ratio : float
+        ``c_i = 2 xi sqrt(k_i m_i)``, see `femgear.system.transmission_errors`.
+    """
+
+    mass: tuple[float, float]
+    stiffness: tuple[float, float]
+    damping_ratio: float = 0.0
+
+    def __post_init__(self):
+        values = [checked_numbers(v, "bearings", code="E-PAIR", unit="") for v in (self.mass, self.stiffness)]
+        if any(v.shape != (2,) or not np.all(np.isfinite(v) & (v > 0.0)) for v in values):
+            raise CaseError(
+                f"bearings with masses {self.mass} and stiffnesses {self.stiffness}", code="E-PAIR",
+                limit="two of each, above 0",
+            )  # fmt: skip
+        _not_negative("damping ratio of the bearings", self.damping_ratio)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ImpactPair:
+    """Dimensionless gear pair with backlash, k(t) and errors.
+
+    Parameters
+    ----------
+    damping_ratio : float
+        zeta of the mesh: ``c = 2 zeta sqrt(k m_e)``.
+    load : float
+        Mean force F over k b; positive keeps the drive flanks in contact.
+    stiffness : sequence of complex
+        Harmonics 1, 2, ... of k(t) over its mean, of the tooth frequency.
+    tooth_error : sequence of complex
+        Harmonics 1, 2, ... of the tooth-frequency error, in half backlashes.
+    eccentricity : (complex, complex)
+        Of gears 1 and 2 along the line of action, in half backlashes, with their phases.
+    teeth : (int, int)
+        Shaft frequencies are the tooth frequency over the tooth numbers.
+    bearings : PairBearings, optional
+        None holds both axes.
+    """
+
+    damping_ratio: float
+    load: float
+    stiffness: tuple[complex, ...] = ()
+    tooth_error: tuple[complex, ...] = ()
+    eccentricity: tuple[complex, complex] = (0.0, 0.0)
+    teeth: tuple[int, int] = (20, 30)
+    bearings: PairBearings | None = None
+
+    def __post_init__(self):
+        _not_negative("damping ratio", self.damping_ratio)
+        _number("load", self.load)
+        for name in ("stiffness", "tooth_error", "eccentricity"):
+            given = checked_numbers(getattr(self, name), name, code="E-PAIR", unit="", kind=complex)
+            values = np.atleast_1d(given)
+            if values.ndim != 1 or not np.all(np.isfinite(values)):
+                raise CaseError(f"{name} {values.tolist()}", code="E-PAIR", key=name, limit="finite numbers")
+            object.__setattr__(self, name, tuple(values.tolist()))
+        teeth = checked_numbers(self.teeth, "teeth", code="E-PAIR", unit="")
+        whole = teeth.shape == (2,) and np.all(teeth >= 1) and np.all(teeth == np.floor(teeth))
+        if len(self.eccentricity) != 2 or not whole or not np.all(np.isfinite(teeth)):
+            raise CaseError(
+                f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth", code="E-PAIR",
+                limit="two of each, whole numbers of teeth, one or more",
+            )  # fmt: skip
+        object.__setattr__(self, "teeth", tuple(int(z) for z in teeth))
+        if len(set(self.frequency)) < len(self.frequency):
+            raise CaseError(
+                f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth make two base "
+                "frequencies one", code="E-PAIR", key="eccentricity", limit="every base frequency once",
+                remedy="give the sum of both to one gear where only the mesh counts, or other teeth",
+            )  # fmt: skip
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Base frequencies of the scaled time: the teeth, then the shafts that are eccentric."""
+        return np.array([1.0, *(1.0 / z for e, z in zip(self.eccentricity, self.teeth) if e)])
+
+    @property
+    def periods(self) -> int:
+        """Tooth periods after which everything repeats."""
+        return math.lcm(*(z for e, z in zip(self.eccentricity, self.teeth) if e))
+
+    def problem(self, ratio: float, *, divided: int = 1) -> NonlinearSystem:
+        """The pair at the frequency ratio Omega, tooth frequency over omega_n, in the scaled time.
+
+        Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `frequency`; for motions that
+        repeat after several tooth periods ``divided`` counts these, and the first base is 1 / divided.
+        """
+        divided = checked_count(divided, "divided", code="E-FREQUENCY")
+        ratio = _number("ratio", ratio, code="E-FREQUENCY")
+        if not (math.isfinite(ratio) and ratio > 0.0):
+            raise CaseError(f"a frequency ratio of {ratio}", code="E-FREQUENCY", key="ratio", limit="above 0")
+        M, C, K, along = self._matrices()
+        system = MechanicalSystem(
+            M=ratio**2 * M, C=ratio * C, K=K, W=np.eye(len(M))[:, -1:], load=self.load * along,
+            dofs=("y 1", "y 2", "x") if self.bearings else ("x",),
+        )  # fmt: skip
+        count = len(self.frequency)
+        k = FourierSeries([[1.0, *self.stiffness]], _orders(0, divided, count))
+        mesh = GearMeshes([0], k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
+        return NonlinearSystem(system, (mesh,), tuple(self._forces(ratio, along, divided)))
+
+    def _matrices(self):
+        """M, C, K with unit time 1 / omega_n, and the direction of u in the coordinates."""
+        if self.bearings is None:
+            return np.eye(1), np.array([[2.0 * self.damping_ratio]]), np.zeros((1, 1)), np.ones(1)
+        along = np.array([-1.0, 1.0, 1.0])
+        mass, stiffness = np.array([*self.bearings.mass, 0.0]), np.array([*self.bearings.stiffness, 0.0])
+        damping = 2.0 * self.bearings.damping_ratio * np.sqrt(mass * stiffness)
+        damping[-1] = 2.0 * self.damping_ratio
+        return np.diag(mass) + np.outer(along, along), np.diag(damping), np.diag(stiffness), along
+
+    def _forces(self, ratio: float, along, divided: int):
+        """Inertia forces ``-e''`` of the errors."""
+        count, base = len(self.frequency), 0
+        for h, error in enumerate(self.tooth_error, 1):
+            if error:
+                yield HarmonicForce((ratio * h) ** 2 * error * along, _orders(0, h * divided, count))
+        for error, z in zip(self.eccentricity, self.teeth):
+            if error:
+                base += 1
+                yield HarmonicForce((ratio / z) ** 2 * error * along, _orders(base, 1, count))
+
+
+def example_pair(damping_ratio: float) -> ImpactPair:
+    """Load 0.9, tooth error 0.72 in half backlashes, k(t) with a first harmonic of 10 % against the error.
+
+    The values are those of docs/impacts.md, chosen so that a damping ratio of 0.15 leaves one answer at every
+    frequency ratio and 0.09 does not.
+    """
+    return ImpactPair(damping_ratio=damping_ratio, load=0.9, tooth_error=(0.72,), stiffness=(-0.1,))
+
+
+def lightly_loaded_pair(damping_ratio: float = 0.05) -> ImpactPair:
+    """Load 0.1, tooth error 0.2, constant stiffness: chaotic at frequency ratios between 1.3 and 1.7.
+
+    Kahraman and Singh (1990) find chaotic motion in lightly loaded, lightly damped pairs; the values are
+    those of docs/impacts.md.
+    """
+    return ImpactPair(damping_ratio=damping_ratio, load=0.1, tooth_error=(0.2,))
+
+
+@dataclass(frozen=True)
+class PairScales:
+    """Units of the dimensionless pair.
+
+    Parameters
+    ----------
+    length : float
+        Half backlash along the line of action [m].
+    frequency : float
+        omega_n [rad/s].
+    force : float
+        k b [N].
+    """
+
+    length: float
+    frequency: float
+    force: float
+
+
+def pair_scales(*, inertia, base_radius, stiffness: float, backlash: float) -> PairScales:
+    """Units of a pair with polar inertias [kg m^2], base radii [m], mesh stiffness [N/m] and play [m].
+
+    Parameters
+    ----------
+    inertia, base_radius : (float, float)
+    stiffness : float
+        Mean.
+    backlash : float
+        Total play along the line of action.
+    """
+    given = {"inertia": inertia, "base_radius": base_radius, "stiffness": stiffness, "backlash": backlash}
+    values = np.concatenate(
+        [np.ravel(checked_numbers(one, key, code="E-PAIR", unit="")) for key, one in given.items()]
+    ).tolist()
+    if np.shape(inertia) != (2,) or len(values) != 6 or not all(math.isfinite(v) and v > 0.0 for v in values):
+        raise CaseError(f"a gear pair with the data {values}", code="E-PAIR", limit="all above 0")
+    mass = 1.0 / sum(r * r / i for r, i in zip(base_radius, inertia))
+    return PairScales(0.5 * backlash, math.sqrt(stiffness / mass), 0.5 * stiffness * backlash)
+
+
+def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tuple[float, ...]:
+    """Frequency ratios at which drive flanks begin to part, ascending: none, one or two.
+
+    Rotations, constant stiffness, one harmonic of the error: as long as flanks touch the pair is linear and
+    they part where ``error Omega^2 / |1 - Omega^2 + 2 i zeta Omega| = load``, a quadratic equation of
+    Omega^2 (Kahraman and Singh 1990, transition from no impact to single-sided impact).
+    """
+    given = {"damping_ratio": damping_ratio, "load": load, "error": error}
+    damping_ratio, load, error = (_number(key, value) for key, value in given.items())
+    _not_negative("damping ratio", damping_ratio)
+    if load == 0.0:
+        raise CaseError(
+            "a pair without load has no closed flanks that could part", code="E-PAIR", key="load",
+            limit="not 0",
+        )  # fmt: skip
+    s = (error / load) ** 2
+    roots = np.roots([1.0 - s, 4.0 * damping_ratio**2 - 2.0, 1.0])
+    real = roots[np.abs(roots.imag) < 1e-12].real
+    return tuple(float(value) for value in np.sort(np.sqrt(real[real > 0.0])))
+
+
+def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
+    return tuple(order if place == base else 0 for place in range(count))
+
+
+def _number(key: str, value, code: str = "E-PAIR") -> float:
+    """One finite number."""
+    number = checked_numbers(value, key, code=code, unit="")
+    if number.ndim or not np.isfinite(number):
+        raise CaseError(f"a {key} of {number.tolist()}", code=code, key=key, limit="one finite number")
+    return float(number)
+
+
+def _not_negative(name: str, value: float) -> None:
+    if _number(name, value) < 0.0:
+        raise CaseError(f"{name} {value}", code="E-PAIR", limit="0 or more")
+
+
+# instants of a period, and a step of the ratio within which interpolation along the branch will do
+_SAMPLES = 2048
+_SHORT = 1e-3
+
+
+def lowest_deflection(solution) -> float:
+    """Smallest deflection of a solution in scaled time, over 2048 phases."""
+    return float(solution.at(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES).min())
+
+
+def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray:
+    """Ratios (n,) along the branch at which the smallest deflection passes a level, to 1e-6.
+
+    The harmonic balance equations are solved again between two points of the branch; at limit points, where
+    two points lie within 1e-3 of the ratio, the border is interpolated.
+
+    Parameters
+    ----------
+    pair : ImpactPair
+    branch : Branch
+        Over the frequency ratio, from ``parameter_curve(pair.problem, ..., 1.0)``.
+    level : float
+        `DRIVE` for the first impacts, `BACK` for impacts on both flanks.
+
+    Raises
+    ------
+    CaseError
+        A level that is no finite number (E-VALUE).
+    """
+    from scipy.optimize import brentq
+
+    number = checked_numbers(level, "level", code="E-VALUE", unit="")
+    if number.ndim or not np.isfinite(number):
+        raise CaseError(f"a level of {number.tolist()}", code="E-VALUE", key="level", limit="a finite number")
+    away = np.array([lowest_deflection(one) for one in branch.solutions]) - level
+    borders = []
+    for i in np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:])):
+        ends, near = branch.parameter[i : i + 2], branch.solutions[i]
+        if abs(ends[1] - ends[0]) <= _SHORT:
+            borders.append(ends[0] + away[i] / (away[i] - away[i + 1]) * (ends[1] - ends[0]))
+            continue
+
+        def lowest(ratio, near=near):
+            found = solve_harmonic_balance(
+                pair.problem(ratio), 1.0, orders=near.orders, start=near, samples=1024, stability=False
+            )
+            return lowest_deflection(found) - level
+
+        borders.append(brentq(lowest, *ends, xtol=1e-6))
+    return np.array(borders)
+
+
+def gear_pair(
+    inertia: tuple[float, float],
+    base_radius: tuple[float, float],
+    *,
+    torque: float = 0.0,
+    mesh_damping: float = 0.0,
+) -> MechanicalSystem:
+    """Driving gear 1 and driven gear 2; give it one `GearMeshes` on column 0.
+
+    The rotation of both gears in their ratio is free; the torque on gear 2 balances that on gear 1.
+
+    Parameters
+    ----------
+    inertia : (2,) sequence
+        Polar moments of inertia [kg m^2].
+    base_radius : (2,) sequence
+        [m]
+    torque : float
+        On gear 1 [N m]; positive presses the drive flanks together.
+    mesh_damping : float
+        Viscous damping along the line of action [N s/m]. It acts on ``x'``; where the mesh has a deflection
+        (transmission error) the publication lets it act on the motion beyond that.
+
+    Returns
+    -------
+    MechanicalSystem
+        Rotations ``theta_1``, ``theta_2`` [rad], opposite senses positive, and the column of the mesh.
+
+    Raises
+    ------
+    CaseError
+        Inertias or radii that are not positive, a damping that is negative, numbers that are not finite.
+    """
+    inertia, radius = (
+        checked_numbers(pair, name, code="E-GEAR-PAIR", unit=unit).copy()
+        for pair, name, unit in ((inertia, "inertia", "kg m^2"), (base_radius, "base_radius", "m"))
+    )
+    torque = checked_numbers(torque, "torque", code="E-GEAR-PAIR", unit="N m").item()
+    mesh_damping = checked_numbers(mesh_damping, "mesh_damping", code="E-GEAR-PAIR", unit="N s/m").item()
+    for name, pair, unit in (("inertia", inertia, "kg m^2"), ("base_radius", radius, "m")):
+        if pair.shape != (2,) or not np.all(np.isfinite(pair)) or np.any(pair <= 0.0):
+            raise CaseError(
+                f"{name} of a gear pair: {pair.tolist()} {unit}", code="E-GEAR-PAIR", key=name,
+                limit="two positive numbers",
+            )  # fmt: skip
+    if not np.isfinite(torque):
+        raise CaseError(f"a torque of {torque} N m", code="E-GEAR-PAIR", key="torque", limit="finite")
+    if not (np.isfinite(mesh_damping) and mesh_damping >= 0.0):
+        raise CaseError(
+            f"a mesh damping of {mesh_damping} N s/m",
+            code="E-GEAR-PAIR",
+            key="mesh_damping",
+            limit="0 or more",
+        )
+    column = np.array([[radius[0]], [-radius[1]]])
+    return MechanicalSystem(
+        M=np.diag(inertia), C=mesh_damping * (column @ column.T), K=np.zeros((2, 2)), W=column,
+        load=torque / radius[0] * column[:, 0], dofs=("theta_1", "theta_2"),
+    )  # fmt: skip
+
+
+def equivalent_mass(inertia: tuple[float, float], base_radius: tuple[float, float]) -> float:
+    """Mass ``m_e`` [kg] that moves along the line of action; ``sqrt(k / m_e)`` is the natural frequency."""
+    (one, other), (first, second) = inertia, base_radius
+    return one * other / (first**2 * other + second**2 * one)
+
+
+NORMAL, ONE_SIDED, TWO_SIDED, UNKNOWN = 0, 1, 2, 3
+STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
+
+
+@dataclass(frozen=True)
+class ContactStates:
+    """What every mesh of a motion does.
+
+    Parameters
+    ----------
+    state : (..., g) int array
+        Index into `STATE_NAMES`: one flank stays closed; it opens and the other does not close; both close.
+    drive, free, back : (..., g) arrays
+        Shares of the instants with the drive flanks, no flanks and the back flanks in contact.
+    """
+
+    state: np.ndarray
+    drive: np.ndarray
+    free: np.ndarray
+    back: np.ndarray
+
+
+def contact_states(meshes: GearMeshes, x, theta) -> ContactStates:
+    """Contact over the instants of a motion.
+
+    Parameters
+    ----------
+    meshes : GearMeshes
+        Meshes that separate.
+    x : (..., T, n_columns) array
+        Deflections of all columns at T instants, at least one period of them [m].
+    theta : (T, n_bases) array
+        Phases of the instants [rad].
+
+    Raises
+    ------
+    CaseError
+        Meshes that do not separate, no instants, deflections or forces that are not finite (E-CONTACT-STATE).
+    """
+    if not meshes.separates:
+        raise CaseError(
+            "meshes that do not separate have no impacts", code="E-CONTACT-STATE", limit="separates=True"
+        )
+    x = checked_numbers(x, "x", code="E-CONTACT-STATE", unit="m")
+    theta = checked_numbers(theta, "theta", code="E-CONTACT-STATE", unit="rad")
+    columns = meshes.columns[:, 0]
+    if x.ndim < 2 or x.shape[-1] <= columns.max(initial=-1) or theta.ndim != 2 or not len(theta):
+        _refuse(f"deflections of shape {x.shape} at phases of shape {theta.shape}")
+    if x.shape[-2] != len(theta):
+        _refuse(f"{x.shape[-2]} deflections of every column at {len(theta)} instants")
+    k = meshes.stiffness.at(theta)
+    line = meshes.force.at(theta) + k * (x[..., columns] - meshes.deflection.at(theta))
+    if not np.all(np.isfinite(line)):
+        _refuse("deflections or forces that are not finite")
+    # flanks of infinite backlash have no back side
+    play = np.where(np.isfinite(meshes.backlash), meshes.backlash, 0.0)
+    drive, back = line > 0.0, np.isfinite(meshes.backlash) & (line + k * play < 0.0)
+    return _judged(drive, back, axis=-2)
+
+
+def solution_states(meshes: GearMeshes, solution: PeriodicSolution, *, samples: int = 1024) -> ContactStates:
+    """Contact in a periodic solution, at equidistant phases; with several bases on a grid of all phases.
+
+    Parameters
+    ----------
+    meshes : GearMeshes
+    solution : PeriodicSolution
+    samples : int
+        Phases of every base: 1024 for one base, ``samples ** (1 / n_bases)`` but 64 at least for several.
+    """
+    bases = solution.orders.shape[1]
+    each = samples if bases == 1 else max(64, round(samples ** (1.0 / bases)))
+    axes = np.meshgrid(*[2.0 * np.pi * np.arange(each) / each] * bases, indexing="ij")
+    theta = np.stack([axis.ravel() for axis in axes], axis=1)
+    x = (np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T).real
+    return contact_states(meshes, x, theta)
+
+
+def range_states(lowest, highest, *, drive: float, back: float) -> np.ndarray:
+    """States (...) from the smallest and largest deflection, where the flanks close at constant deflections.
+
+    `UNKNOWN` where an extreme is nan or infinite, as of a motion that did not settle.
+
+    Parameters
+    ----------
+    lowest, highest : (...) arrays
+        Of the relative deflection.
+    drive, back : float
+        Deflections above and below which the drive and the back flanks touch.
+    """
+    lowest, highest, drive, back = (
+        checked_numbers(value, name, code="E-CONTACT-STATE", unit="m")
+        for name, value in (("lowest", lowest), ("highest", highest), ("drive", drive), ("back", back))
+    )
+    if not (np.all(np.isfinite([drive, back])) and np.all(back <= drive)):
+        _refuse(f"flanks that close above {drive} and below {back}")
+    if lowest.shape != highest.shape or np.any(lowest > highest):
+        _refuse("smallest deflections above the largest, or of another number")
+    both = (highest > drive) & (lowest < back)
+    closed = (lowest >= drive) | (highest <= back)
+    state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
+    return np.where(np.isfinite(lowest) & np.isfinite(highest), state, UNKNOWN)
+
+
+def state_regions(parameter, state) -> list[tuple[int, float, float]]:
+    """Runs of equal states along a curve or sweep: state, first and last value of the parameter.
+
+    Neighbouring runs share no value; where the state changes the border lies between them.
+    """
+    parameter = checked_numbers(parameter, "parameter", code="E-CONTACT-STATE", unit="")
+    state = checked_numbers(state, "state", code="E-CONTACT-STATE", unit="")
+    if parameter.ndim != 1 or parameter.shape != state.shape:
+        _refuse(f"states of shape {state.shape} over parameters of shape {parameter.shape}")
+    ends = np.flatnonzero(np.diff(state, append=-1, prepend=-1))
+    return [
+        (int(state[first]), float(parameter[first]), float(parameter[last - 1]))
+        for first, last in pairwise(ends)
+    ]
+
+
+def level_crossings(parameter, value, level: float) -> np.ndarray:
+    """Parameters at which a quantity along a curve passes a level, by linear interpolation."""
+    parameter, away = np.asarray(parameter, float), np.asarray(value, float) - level
+    i = np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:]))
+    share = away[i] / (away[i] - away[i + 1])
+    return parameter[i] + share * (parameter[i + 1] - parameter[i])
+
+
+def _refuse(message: str):
+    raise CaseError(
+        message, code="E-CONTACT-STATE", limit="finite numbers, as many instants as phases, one or more"
+    )
+
+
+def _judged(drive, back, axis: int) -> ContactStates:
+    both = drive.any(axis) & back.any(axis)
+    closed = drive.all(axis) | back.all(axis)
+    state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
+    return ContactStates(state, drive.mean(axis), (~drive & ~back).mean(axis), back.mean(axis))

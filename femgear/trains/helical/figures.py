@@ -1,0 +1,477 @@
+"""Figures of the helical planetary set: mode shapes from the front and from the side, mesh-force spectra.
+
+Figures of modes.nc and dynamics.nc of helical cases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.report.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    DASHES,
+    GREEN,
+    SIZE,
+    VERMILION,
+    family,
+    label,
+    legend_below,
+    line_style,
+    new_figure,
+    periodic,
+    rpm,
+)
+from femgear.system.lumped import CENTRAL
+from femgear.system.mode_kinds import phasing
+from femgear.trains.elastic.figures import draw_static, excited_harmonics, fine_positions, name_kinds
+from femgear.trains.helical.model import helical_motions
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from femgear.gears.planetary import PlanetarySet
+    from femgear.system.system import Modes
+    from femgear.trains.helical.model import ErrorResponse, HelicalSet
+
+_CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
+_BODIES = {"carrier": GREEN, "ring": BLACK, "sun": VERMILION, "planets": BLUE}
+_SHOWN = 12
+_SPLIT = 4
+# half heights of the views over the ring's radius, and the largest magnification of small motions
+_FRONT, _SIDE, _MOST = 1.25, 0.4, 1e4
+# widths of lines that lie on each other in the side view
+_WIDTHS = {"carrier": 1.6, "ring": 4.5, "sun": 3.2, "planets": 1.6}
+
+
+def helical_mode_shapes(
+    data: HelicalSet, modes: Modes, *, shown: Sequence[int] | None = None, scale: float = 0.16
+) -> Figure:
+    """Bodies at rest (grey) and displaced, each mode from the front and below it from the side.
+
+    From the front: pitch circles, for the carrier the circle of planet centres, with a spoke that turns.
+    From the side, seen along y: every body as the line of its diameter along x, which tilts about y and moves
+    along z, drawn at the scale of the front view times the factor in the title.
+
+    Parameters
+    ----------
+    data : HelicalSet
+    modes : Modes
+        Of `femgear.trains.helical.model.helical_modes`.
+    shown : sequence of int, optional
+        Mode numbers from 0; the first twelve that are no rigid-body motions when omitted.
+    scale : float
+        Largest displacement of each view as a share of the ring's radius.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    CaseError
+        No mode to show, or one that the modes do not have (E-MODES).
+    """
+    if shown is None:
+        shown = np.flatnonzero(modes.frequency > 0.0)[:_SHOWN]
+    shown = [int(mode) for mode in shown]
+    if not shown or min(shown) < 0 or max(shown) >= len(modes.frequency):
+        raise CaseError(f"modes {shown} to draw", code="E-MODES", limit=f"0 to {len(modes.frequency) - 1}")
+    motions, names = _motions(data, modes.shape), phasing(helical_motions(data, modes.shape))
+    columns = min(_SPLIT, len(shown))
+    rows = -(-len(shown) // columns)
+    figure, axes = new_figure(rows=2 * rows, columns=columns, width=2.7 * columns, height=4.3 * rows + 0.6)
+    axes[0].get_gridspec().set_height_ratios([_FRONT, _SIDE] * rows)
+    for ax in axes:
+        ax.set_axis_off()
+        ax.set_aspect("equal")
+    for place, mode in enumerate(shown):
+        row, column = divmod(place, columns)
+        front, side = (axes[(2 * row + i) * columns + column] for i in (0, 1))
+        draw_mode(front, side, data, motions[:, :, mode], scale)
+        text = f"mode {mode + 1}: {modes.frequency[mode]:.6g} Hz\n{modes.kind[mode]}\n{names[mode]}"
+        front.set_title(text, fontsize=SIZE - 2)
+    legend_below(figure, columns=5)
+    return figure
+
+
+def draw_mode(front, side, data: HelicalSet, moved: np.ndarray, scale: float) -> None:
+    """Both views of one mode, each at its own magnification."""
+    sizes = [np.abs(moved[:, axis]).max() for axis in ([0, 1, 5], [2, 3, 4])]
+    # a view without motion shows none
+    views = [scale * data.ring_radius / max(size, max(sizes) / _MOST) for size in sizes]
+    _draw_front(front, data, views[0] * moved)
+    _draw_side(side, data, views[1] * moved)
+    times = views[1] / views[0]
+    times = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
+    side.set_title(f"from the side, scale × {times}", fontsize=SIZE - 3, color="0.4")
+
+
+def _motions(data: HelicalSet, shape) -> np.ndarray:
+    """x, y, z, tilts and rotation (N + 3, 6, m) of all bodies in the axes of the set."""
+    found = helical_motions(data, shape)
+    plane, space, planets = found.central[:3], found.central[3:], found.planets
+    central = np.stack(
+        [*plane.swapaxes(0, 1)[:2], space[:, 2], space[:, 0], space[:, 1], plane[:, 2]], axis=1
+    )
+    cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
+    turned = planets.copy()
+    for first in (0, 3):
+        one, two = planets[:, first], planets[:, first + 1]
+        turned[:, first], turned[:, first + 1] = cosine * one - sine * two, sine * one + cosine * two
+    return np.concatenate([central, turned])
+
+
+def pitch_radii(data: HelicalSet) -> tuple[float, float, float]:
+    """Working pitch radii of ring, sun and planet [m]: their circles touch.
+
+    The centre distance is divided as the base radii are. Where the meshes of a planet have two pitch circles,
+    the smaller one stands for it.
+    """
+    a, ring, sun, planet = data.centre_distance, data.ring_radius, data.sun_radius, data.planet_radius
+    outer, inner = a / (ring - planet), a / (sun + planet)
+    return outer * ring, inner * sun, min(outer, inner) * planet
+
+
+def _bodies(data: HelicalSet):
+    """Legend text, colour, centre, drawn radius and radius that turns arcs into angles, of every body.
+
+    In the order of the coordinates; rotations and tilts are arcs on base circles.
+    """
+    ring, sun, planet = pitch_radii(data)
+    drawn = (data.centre_distance, ring, sun)
+    bases = (data.centre_distance, data.ring_radius, data.sun_radius)
+    for name, radius, base in zip(CENTRAL, drawn, bases):
+        yield name, _BODIES[name], 0j, radius, base
+    for centre in data.centre_distance * np.exp(1j * data.planet_angles):
+        yield "planets", _BODIES["planets"], centre, planet, data.planet_radius
+
+
+def _draw_front(ax, data: HelicalSet, moved: np.ndarray) -> None:
+    for (name, colour, centre, radius, base), (x, y, _, _, _, u) in zip(_bodies(data), moved):
+        spoke = radius * np.exp(1j * (np.angle(centre) if centre else 0.0))
+        style = {"linestyle": "--"} if name == "carrier" else {}
+        for at, turn, look in (
+            (centre, 0.0, {"color": "0.82", "linewidth": 1.0, "label": "at rest"}),
+            (centre + x + 1j * y, u / base, {"color": colour, "linewidth": 1.5, "label": name} | style),
+        ):
+            ax.plot(*_xy(at + radius * _CIRCLE), **look)
+            ax.plot(*_xy(np.array([at, at + spoke * np.exp(1j * turn)])), **look)
+    _limits(ax, data, _FRONT)
+
+
+def _draw_side(ax, data: HelicalSet, moved: np.ndarray) -> None:
+    ax.axhline(0.0, color="0.82", linewidth=1.0)
+    for (name, colour, centre, radius, base), (_, _, z, _, tilt, _) in zip(_bodies(data), moved):
+        ends = np.array([-radius, radius])
+        style = {"linestyle": "--"} if name == "carrier" else {}
+        # a turn by phi about y lowers points at positive x
+        height = z - tilt / base * ends
+        ax.plot(centre.real + ends, height, color=colour, linewidth=_WIDTHS[name], **style)
+    _limits(ax, data, _SIDE)
+
+
+def _limits(ax, data: HelicalSet, high: float) -> None:
+    ring = pitch_radii(data)[0]
+    ax.set_xlim(-1.25 * ring, 1.25 * ring)
+    ax.set_ylim(-high * ring, high * ring)
+
+
+def _xy(points):
+    return points.real, points.imag
+
+
+def mesh_force_spectra(
+    response: ErrorResponse,
+    titles: Sequence[str],
+    *,
+    meshes: Sequence[tuple[str, int]] = (("sun-planet 1", 0),),
+    marks: Sequence[tuple[str, Sequence[float]]] = (),
+) -> Figure:
+    """Amplitude of dynamic mesh forces over the frequency of every harmonic, one panel a case.
+
+    Parameters
+    ----------
+    response : ErrorResponse
+        Of as many cases as there are titles.
+    titles : sequence of str
+    meshes : sequence of (text, column)
+        Columns of ``W`` to draw, up to four.
+    marks : sequence of (text, frequencies)
+        Natural frequencies [Hz] by kind, drawn as ticks along the lower edge.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    CaseError
+        Another number of titles than of cases (E-SHAPE).
+    """
+    if len(titles) != len(response.force):
+        raise CaseError(
+            f"{len(titles)} titles for {len(response.force)} cases", code="E-SHAPE", limit="one a case"
+        )  # fmt: skip
+    columns = 2 if len(titles) > 1 else 1
+    rows = -(-len(titles) // columns)
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=5.2 * columns, height=2.2 * rows + 1.0, sharex=True, sharey=True
+    )  # fmt: skip
+    for ax, title, force in zip(axes, titles, response.force):
+        _draw_spectra(ax, response, force, meshes, marks)
+        label(ax, title=title)
+    for ax in axes[len(titles) :]:
+        ax.set_axis_off()
+    axes[0].set_xlim(0.0, response.mesh_frequency.max())
+    for ax in axes[max(len(titles) - columns, 0) : len(titles)]:
+        label(ax, "frequency of the harmonic [Hz]")
+    for ax in axes[: len(titles) : columns]:
+        label(ax, y="mesh force [N]")
+    legend_below(figure, columns=2 * columns if len(meshes) == 1 else columns + 1)
+    return figure
+
+
+def _draw_spectra(ax, response: ErrorResponse, force: np.ndarray, meshes, marks) -> None:
+    """Amplitudes of one case (F, H, n_columns), and the marks inside the axis."""
+    for i, h in enumerate(response.harmonics):
+        for dash, (text, column) in zip(DASHES, meshes):
+            hertz, size = h * response.mesh_frequency, np.abs(force[:, i, column])
+            name = f"harmonic {h}" + (f", {text}" if len(meshes) > 1 else "")
+            colour = COLOURS[i % len(COLOURS)]
+            ax.plot(hertz, size, color=colour, linestyle=dash, linewidth=1.3, label=name)
+    for marker, (text, found) in zip("|xo^", marks):
+        found = [hertz for hertz in found if 0.0 <= hertz <= response.mesh_frequency.max()]
+        ax.plot(found, np.full(len(found), 0.03), marker, color=BLACK, markersize=6, label=text,
+                linestyle="none", transform=ax.get_xaxis_transform(), clip_on=False)  # fmt: skip
+    ax.set_yscale("log")
+
+
+_MARKS = {"in phase": "o", "counter-phased": "s"}
+_SHOWN_results, _COLUMNS, _HARMONICS, _SPEEDS = 12, 4, 4, 4
+
+
+@dataclass(frozen=True)
+class _Radii:
+    """What the drawing of a mode needs of a set."""
+
+    ring_radius: float
+    sun_radius: float
+    planet_radius: float
+    centre_distance: float
+    planet_angles: np.ndarray
+
+
+def helical_modes_figures(
+    modes: xr.Dataset, gears: PlanetarySet, static: xr.Dataset | None
+) -> dict[str, Figure]:
+    """Figures of modes.nc, by file name.
+
+    Parameters
+    ----------
+    modes : xarray.Dataset
+        Contents of modes.nc of a helical case.
+    gears : PlanetarySet
+        Of its transverse section.
+    static : xarray.Dataset, optional
+        Contents of static.nc, the spur gears of that section.
+    """
+    from femgear.gears.phasing import phasing_of_set
+    from femgear.trains.static.figures import phase_diagram
+
+    figures = {
+        "spatial_mode_shapes": spatial_mode_shapes(modes, gears),
+        "mesh_phasing": phase_diagram(phasing_of_set(gears)),
+    }
+    if "helical_stiffness" in modes and static is not None:
+        figures["helical_mesh_stiffness"] = helical_mesh_stiffness(modes, static)
+    return figures
+
+
+def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float = 0.16) -> Figure:
+    """The first twelve modes that are no rigid-body motions, each from the front and below it from the side.
+
+    Parameters
+    ----------
+    modes : xarray.Dataset
+    gears : PlanetarySet
+    scale : float
+        Largest displacement of each view as a share of the ring's radius.
+
+    Raises
+    ------
+    CaseError
+        No mode to show (E-MODES).
+    """
+    frequency = modes["frequency"].values
+    shown = np.flatnonzero(frequency > 0.0)[:_SHOWN_results]
+    if not len(shown):
+        raise CaseError("no mode to draw", code="E-MODES", limit="a mode that is no rigid-body motion")
+    data = _Radii(
+        gears.ring.base_radius,
+        gears.sun.base_radius,
+        gears.planet.base_radius,
+        gears.centre_distance,
+        np.asarray(gears.planet_angles),
+    )
+    planets = [data.planet_radius] * gears.n_planets
+    radii = np.array([data.centre_distance, data.ring_radius, data.sun_radius, *planets])
+    moved = modes["shape"].values.reshape(len(radii), 6, -1).copy()
+    moved[:, 3:] *= radii[:, None, None]
+    columns = min(_COLUMNS, len(shown))
+    rows = -(-len(shown) // columns)
+    figure, axes = new_figure(rows=2 * rows, columns=columns, width=2.7 * columns, height=4.3 * rows + 0.6)
+    axes[0].get_gridspec().set_height_ratios([1.25, 0.4] * rows)
+    for ax in axes:
+        ax.set_axis_off()
+        ax.set_aspect("equal")
+    for place, mode in enumerate(shown):
+        row, column = divmod(place, columns)
+        front, side = (axes[(2 * row + i) * columns + column] for i in (0, 1))
+        draw_mode(front, side, data, moved[:, :, mode], scale)
+        kind, phasing = str(modes["kind"].values[mode]), str(modes["phasing"].values[mode])
+        front.set_title(f"mode {mode + 1}: {frequency[mode]:.6g} Hz\n{kind}\n{phasing}", fontsize=SIZE - 2)
+    legend_below(figure, columns=5)
+    return figure
+
+
+def helical_mesh_stiffness(modes: xr.Dataset, static: xr.Dataset) -> Figure:
+    """Stiffness and transmission error of the meshes of planet 1 beside those of the spur gears."""
+    figure, axes = new_figure(rows=2, height=7.0, sharex=True)
+    names, first = [str(name) for name in modes["mesh"].values], (0, modes.sizes["mesh"] // 2)
+    for ax, ours, spur, scale, text in (
+        (axes[0], "helical_stiffness", "mesh_stiffness", 1e-6, "mesh stiffness [N/µm]"),
+        (axes[1], "helical_ste", "ste", 1e6, "transmission error [µm]"),
+    ):
+        for colour, row in zip(COLOURS, first):
+            at, line = periodic(modes["position"], modes[ours].values[row] * scale)
+            ax.plot(at, line, color=colour, label=f"helical, {names[row]}")
+            at, line = periodic(static["position"], static[spur].values[row] * scale)
+            ax.plot(at, line, ":", color=colour, label=f"spur, {names[row]}")
+        label(ax, y=text)
+    axes[0].set_ylim(bottom=0.0)
+    axes[1].set_xlim(0.0, 1.0)
+    label(axes[1], "position in the mesh period [1]")
+    legend_below(figure, axes[0], columns=2)
+    return figure
+
+
+def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
+    """Fluctuation of the dynamic transmission error over one mesh period beside the static one.
+
+    Parameters
+    ----------
+    dynamics, modes : xarray.Dataset
+        Contents of dynamics.nc, of which at most four speeds are drawn, and of modes.nc.
+    """
+    count = dynamics.sizes["speed"]
+    speeds = sorted({round(i) for i in np.linspace(0, count - 1, min(count, _SPEEDS))})
+    rows, columns = -(-len(speeds) // 2), min(len(speeds), 2)
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=1.2 + 3.6 * rows, sharey=True
+    )
+    for ax in axes[len(speeds) :]:
+        figure.delaxes(ax)
+    h = dynamics["harmonic"].values
+    position = fine_positions(int(h.max()))
+    wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
+    dte = 1e6 * (dynamics["dte_real"].values + 1j * dynamics["dte_imag"].values)[..., h > 0]
+    ste = modes["helical_ste"].values
+    # what is one line at one speed need not be one at another: the lines are those of all speeds
+    lines = alike_lines(dynamics["mesh"].values, np.hstack([*(dte[speeds] @ wave).real, 1e6 * ste]))
+    for ax, s in zip(axes, speeds):
+        for i, (text, row) in enumerate(lines):
+            style = line_style(i)
+            ax.plot(position, (dte[s, row] @ wave).real, linewidth=2.0, label=text, **style)
+            draw_static(ax, modes["position"], ste[row], excited_harmonics(dynamics, s), position, style)
+        ax.set_xlim(0.0, 1.0)
+        frequency = float(dynamics["mesh_frequency"].values[s])
+        title = f"{rpm(dynamics['speed'].values[s])}, mesh frequency {frequency:.6g} Hz"
+        label(ax, "position in the mesh period [1]", title=title)
+    for ax in axes[: len(speeds) : 2]:
+        label(ax, y="transmission error less its mean [µm]")
+    name_kinds(axes[0], dynamics)
+    legend_below(figure, columns=3)
+    return figure
+
+
+def alike_lines(names, values, *, tolerance: float = 1e-6) -> list[tuple[str, int]]:
+    """Legend texts and row numbers of the curves to draw: one for all meshes of a kind whose curves agree.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Mesh labels.
+    values : (n, ...) array
+        A row a mesh.
+    tolerance : float
+        Largest difference of curves counted as equal, relative to the largest value.
+    """
+    names, values = [str(name) for name in names], np.asarray(values)
+    kinds, size, groups = [family(name) for name in names], np.abs(values).max(initial=0.0), []
+    for row, kind in enumerate(kinds):
+        for group in groups:
+            near = np.abs(values[row] - values[group[0]]).max() <= tolerance * size
+            if kinds[group[0]] == kind and near:
+                group.append(row)
+                break
+        else:
+            groups.append([row])
+    lines = []
+    for group in groups:
+        text = ", ".join(names[row] for row in group)
+        if 1 < len(group) == kinds.count(kinds[group[0]]):
+            text = f"all {kinds[group[0]]} meshes"
+        lines.append((text + " (identical)" if len(group) > 1 else text, group[0]))
+    return lines
+
+
+def mesh_force_figure(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
+    """Amplitudes of the mesh forces of planet 1 over the frequency of every harmonic.
+
+    Parameters
+    ----------
+    dynamics, modes : xarray.Dataset
+        Contents of dynamics.nc and modes.nc; marks along the axis are natural frequencies by phasing.
+    """
+    order = np.argsort(dynamics["mesh_frequency"].values)
+    hertz = dynamics["mesh_frequency"].values[order]
+    force = np.hypot(dynamics["mesh_force_real"].values, dynamics["mesh_force_imag"].values)[order]
+    count = min(_HARMONICS, force.shape[-1] - 1)
+    names, n = [str(name) for name in dynamics["mesh"].values], dynamics.sizes["mesh"] // 2
+    figure, axes = new_figure(rows=2, height=7.4, sharex=True)
+    top = count * hertz.max()
+    for ax, mesh in zip(axes, (0, n)):
+        for h in range(1, count + 1):
+            ax.plot(
+                1e-3 * h * hertz, force[:, mesh, h], DASHES[(h - 1) % 4], color=COLOURS[h - 1],
+                label=f"harmonic {h}",
+            )  # fmt: skip
+        _mark(ax, modes, top)
+        ax.set_yscale("log")
+        label(ax, y="mesh force [N]", title=names[mesh])
+    axes[0].set_xlim(0.0, 1e-3 * top)
+    label(axes[1], "frequency of the harmonic [kHz]")
+    legend_below(figure, axes[0], columns=4)
+    return figure
+
+
+def _mark(ax, modes: xr.Dataset, top: float) -> None:
+    """Natural frequencies as marks inside the lower edge, by the phasing of the mode."""
+    found = modes["frequency"].values
+    phasing = np.array([str(name) for name in modes["phasing"].values])
+    for name in dict.fromkeys(phasing):
+        here = found[(phasing == name) & (found > 0.0) & (found <= top)]
+        if len(here):
+            ax.plot(
+                1e-3 * here, np.full(len(here), 0.03), _MARKS.get(name, "^"), color=BLACK, markersize=5,
+                markerfacecolor="none", label=f"modes {name}", linestyle="none",
+                transform=ax.get_xaxis_transform(),
+            )  # fmt: skip

@@ -1,0 +1,328 @@
+"""Results of a helical case as xarray datasets: modes.nc, dynamics.nc.
+
+What a helical case is, as tables.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.gears import involute
+from femgear.gears.helix import virtual_teeth
+from femgear.report.tables import Block
+from femgear.storage.dataset import (
+    FOURIER,
+    MEMBERS,
+    RPM,
+    complex_entries,
+    dataset,
+    in_space,
+    response_entries,
+)
+from femgear.system.system import MeshExcitation
+from femgear.trains.helical.model import contact_ratios
+from femgear.trains.helical.virtual_gears import SectionStiffness
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.case.sections import Case
+    from femgear.gears.kinematics import Speeds
+    from femgear.gears.planetary import PlanetarySet
+    from femgear.solvers.stability.floquet import Stability
+    from femgear.system.system import MechanicalSystem, Modes, Response
+    from femgear.trains.helical.model import HelicalSet
+
+
+@dataclass(frozen=True)
+class HelicalModesResult:
+    """Modes with mean mesh stiffness, and what excites them.
+
+    ``excitation`` has a row a slice, ``whole`` a row a mesh at its static state with fixed centres, both
+    along the tooth normals and None where the mesh stiffness is given; ``phasing`` is that of every mode.
+    """
+
+    planetary_set: PlanetarySet
+    data: HelicalSet
+    system: MechanicalSystem
+    modes: Modes
+    phasing: tuple[str, ...]
+    flank: int
+    section: SectionStiffness | None = None
+    excitation: MeshExcitation | None = None
+    whole: MeshExcitation | None = None
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of modes.nc."""
+
+        return helical_modes_dataset(self)
+
+
+@dataclass(frozen=True)
+class HelicalDynamicsResult:
+    """Periodic response at every speed, its stability, and loads.
+
+    ``loads`` holds complex harmonics by name: ``pin`` (speeds, N, 6, H + 1) and ``support``
+    (speeds, 3, 6, H + 1), three forces [N] and three moments [N m] each.
+    """
+
+    modes: HelicalModesResult
+    input_speed: np.ndarray
+    speeds: tuple[Speeds, ...]
+    response: Response
+    stability: Stability
+    loads: dict[str, np.ndarray]
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of dynamics.nc."""
+
+        return helical_dynamics_dataset(self)
+
+
+AXES = ("x", "y", "z", "tilt x", "tilt y", "rotation")
+
+
+def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
+    """Contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
+    from femgear.trains.helical.model import free_motions
+
+    modes, data = result.modes, result.data
+    shape, dofs = in_space(data, free_motions(data) @ modes.shape, AXES)
+    meshes = (2 * data.n_planets, data.slices)
+    deflection = modes.mesh_deflection.reshape(*meshes, -1).mean(axis=1)
+    variables = {
+        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
+        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
+        "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
+        "phasing": (("mode",), list(result.phasing), "1", "phasing of the planets in the mode"),
+        "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
+        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
+        "mesh_stiffness": (
+            ("mesh",), modes.mesh_stiffness.reshape(meshes).sum(axis=1), "N/m",
+            "mean mesh stiffness along the tooth normals",
+        ),
+        "mesh_deflection": (
+            ("mesh", "mode"), deflection, "kg^-1/2", "mesh deflection of the mode along the tooth normals",
+        ),
+    }  # fmt: skip
+    coords = _coordinates(result) | {
+        "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
+        "dof": (("dof",), dofs, "1", "degree of freedom"),
+    }
+    if result.whole is not None:
+        along, whole = np.cos(data.base_helix_angle), result.whole
+        where = ("mesh", "position")
+        variables["helical_stiffness"] = (
+            where, whole.stiffness * along**2, "N/m", "mesh stiffness along the transverse line of action",
+        )  # fmt: skip
+        variables["helical_ste"] = (
+            where, whole.deflection / along, "m",
+            "static transmission error along the transverse line of action, centres fixed",
+        )  # fmt: skip
+        position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
+        coords["position"] = (("position",), position, "1", "position in mesh periods")
+    return dataset(
+        variables,
+        coords=coords,
+        attrs={"title": "modes of the helical set at standstill", "unknowns": len(modes.shape)}
+        | _attributes(result),
+    )
+
+
+def helical_dynamics_dataset(result: HelicalDynamicsResult) -> xr.Dataset:
+    """Contents of dynamics.nc of a helical case."""
+    response, basis, lines = result.response, result.modes, ("speed", "mesh", "harmonic")
+    data = basis.data
+    whole = (len(response.mesh_frequency), 2 * data.n_planets, data.slices, -1)
+    force, deflection = response.force.reshape(whole), response.deflection.reshape(whole)
+    pin, support = result.loads["pin"], result.loads["support"]
+    along = np.cos(data.base_helix_angle)
+    on_planet, on_member = (
+        ("speed", "planet", "direction", "harmonic"),
+        ("speed", "member", "axis", "harmonic"),
+    )
+    entries = (
+        (
+            "dte", lines, deflection.mean(axis=2) / along, "m",
+            "dynamic transmission error along the transverse line of action at mid-face",
+        ),
+        ("mesh_force", lines, force.sum(axis=2), "N", "dynamic mesh force along the tooth normals"),
+        (
+            "mesh_deflection", lines, deflection.mean(axis=2), "m",
+            "deflection of the mesh spring along the tooth normals at mid-face",
+        ),
+        (
+            "slice_force", ("speed", "mesh", "slice", "harmonic"), force, "N",
+            "dynamic force of a slice along the tooth normals",
+        ),
+        ("pin_force", on_planet, pin[:, :, :3], "N", "force of the pin on the planet"),
+        ("pin_moment", on_planet, pin[:, :, 3:], "N m", "moment of the pin on the planet"),
+        ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),
+        ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
+    )  # fmt: skip
+    return dataset(
+        response_entries(result) | complex_entries(entries),
+        coords=_coordinates(basis) | _lines(result),
+        attrs={
+            "title": "periodic response of the helical set by the spectral method",
+            "message": response.message,
+            "ring_teeth": basis.planetary_set.ring.teeth,
+            "fourier_convention": FOURIER,
+        }
+        | _attributes(basis),
+    )
+
+
+def _lines(result: HelicalDynamicsResult) -> dict[str, tuple]:
+    data, harmonics = result.modes.data, np.arange(result.response.force.shape[-1])
+    planets = np.arange(1, data.n_planets + 1)
+    axes, directions = ["x", "y", "z"], ["radial", "tangential", "axial"]
+    return {
+        "speed": (("speed",), result.input_speed / RPM, "rpm", "speed of the input"),
+        "harmonic": (("harmonic",), harmonics, "1", "harmonic of the mesh frequency"),
+        "slice": (("slice",), data.slice_heights, "m", "height of the slice above mid-face"),
+        "planet": (("planet",), planets, "1", "planet"),
+        "direction": (("direction",), directions, "1", "direction at the planet"),
+        "member": (("member",), list(MEMBERS), "1", "member"),
+        "axis": (("axis",), axes, "1", "axis of the frame of the carrier"),
+    }
+
+
+def _coordinates(result: HelicalModesResult) -> dict[str, tuple]:
+    return {"mesh": (("mesh",), list(result.planetary_set.mesh_names), "1", "gear mesh")}
+
+
+def _attributes(result: HelicalModesResult) -> dict:
+    data, section = result.data, result.section
+    given = {
+        "model": "helical",
+        "planet_angles": np.asarray(data.planet_angles),
+        "base_helix_angle": data.base_helix_angle,
+        "face_width": data.face_width,
+    }
+    if section is not None:
+        given |= {"virtual_teeth": np.array(section.teeth), "section_factor": section.factor}
+    return given
+
+
+def describe_helical(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
+    """Helix, contact ratios, bodies and supports of a helical case.
+
+    Parameters
+    ----------
+    case : Case
+        With a section helical.
+    planetary : PlanetarySet
+        Of its transverse section.
+    """
+    return _teeth(case, planetary), Block(
+        "Helical model", _BODIES, tuple(_bodies(case)), _model(case, planetary)
+    )
+
+
+_BODIES = (
+    "", "mass [kg]", "polar, diametral inertia [kg m^2]", "radial, axial [N/m]", "tilt, torsional [N m/rad]",
+)  # fmt: skip
+
+
+def _teeth(case: Case, s: PlanetarySet) -> Block:
+    helical, normal = case.helical, case.sun
+    beta = helical.helix_angle
+    base = involute.base_helix_angle(normal.pressure_angle, beta)
+    ratios = contact_ratios(s, helix_angle=beta, face_width=case.set.face_width)
+    rows = [
+        (name, *(f"{value:.4f}" for value in values))
+        for name, values in (
+            ("transverse contact ratio", ratios[:, 0]),
+            ("overlap ratio", ratios[:, 1]),
+            ("total contact ratio", ratios.sum(axis=1)),
+        )
+    ]
+    other = "left" if helical.hand == "right" else "right"
+    notes = (
+        f"helix angle {math.degrees(beta):.6g} deg, on the base cylinder {math.degrees(base):.6g} deg; sun "
+        f"{helical.hand}-handed, planets and ring {other}-handed",
+        f"normal module {normal.module * 1e3:.6g} mm, normal pressure angle "
+        f"{math.degrees(normal.pressure_angle):.6g} deg; gears, meshes and static solution are those of the "
+        f"transverse section: module {s.sun.module * 1e3:.6g} mm, pressure angle "
+        f"{math.degrees(s.sun.pressure_angle):.6g} deg, profile shifts and racks in transverse modules",
+    )
+    return Block("Helix", ("", "sun-planet", "planet-ring"), tuple(rows), notes)
+
+
+def _bodies(case: Case) -> Iterator[tuple[str, ...]]:
+    helical, planet = case.helical, case.planet
+    for name, one, radial in (
+        ("sun", case.sun, case.sun.support_stiffness),
+        ("ring", helical.ring, helical.ring.support_stiffness),
+        ("carrier", case.carrier, case.carrier.support_stiffness),
+        ("planet (pin)", planet, planet.bearing_stiffness),
+    ):
+        space = getattr(helical, name.partition(" ")[0])
+        torsional = space.torsional_stiffness
+        held = "held" if name == case.operation.fixed else "0"
+        yield (
+            name,
+            f"{one.mass:.6g}",
+            f"{one.inertia:.6g}, {space.diametral_inertia:.6g}",
+            f"{radial:.6g}, {space.axial_stiffness:.6g}",
+            f"{space.tilt_stiffness:.6g}, {held if torsional is None else f'{torsional:.6g}'}",
+        )
+
+
+def _model(case: Case, s: PlanetarySet) -> tuple[str, ...]:
+    helical, given = case.helical, case.helical.mesh_stiffness
+    if given is not None:
+        text = (
+            f"mesh stiffness along the tooth normals: sun-planet {given.sun_planet:.6g}, planet-ring "
+            f"{given.planet_ring:.6g} N/m, as given"
+        )
+    elif helical.section == "normal":
+        teeth = "/".join(str(z) for z in virtual_teeth(s, helical.helix_angle))
+        text = f"mesh stiffness: of the static solution, teeth as stiff as those of virtual gears {teeth}"
+    else:
+        text = "mesh stiffness: of the static solution, teeth of the transverse section"
+    slices = "one slice" if helical.slices == 1 else f"{helical.slices} slices"
+    points = helical.contact_points.replace("_", " ")
+    return text, f"{slices} over the face width; forces act at the {points}"
+
+
+def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None) -> Block:
+    """Numbers of static.nc, which holds spur gears, and beside them those of the helical meshes.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        Contents of static.nc of a helical case.
+    modes : xarray.Dataset, optional
+        Contents of modes.nc, which has stiffness and transmission error of the helical meshes.
+    """
+    sources = [("spur", static["ste"], static["mesh_stiffness"])]
+    if modes is not None and "helical_ste" in modes:
+        sources.insert(0, ("helical", modes["helical_ste"], modes["helical_stiffness"]))
+    header, columns = ["mesh"], [[str(name) for name in static["mesh"].values]]
+    for name, *pair in sources:
+        for values, short, factor, unit in zip(pair, ("STE", "k"), (1e6, 1e-6), ("um", "N/um")):
+            values = factor * values.values
+            header += [f"{name} {short} mean [{unit}]", "p-p"]
+            columns += [
+                [f"{v:.4g}" for v in values.mean(axis=1)],
+                [f"{v:.4g}" for v in np.ptp(values, axis=1)],
+            ]
+    header.append("spur force [N]")
+    columns.append([f"{v:.3f}" for v in static["mesh_force"].values.mean(axis=1)])
+    share = static["load_share"].values
+    notes = [
+        "spur: transverse spur section, whose gears the slices come from; all along its line of action",
+        f"load share of a planet in the transverse spur section {share.min():.4f} to {share.max():.4f} "
+        f"(equal: {1 / static.sizes['planet']:.4f}); contact: {static.attrs.get('contact', 'unknown')}",
+    ]
+    if static.attrs.get("mesh_periods", 1) > 1:
+        notes.append(str(static.attrs["period"]))
+    notes += [f"[{text.strip()}" for text in str(static.attrs.get("warnings", "")).split("[") if text]
+    return Block("Static", tuple(header), tuple(zip(*columns)), tuple(notes))

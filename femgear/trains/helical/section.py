@@ -1,0 +1,139 @@
+"""The section of a case file that makes the teeth helical, and what it goes with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from femgear.case.fields import Count, Quantity
+from femgear.case.units import ANGLE, INERTIA, MASS, STIFFNESS, TORSION
+from femgear.trains.planar.section import MeshStiffnessSection
+
+LARGEST_HELIX = math.radians(45.0)
+# stiffer supports are lost in the rounding of those that mesh springs feel
+Stiffness = Quantity(STIFFNESS, 0.0, 1e14)
+Turning = Quantity(TORSION, 0.0, 1e13)
+MOST_SLICES = 30
+# measured with 8 meshes of 10 to 30 slices: the time of one speed grows with the cube of the columns
+_SECONDS = 2.7e-7
+_LONG = 60.0
+Diametral = Quantity(INERTIA, 1e-12, 1e8)
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Supported(_Section):
+    """What a body needs beyond its mass, polar inertia and radial support to move in space."""
+
+    diametral_inertia: Diametral
+    axial_stiffness: Stiffness
+    tilt_stiffness: Turning
+    torsional_stiffness: Turning | None = None
+
+
+class HelicalSunSection(_Supported):
+    """The sun in space."""
+
+
+class HelicalCarrierSection(_Supported):
+    """The carrier in space."""
+
+
+class HelicalPlanetSection(_Supported):
+    """Each planet in space, on its pin."""
+
+
+class HelicalRingSection(_Supported):
+    """The ring as a rigid body on its support in the housing."""
+
+    mass: Quantity(MASS, 1e-6, 1e6)
+    inertia: Diametral
+    support_stiffness: Stiffness
+
+
+class HelicalSection(_Section):
+    """Helical teeth on rigid bodies that move in space: sun, ring, carrier and planets.
+
+    With this section module, pressure angle, racks and profile shifts are those of the normal section, and a
+    run solves the set of Kahraman in place of the elastic ring.
+    """
+
+    helix_angle: Quantity(ANGLE, 0.0, LARGEST_HELIX)
+    hand: Literal["right", "left"] = "right"
+    slices: Count(1, MOST_SLICES) = 1
+    contact_points: Literal["pitch_point", "base_circles"] = "pitch_point"
+    section: Literal["normal", "transverse"] = "normal"
+    mesh_stiffness: MeshStiffnessSection | None = None
+    sun: HelicalSunSection
+    ring: HelicalRingSection
+    carrier: HelicalCarrierSection
+    planet: HelicalPlanetSection
+
+    @property
+    def signed_helix_angle(self) -> float:
+        """Of the sun, positive for a right-handed one [rad]."""
+        return self.helix_angle if self.hand == "right" else -self.helix_angle
+
+
+def helical_notices(data: dict) -> Iterator[str]:
+    """What a helical case gives without effect.
+
+    Parameters
+    ----------
+    data : dict
+        Tables of a case file that was checked, with a section helical.
+    """
+    unused = [name for name in ("motor", "brake", "housing") if name in data]
+    unused += [f"ring.{key}" for key in ("foundation_radial", "foundation_tangential") if key in data["ring"]]
+    unused += [f"static.{key}" for key in ("stresses", "back_flanks") if key in data.get("static", {})]
+    if data["planet"].get("bearing_clearance"):
+        unused.append("planet.bearing_clearance")
+    if unused:
+        yield f"{_listed(unused)} no effect in this helical case"
+    if data["helical"].get("contact_points") == "base_circles":
+        yield (
+            '[W-CONTACT-POINTS] helical.contact_points: with "base_circles" the mesh forces on both gears do '
+            "not act on one line, so that the set is not in equilibrium: pin and support moments are wrong, "
+            'for 30/20/70 teeth those of the pins by 13 % (usual: "pitch_point"; frequencies differ by 0.1 %)'
+        )
+    if "mesh_stiffness" in data["helical"]:
+        given = [name for name in ("static", "dynamics") if name in data]
+        if "section" in data["helical"]:
+            given.append("helical.section")
+        for name in ("sun", "planet", "ring", "carrier"):
+            keys = ("modifications", "errors", "individual")
+            given += [f"{name}.{key}" for key in keys if data.get(name, {}).get(key)]
+        if given:
+            yield (
+                f"{_listed(given)} no effect while helical.mesh_stiffness is given: it leaves nothing that "
+                "excites, and modes are all that is computed"
+            )
+    else:
+        yield from _slow_notice(data)
+
+
+def _slow_notice(data: dict) -> Iterator[str]:
+    """What many slices cost."""
+    slices, angles = data["helical"].get("slices", 1), data["set"].get("planet_angles")
+    planets = data["set"]["planets"] if angles is None else len(angles)
+    given = data["operation"]["speeds"]
+    speeds = given["count"] if isinstance(given, dict) else len(given)
+    seconds = _SECONDS * speeds * (2 * planets * slices) ** 3
+    if slices > 1 and seconds > _LONG:
+        yield (
+            f"[W-SLICES] helical.slices: {slices} slices of {2 * planets} meshes at {speeds} speeds take "
+            f"dynamics about {_duration(seconds)} (usual: 8 slices or fewer)"
+        )
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
+
+
+def _listed(names: list[str]) -> str:
+    return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"

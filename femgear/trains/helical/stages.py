@@ -1,0 +1,197 @@
+"""The pipeline of a helical case: static (where no mesh stiffness is given) -> modes -> dynamics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case.case import planetary_set
+from femgear.case.dependencies import check_entries, static_entries
+from femgear.case.sections import Case
+from femgear.system.system import MeshExcitation
+from femgear.threads import one_blas_thread
+from femgear.trains.helical.checks import check_helical_case
+from femgear.trains.helical.results import HelicalDynamicsResult, HelicalModesResult
+from femgear.trains.helical.virtual_gears import (
+    SectionStiffness,
+    base_helix_angle,
+    helical_data,
+    normal_record,
+    overlap_ratio,
+    rotation_sense,
+    section_stiffness,
+    shared_load,
+    torque_of,
+)
+from femgear.trains.protocol import Progress
+from femgear.trains.static import stages as static_stages
+from femgear.trains.static.results import StaticResult
+
+if TYPE_CHECKING:
+    from femgear.system.system import MechanicalSystem, Response
+    from femgear.trains.helical.model import HelicalSet
+
+
+def solve_helical_static(
+    case: Case, *, cache: Path | None = None, progress: Progress | None = None
+) -> StaticResult:
+    """Static solution of the spur gears of the transverse section, the whole face width loaded at once."""
+    return static_stages.solve_static(_drive_flanks(case), cache=cache, progress=progress)
+
+
+def _drive_flanks(case: Case) -> Case:
+    """The case whose static solution has drive flanks alone."""
+    plain = case.static.model_copy(update={"stresses": False, "back_flanks": False})
+    return case.model_copy(update={"static": plain})
+
+
+@one_blas_thread()
+def solve_helical_modes(
+    case: Case,
+    static: StaticResult | None = None,
+    *,
+    section: SectionStiffness | None = None,
+    cache: Path | None = None,
+) -> HelicalModesResult:
+    """Natural frequencies, modes, their kinds and phasing.
+
+    Parameters
+    ----------
+    case : Case
+        With a section helical.
+    static : StaticResult, optional
+        Of `solve_helical_static`; needed where the case gives no mesh stiffness.
+    section : SectionStiffness, optional
+        Of `section_stiffness`, where it is known already.
+    cache : path, optional
+        Folder of generated grids.
+
+    Raises
+    ------
+    CaseError
+        What `check_helical_case` refuses.
+    """
+    from femgear.system.lumped import flank_sign
+    from femgear.trains.helical.model import helical_excitation, helical_system
+
+    gears = planetary_set(case)
+    check_helical_case(case, gears)
+    excitation, whole = None, None
+    if case.helical.mesh_stiffness is None:
+        check_entries(static.entries, static_entries(_drive_flanks(case)), "static solution")
+        factor = np.ones(2)
+        if case.helical.section == "normal":
+            section = section or section_stiffness(case, gears, cache=cache)
+            factor = section.factor
+        sense, overlap = rotation_sense(case, gears), overlap_ratio(case, gears)
+        cycle = static.cycle
+        backlash = np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], gears.n_planets)
+        spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, backlash)
+        record = normal_record(spur, factor, base_helix_angle(case, gears), reversed_time=sense < 0)
+        hand = sense * (1 if case.helical.hand == "right" else -1)
+        whole = shared_load(helical_excitation(record, overlap))
+        excitation = helical_excitation(record, overlap, slices=case.helical.slices, hand=hand)
+    data = helical_data(case, gears, None if whole is None else whole.stiffness.mean(axis=1))
+    torque = torque_of(case)
+    system, flank = helical_system(data, torque=torque), flank_sign(data, torque)
+    stiffness = data.column_stiffness if excitation is None else excitation.stiffness.mean(axis=1)
+    modes, phases = _named_modes(data, system, stiffness, case.dynamics.damping_ratio)
+    return HelicalModesResult(gears, data, system, modes, phases, flank, section, excitation, whole)
+
+
+@one_blas_thread()
+def solve_helical_dynamics(
+    case: Case, modes: HelicalModesResult, *, progress: Progress | None = None
+) -> HelicalDynamicsResult:
+    """Periodic response at the case's speeds by the spectral method, with a Floquet verdict at each.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    from femgear.gears.kinematics import speeds
+    from femgear.solvers.periodic.spectral import solve_spectral
+    from femgear.solvers.stability.floquet import stability as floquet_verdict
+
+    operation, dynamics = case.operation, case.dynamics
+    turning = tuple(
+        speeds(modes.planetary_set, input=operation.input, fixed=operation.fixed, speed=speed)
+        for speed in operation.speeds
+    )
+    frequency = np.array([one.mesh_frequency for one in turning])
+    response = solve_spectral(
+        modes.modes,
+        modes.excitation,
+        frequency,
+        excitation_harmonics=case.mesh_harmonics,
+        response_harmonics=case.response_harmonics,
+        tolerance=dynamics.tolerance,
+    )
+    if progress is not None:
+        progress("dynamics", 1, 2)
+    verdict = floquet_verdict(
+        modes.modes, modes.excitation, frequency, excitation_harmonics=case.mesh_harmonics
+    )
+    if progress is not None:
+        progress("dynamics", 2, 2)
+    return HelicalDynamicsResult(
+        modes, np.array(operation.speeds), turning, response, verdict, _loads(modes, response)
+    )
+
+
+def _named_modes(data: HelicalSet, system: MechanicalSystem, stiffness, ratio: float):
+    """All modes, those of one frequency with one phasing each, and the phasing."""
+    from femgear.solvers.linear.modal import solve_modes
+    from femgear.system.mode_kinds import phase_basis, phasing
+    from femgear.trains.helical.model import helical_kinds, helical_motions
+
+    modes = solve_modes(system, stiffness, damping_ratio=ratio)
+    Q = phase_basis(helical_motions(data, modes.shape), modes.frequency, tolerance=1e-9)
+    shape = modes.shape @ Q
+    named = replace(
+        modes,
+        shape=shape,
+        mesh_deflection=modes.mesh_deflection @ Q,
+        modal_load=Q.T @ modes.modal_load,
+        kind=helical_kinds(data, shape, frequency=modes.frequency),
+    )
+    return named, phasing(helical_motions(data, shape))
+
+
+def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:
+    """Loads of pins on planets and of supports on central members, harmonics (speeds, ..., 6, H + 1)."""
+    from femgear.solvers.linear.modal import output_load, output_response, residual_output
+    from femgear.system.lumped import CENTRAL, member_radius
+    from femgear.trains.helical.model import free_motions, mesh_directions, pin_directions
+
+    data, system, basis = result.data, result.system, result.modes
+    T, pins, N = free_motions(data), pin_directions(data), data.n_planets
+    radii = np.array([member_radius(data, name) for name in CENTRAL])
+    scale = np.hstack([np.ones((3, 3)), np.repeat(radii[:, None], 3, axis=1)])
+    springs = np.stack([getattr(data, name).support.stiffness for name in CENTRAL])
+    stiffness = np.where(np.isinf(springs), 0.0, springs)
+    rows = np.concatenate(
+        [
+            -(data.pin_stiffness[..., None] * pins.transpose(1, 2, 0)).reshape(6 * N, -1) @ T,
+            -(stiffness / scale).reshape(18, 1) * T[:18],
+        ]
+    )
+    found = output_response(
+        basis,
+        response,
+        rows @ basis.shape,
+        residual=residual_output(system, basis, rows),
+        load=output_load(system, basis, rows),
+    )
+    pin, support = found[:, : 6 * N], found[:, 6 * N :].copy()
+    # what holds a motion takes up what meshes and pins exert on it
+    W = mesh_directions(data, result.flank)[:18]
+    for row in np.flatnonzero(np.isinf(springs).ravel()):
+        meshes = np.einsum("j,sjh->sh", W[row], response.force)
+        on_pins = np.einsum("p,sph->sh", pins[row].reshape(-1), pin)
+        support[:, row] = (meshes - on_pins) * scale.ravel()[row]
+    shape = (len(found), -1, 6, found.shape[-1])
+    return {"pin": pin.reshape(shape), "support": support.reshape(shape)}

@@ -1,0 +1,277 @@
+"""What a helical case means for the helical set: bodies, supports, radii, helix, torque.
+
+Stiffness of helical teeth from the static solution of the transverse section, as the normal one has it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case.checks import output_member
+from femgear.case.sections import Case
+from femgear.errors import CaseError, GeometryError
+from femgear.system.system import MeshExcitation
+from femgear.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    from femgear.gears.planetary import PlanetarySet
+    from femgear.system.lumped import PlanarTorque
+    from femgear.trains.helical.model import HelicalSet
+
+
+def helical_data(case: Case, gears: PlanetarySet, mesh_stiffness=None) -> HelicalSet:
+    """Helical set of a case: bodies and supports of its entries, radii and angles of its gears.
+
+    Parameters
+    ----------
+    case : Case
+    gears : PlanetarySet
+        Of the transverse section.
+    mesh_stiffness : (2N,) array, optional
+        Mean stiffnesses along the tooth normals [N/m] where the case gives none.
+    """
+    from femgear.system.lumped import HelicalBody, HelicalSupport
+    from femgear.trains.helical.model import helical_from_set
+
+    helical, N = case.helical, gears.n_planets
+    polar = {"sun": case.sun, "ring": helical.ring, "carrier": case.carrier}
+    bodies = {}
+    for name, one in polar.items():
+        space = getattr(helical, name)
+        held = np.inf if name == case.operation.fixed else 0.0
+        torsional = held if space.torsional_stiffness is None else space.torsional_stiffness
+        support = HelicalSupport(
+            one.support_stiffness, space.axial_stiffness, space.tilt_stiffness, torsional
+        )
+        bodies[name] = HelicalBody(one.mass, one.inertia, space.diametral_inertia, support)
+    pin, given = helical.planet, helical.mesh_stiffness
+    return helical_from_set(
+        gears,
+        helix_angle=helical.signed_helix_angle,
+        **bodies,
+        planet=HelicalBody(case.planet.mass, case.planet.inertia, pin.diametral_inertia),
+        stiffness_sun_planet=mesh_stiffness[:N] if given is None else given.sun_planet,
+        stiffness_planet_ring=mesh_stiffness[N:] if given is None else given.planet_ring,
+        planet_bearing=HelicalSupport(
+            case.planet.bearing_stiffness,
+            pin.axial_stiffness,
+            pin.tilt_stiffness,
+            pin.torsional_stiffness or 0.0,
+        ),
+        contact_points=helical.contact_points,
+        slices=helical.slices,
+        face_width=case.set.face_width,
+    )
+
+
+def base_helix_angle(case: Case, gears: PlanetarySet) -> float:
+    """beta_b [rad] without sign: ``tan beta_b = tan beta cos alpha_t`` (ISO 21771, section 4.2.6)."""
+    return math.atan(math.tan(case.helical.helix_angle) * math.cos(gears.sun.pressure_angle))
+
+
+def overlap_ratio(case: Case, gears: PlanetarySet) -> float:
+    """eps_beta of both meshes."""
+    from femgear.trains.helical.model import contact_ratios
+
+    found = contact_ratios(gears, helix_angle=case.helical.helix_angle, face_width=case.set.face_width)
+    return float(found[0, 1])
+
+
+def rotation_sense(case: Case, gears: PlanetarySet) -> int:
+    """1 where the sun turns counter-clockwise against the carrier, else -1."""
+    from femgear.gears.kinematics import speeds
+
+    found = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=1.0)
+    return 1 if found.sun > found.carrier else -1
+
+
+def torque_of(case: Case) -> PlanarTorque:
+    """The driving torque, which the member that is neither driven nor held takes up."""
+    from femgear.system.lumped import PlanarTorque
+
+    return PlanarTorque(case.operation.torque, case.operation.input, output_member(case))
+
+
+# both sections are solved on the same grid, and only the ratio of their stiffnesses counts
+FLANK_ELEMENTS, POSITIONS = 8, 16
+
+
+@dataclass(frozen=True)
+class SectionStiffness:
+    """Stiffness of one tooth pair in the transverse section and in the normal one.
+
+    Parameters
+    ----------
+    teeth : (3,) tuple of int
+        Of the virtual sun, planet and ring.
+    transverse, normal : (2,) array
+        Mean stiffness c' of a tooth pair [N/m^2] of the sun-planet and the planet-ring mesh: of the
+        transverse section, per face width along the transverse line of action; of the virtual gears, per
+        length of the contact line along the tooth normal.
+    base_helix_angle : float
+        [rad]
+    """
+
+    teeth: tuple[int, int, int]
+    transverse: np.ndarray
+    normal: np.ndarray
+    base_helix_angle: float
+
+    @property
+    def factor(self) -> np.ndarray:
+        """``c'_n cos(beta_b) / c'_t`` (2,): helical stiffness over that of the transverse section.
+
+        A piece dz of the face width holds ``dz / cos beta_b`` of contact line. A turn that closes the
+        transverse line of action by d closes the normal by ``d cos beta_b``, and of the normal force the
+        part ``cos beta_b`` makes torque: ``dF_t = c'_n (dz / cos beta_b) cos^2 beta_b d``. ISO 6336-1,
+        method B, likewise takes c' of virtual gears times ``cos beta``.
+        """
+        return self.normal * math.cos(self.base_helix_angle) / self.transverse
+
+
+@one_blas_thread()
+def section_stiffness(case: Case, gears: PlanetarySet, *, cache: Path | None = None) -> SectionStiffness:
+    """Stiffness of the teeth of both sections, from one planet each under the same load a length.
+
+    The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse.
+
+    Parameters
+    ----------
+    case : Case
+        With a section helical.
+    gears : PlanetarySet
+        Of its transverse section.
+    cache : path, optional
+        Folder of generated grids.
+
+    Raises
+    ------
+    CaseError
+        Virtual gears that cannot be made (E-HELICAL-SECTION).
+    GridError, ContactError
+    """
+    virtual, helix = virtual_gears(case, gears), case.helical.helix_angle
+    single = replace(gears, planet_angles=gears.planet_angles[:1])
+    beta_b = math.atan(math.tan(helix) * math.cos(gears.sun.pressure_angle))
+    load = line_load(case, gears)
+    transverse, normal = (_pair_stiffness(case, one, load, cache) for one in (single, virtual))
+    teeth = tuple(gear.teeth for gear in (virtual.sun, virtual.planet, virtual.ring))
+    return SectionStiffness(teeth, transverse, normal, beta_b)
+
+
+def virtual_gears(case: Case, gears: PlanetarySet) -> PlanetarySet:
+    """`femgear.gears.helix.virtual_set` of a case.
+
+    Raises
+    ------
+    CaseError
+        E-HELICAL-SECTION: they cannot be made.
+    """
+    from femgear.gears.helix import virtual_set
+
+    try:
+        return virtual_set(gears, case.helical.helix_angle)
+    except GeometryError as error:
+        raise CaseError(
+            f"the virtual gears of the normal section cannot be made: {error.message}",
+            code="E-HELICAL-SECTION",
+            key="helical.section",
+            value=case.helical.section,
+            limit='"transverse" for these teeth',
+            remedy='write section = "transverse": teeth then are those of the transverse section, too stiff',
+            file=case.location("helical.section"),
+        ) from None
+
+
+def normal_record(
+    record: MeshExcitation, factor: np.ndarray, base_helix_angle: float, *, reversed_time: bool = False
+) -> MeshExcitation:
+    """Record along tooth normals of helical teeth without overlap, from spur gears of the transverse section.
+
+    ``k_n = factor k_t / cos^2 beta_b``, ``F_n = F_t / cos beta_b``; the tangent line of force over deflection
+    keeps its intercept ``d_t - F_t / k_t``, which holds deviations of the flanks, and changes its slope:
+    ``d_n = (d_t - F_t / k_t + F_t / (factor k_t)) cos beta_b``.
+
+    Parameters
+    ----------
+    record : MeshExcitation
+        Along the transverse line of action, 2N rows.
+    factor : (2,) array
+        Of the sun-planet and the planet-ring meshes.
+    base_helix_angle : float
+        [rad]
+    reversed_time : bool
+        For a sun that turns clockwise against the carrier: positions of the record run the other way.
+    """
+    scale = np.repeat(np.asarray(factor, float), len(record.stiffness) // 2)[:, None]
+    along = math.cos(base_helix_angle)
+    softer = record.force / record.stiffness * (1.0 / scale - 1.0)
+    values = [
+        record.stiffness * scale / along**2,
+        (record.deflection + softer) * along,
+        record.force / along,
+    ]
+    if reversed_time:
+        values = [np.roll(one[:, ::-1], 1, axis=1) for one in values]
+    return MeshExcitation(*values, backlash=record.backlash * along, periods=record.periods)
+
+
+def shared_load(record: MeshExcitation) -> MeshExcitation:
+    """The same tangent lines at the static state of a set with fixed centres.
+
+    Each planet passes the force on that it takes, ``F = k_s (d_s - e_s) = k_r (d_r - e_r)``, and one rotation
+    of the sun closes the meshes of all planets, ``d_s + d_r = X``; the forces on the sun add up to those of
+    the record.
+
+    Parameters
+    ----------
+    record : MeshExcitation
+        2N rows, one a mesh.
+    """
+    meshes = (2, len(record.stiffness) // 2, -1)
+    k = record.stiffness.reshape(meshes)
+    intercept = (record.deflection - record.force / record.stiffness).reshape(meshes)
+    compliance, gap = (1.0 / k).sum(axis=0), intercept.sum(axis=0)
+    total = record.force.reshape(meshes)[0].sum(axis=0)
+    closing = (total + (gap / compliance).sum(axis=0)) / (1.0 / compliance).sum(axis=0)
+    force = (closing - gap) / compliance
+    deflection = intercept + force / k
+    return replace(
+        record, force=np.concatenate([force, force]), deflection=deflection.reshape(record.deflection.shape)
+    )
+
+
+def line_load(case: Case, gears: PlanetarySet) -> float:
+    """Load a width of each sun mesh in the transverse section, which is that a length of contact line [N/m].
+
+    ``F_n / (b / cos beta_b)`` with ``F_n = F_t / cos beta_b``.
+    """
+    from femgear.gears.kinematics import torques
+
+    sun = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
+    return abs(sun) / (gears.n_planets * gears.sun.base_radius * gears.sun.face_width)
+
+
+def _pair_stiffness(case: Case, gears: PlanetarySet, load: float, cache: Path | None) -> np.ndarray:
+    """Mean stiffness of a tooth pair per width (2,) of the meshes of one planet [N/m^2]."""
+    from femgear.contact.bodies import make_bodies, make_sectors
+    from femgear.contact.cycle import walk_mesh_cycle
+    from femgear.fe.elasticity import Material
+
+    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    sectors = make_sectors(gears, material, flank_elements=FLANK_ELEMENTS, cache=cache)
+    width = gears.sun.face_width
+    cycle = walk_mesh_cycle(
+        gears,
+        make_bodies(sectors, material),
+        sun_torque=load * width * gears.sun.base_radius,
+        positions=POSITIONS,
+        contact=case.static.contact,
+    )
+    ratios = np.array([gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring])
+    return cycle.stiffness.mean(axis=1) / (width * ratios)

@@ -1,0 +1,919 @@
+"""Planetary stages in series as one mechanical system: every stage in the frame of its own carrier.
+
+The stages are lumped sets (`femgear.system.assembler`), the shafts between members springs or rigid. One
+rotation is the same in all frames, so that torsional couplings are exact at any speed. The centres of two
+members meet in the fixed frame: with ``z = x + i y`` in frames at the angles psi the lateral spring sees
+``z_1 exp(i psi_1) - z_2 exp(i psi_2)``. It is a constant spring where both frames turn at one speed, or
+stand; otherwise its columns stay in ``W`` for the periodic element of `femgear.trains.multistage.model`.
+D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16) couple stages with the same springs.
+
+Data of planetary stages in series: the stages, what couples them, what drives and what is driven.
+
+Speeds and torques of planetary stages in series: Willis for every stage, one linear system for the train.
+
+With the speeds ``w`` of all central members, every stage, coupling, and fixed member is one row of ``A w =
+0``. Ideal torques follow from the same rows: those that the outside gives the members are ``A^T lambda``
+(principle of virtual work), so that speeds and torques balance in power by construction.
+
+Lateral springs between frames that turn against one another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.system.assembler import free_motions, mesh_directions, planar_dofs, planar_system
+from femgear.system.entries import checked_count, checked_numbers
+from femgear.system.lumped import (
+    CENTRAL,
+    PlanarSet,
+    PlanarTorque,
+    flank_sign,
+    member_radius,
+    planar_from_set,
+    torque_shares,
+)
+from femgear.system.series import FourierSeries
+from femgear.system.system import MechanicalSystem
+from femgear.trains.planar.model import planar_springs
+
+if TYPE_CHECKING:
+    from femgear.gears.planetary import PlanetarySet
+
+# radii of base circles may be rounded; tooth numbers that differ by more are another set
+_RADII = 1e-3
+# largest finite stiffness of a coupling [N m/rad, N/m]; beyond, rounding hides the other springs
+STIFFEST = {"torsional": 1e12, "lateral": 1e15}
+
+
+@dataclass(frozen=True, order=True)
+class Member:
+    """A central member of a stage.
+
+    Parameters
+    ----------
+    stage : int
+        From 1.
+    name : {"carrier", "ring", "sun"}
+    """
+
+    stage: int
+    name: str
+
+    def __post_init__(self):
+        object.__setattr__(self, "stage", checked_count(self.stage, "stage", code="E-COUPLING"))
+
+    def __str__(self) -> str:
+        return f"stage {self.stage} {self.name}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stage:
+    """One planetary set of the train.
+
+    Parameters
+    ----------
+    data : PlanarSet
+    teeth : (3,) tuple of int, optional
+        Of sun, planet and ring (positive); speeds and mesh frequencies need them.
+    fixed : {"carrier", "ring", "sun"}, optional
+        Member that the housing holds; None where all three turn.
+    phases : (2N,) array, optional
+        Mesh phases as fractions of the mesh period, as in `PlanetarySet.mesh_phases`.
+    angle : float
+        Angle of the stage's x axis against the common frame at time zero [rad]; lateral couplings see it.
+
+    Raises
+    ------
+    CaseError
+        Tooth numbers that do not fit the base radii (E-TEETH), an unknown fixed member or one that nothing
+        holds (E-MECHANISM), phases of another number of meshes (E-SHAPE).
+    """
+
+    data: PlanarSet
+    teeth: tuple[int, int, int] | None = None
+    fixed: str | None = "ring"
+    phases: Sequence[float] | np.ndarray | None = None
+    angle: float = 0.0
+
+    def __post_init__(self):
+        if self.fixed is not None and self.fixed not in CENTRAL:
+            raise CaseError(
+                f"a fixed member {self.fixed!r}", code="E-MECHANISM", key="fixed", limit=", ".join(CENTRAL)
+            )
+        if self.fixed is not None and not getattr(self.data, self.fixed).torsional_support > 0.0:
+            raise CaseError(
+                f"the {self.fixed} is fixed but has no torsional support", code="E-MECHANISM",
+                key=f"{self.fixed}.torsional_support", limit="above 0, or infinite",
+            )  # fmt: skip
+        if checked_numbers(self.angle, "angle", code="E-VALUE", unit="rad").ndim or not np.isfinite(
+            self.angle
+        ):
+            raise CaseError(f"a stage angle of {self.angle} rad", code="E-VALUE", key="angle", limit="finite")
+        if self.teeth is not None:
+            object.__setattr__(self, "teeth", _checked_teeth(self.data, self.teeth))
+        if self.phases is not None:
+            phases = np.array(checked_numbers(self.phases, "phases", code="E-SHAPE", unit=""))
+            if phases.shape != (2 * self.data.n_planets,) or not np.all(np.isfinite(phases)):
+                raise CaseError(
+                    f"mesh phases of shape {phases.shape}", code="E-SHAPE", key="phases",
+                    limit=f"{2 * self.data.n_planets} finite numbers",
+                )  # fmt: skip
+            phases.setflags(write=False)
+            object.__setattr__(self, "phases", phases)
+
+
+@dataclass(frozen=True)
+class StageCoupling:
+    """A shaft between two members.
+
+    Parameters
+    ----------
+    first, second : Member
+        Of different stages.
+    torsional : float
+        Stiffness against their relative rotation [N m/rad]; infinite makes one rotation of both. Not zero:
+        what does not transmit torque is no coupling of speeds.
+    lateral : float
+        Isotropic stiffness between their centres [N/m]: two equal springs, without tilt. Infinite joins the
+        centres, which only a train at rest can have, or members in frames of one speed.
+
+    Raises
+    ------
+    CaseError
+        Members that are none or of one stage, stiffnesses out of range (E-COUPLING).
+    """
+
+    first: Member
+    second: Member
+    torsional: float = math.inf
+    lateral: float = 0.0
+
+    def __post_init__(self):
+        for member in (self.first, self.second):
+            if member.name not in CENTRAL:
+                _refuse(f"a coupling of the {member.name!r}", f"members {', '.join(CENTRAL)}")
+        if self.first.stage == self.second.stage:
+            _refuse(f"a coupling inside stage {self.first.stage}", "members of two stages")
+        units = {"torsional": "N m/rad", "lateral": "N/m"}
+        for name, unit in units.items():
+            value = checked_numbers(getattr(self, name), name, code="E-COUPLING", unit=unit)
+            if value.ndim or not (value >= 0.0 and (value or name == "lateral")):
+                lowest = "0 or more" if name == "lateral" else "above 0"
+                _refuse(f"a {name} stiffness of {value.tolist()} {unit}", f"{lowest}, or infinite")
+            if STIFFEST[name] < value < math.inf:
+                raise CaseError(
+                    f"a {name} stiffness of {value:g} {unit}", code="E-COUPLING", key=name,
+                    limit=f"up to {STIFFEST[name]:g} {unit}: beyond, rounding hides all other springs",
+                    remedy="take infinite for a rigid coupling",
+                )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MultistageSet:
+    """Planetary stages and their couplings.
+
+    Parameters
+    ----------
+    stages : tuple of Stage
+    couplings : tuple of StageCoupling
+        `in_series` makes those of a plain train. None: stages side by side.
+    input, output : Member
+        Where the external torques act.
+
+    Raises
+    ------
+    CaseError
+        No stage, members of stages that are not there (E-COUPLING), one member for input and output, or one
+        that is fixed (E-MECHANISM).
+    """
+
+    stages: tuple[Stage, ...]
+    couplings: tuple[StageCoupling, ...]
+    input: Member
+    output: Member
+
+    def __post_init__(self):
+        object.__setattr__(self, "stages", tuple(self.stages))
+        object.__setattr__(self, "couplings", tuple(self.couplings))
+        if not self.stages or not all(isinstance(one, Stage) for one in self.stages):
+            _refuse("a train without stages, or of something else", "one Stage or more")
+        named = [self.input, self.output]
+        named += [member for one in self.couplings for member in (one.first, one.second)]
+        for member in named:
+            if not 1 <= member.stage <= len(self.stages) or member.name not in CENTRAL:
+                _refuse(f"{member} in a train of {len(self.stages)} stages", "members of its stages")
+        for member in (self.input, self.output):
+            if self.input == self.output or self.stages[member.stage - 1].fixed == member.name:
+                raise CaseError(
+                    f"input {self.input} and output {self.output}", code="E-MECHANISM",
+                    limit="two members that turn",
+                )  # fmt: skip
+
+    @property
+    def n_meshes(self) -> int:
+        """Of all stages."""
+        return sum(2 * stage.data.n_planets for stage in self.stages)
+
+
+def in_series(
+    stages: Sequence[Stage],
+    *,
+    driving: str = "carrier",
+    driven: str = "sun",
+    torsional: float | Sequence[float] = math.inf,
+    lateral: float | Sequence[float] = 0.0,
+    input: str = "sun",
+    output: str = "carrier",
+) -> MultistageSet:
+    """Stages one after the other: `driving` of each turns `driven` of the next.
+
+    Parameters
+    ----------
+    stages : sequence of Stage
+    driving, driven : {"carrier", "ring", "sun"}
+    torsional, lateral : float or one a coupling
+        See `StageCoupling`.
+    input, output : {"carrier", "ring", "sun"}
+        Of the first and the last stage.
+    """
+    if len(stages) < 1:
+        _refuse("a train of no stages", "one stage or more")
+    count = len(stages) - 1
+    stiffness = []
+    for name, values in (("torsional", torsional), ("lateral", lateral)):
+        values = np.atleast_1d(checked_numbers(values, name, code="E-COUPLING", unit=""))
+        if values.ndim != 1 or len(values) not in (1, count):
+            _refuse(f"{values.size} {name} stiffnesses", f"one, or {count}")
+        stiffness.append(np.broadcast_to(values, count).tolist())
+    couplings = tuple(
+        StageCoupling(Member(n + 1, driving), Member(n + 2, driven), *(values[n] for values in stiffness))
+        for n in range(count)
+    )
+    return MultistageSet(
+        stages=tuple(stages), couplings=couplings, input=Member(1, input), output=Member(count + 1, output)
+    )
+
+
+def stage_of_set(planetary_set: PlanetarySet, *, fixed: str | None = "ring", angle=0.0, **lumped) -> Stage:
+    """Stage with the teeth, mesh phases, radii and angles of a geared set.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    fixed, angle
+        See `Stage`.
+    lumped
+        Bodies and stiffnesses, see `femgear.system.lumped.planar_from_set`.
+    """
+    s = planetary_set
+    return Stage(
+        data=planar_from_set(s, **lumped),
+        teeth=(s.sun.teeth, s.planet.teeth, s.ring.teeth),
+        fixed=fixed,
+        phases=s.mesh_phases,
+        angle=angle,
+    )
+
+
+def shaft_stiffness(
+    diameter: float, length: float, *, young: float = 206e9, poisson: float = 0.3
+) -> dict[str, float]:
+    """Torsional and lateral stiffness of a solid round shaft whose ends do not tilt.
+
+    ``k_t = G pi d^4 / (32 L)`` and, for Timoshenko's beam, ``k = 12 E I / (L^3 (1 + phi))`` with ``phi = 12 E
+    I / (kappa G A L^2)`` (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 5.6) and
+    ``kappa = 6 (1 + nu) / (7 + 6 nu)`` (G. R. Cowper, J. Appl. Mech. 33, 1966, 335-340).
+
+    Parameters
+    ----------
+    diameter, length : float
+        [m]
+    young : float
+        [Pa]
+    poisson : float
+
+    Returns
+    -------
+    dict
+        ``torsional`` [N m/rad] and ``lateral`` [N/m], as `StageCoupling` takes them.
+
+    Raises
+    ------
+    CaseError
+        Lengths or moduli that no shaft has (E-COUPLING).
+    """
+    if not all(math.isfinite(one) and one > 0.0 for one in (diameter, length, young)):
+        _refuse(f"a shaft of {diameter} m by {length} m and {young} Pa", "finite and above 0")
+    if not -1.0 < poisson <= 0.5:
+        _refuse(f"Poisson's ratio of {poisson}", "above -1, 0.5 or less")
+    shear = young / (2.0 * (1.0 + poisson))
+    polar = math.pi * diameter**4 / 32.0
+    bending = 12.0 * young * 0.5 * polar
+    kappa = 6.0 * (1.0 + poisson) / (7.0 + 6.0 * poisson)
+    phi = bending / (kappa * shear * 0.25 * math.pi * diameter**2 * length**2)
+    return {"torsional": shear * polar / length, "lateral": bending / (length**3 * (1.0 + phi))}
+
+
+def _checked_teeth(data: PlanarSet, teeth) -> tuple[int, int, int]:
+    numbers = checked_numbers(teeth, "teeth", code="E-TEETH", unit="")
+    if numbers.shape != (3,) or not np.all(np.isfinite(numbers) & (numbers >= 1) & (numbers % 1 == 0)):
+        raise CaseError(
+            f"tooth numbers {numbers.tolist()}",
+            code="E-TEETH",
+            key="teeth",
+            limit="sun, planet and ring, above 0",
+        )
+    sun, planet, ring = (int(z) for z in teeth)
+    for name, ratio, radii in (
+        ("planet", planet / sun, data.planet_radius / data.sun_radius),
+        ("ring", ring / sun, data.ring_radius / data.sun_radius),
+    ):
+        if abs(radii / ratio - 1.0) > _RADII:
+            raise CaseError(
+                f"{name} and sun have {ratio:.6g} as ratio of teeth and {radii:.6g} as ratio of base radii",
+                code="E-TEETH", key="teeth", value=(sun, planet, ring), limit="the same to 0.1 %",
+            )  # fmt: skip
+    return sun, planet, ring
+
+
+def _refuse(message: str, limit: str):
+    raise CaseError(message, code="E-COUPLING", limit=limit)
+
+
+# singular values below this share of the largest one count as none
+_RANK = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class TrainSpeeds:
+    """Absolute speeds [rad/s] and mesh frequencies [Hz], one a stage.
+
+    Parameters
+    ----------
+    sun, ring, carrier, planet : (S,) arrays
+        The planet's about its own axis, in the fixed frame.
+    mesh_frequency : (S,) array
+    """
+
+    sun: np.ndarray
+    ring: np.ndarray
+    carrier: np.ndarray
+    planet: np.ndarray
+    mesh_frequency: np.ndarray
+
+    def of(self, member: Member) -> float:
+        """Speed of a member [rad/s]."""
+        return float(getattr(self, member.name)[member.stage - 1])
+
+
+@dataclass(frozen=True, eq=False)
+class TrainTorques:
+    """Torques without losses [N m], positive counter-clockwise.
+
+    Parameters
+    ----------
+    sun, ring, carrier : (S,) arrays
+        What couplings, housing, input and output give the members; they add up to zero in every stage.
+    coupling : (C,) array
+        On the second member of every coupling, its reaction on the first.
+    housing : (S,) array
+        On the fixed member of every stage; zero where there is none.
+    output : float
+        On the output member.
+    """
+
+    sun: np.ndarray
+    ring: np.ndarray
+    carrier: np.ndarray
+    coupling: np.ndarray
+    housing: np.ndarray
+    output: float
+
+
+def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
+    """Speeds of all bodies from that of the input member.
+
+    Parameters
+    ----------
+    data : MultistageSet
+        With the teeth of every stage.
+    speed : float
+        Of the input [rad/s].
+
+    Returns
+    -------
+    TrainSpeeds
+        ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)`` in every stage (Willis).
+
+    Raises
+    ------
+    CaseError
+        A stage without teeth (E-TEETH), members that are free or held twice (E-MECHANISM), a speed that is
+        not finite (E-VALUE).
+    """
+    _check_finite("speed", speed, "rad/s")
+    weights = _tooth_weights(data)
+    rows = np.vstack([_rows(data, weights), _unit(data, data.input)])
+    right = np.zeros(len(rows))
+    right[-1] = speed
+    w = _solved(data, rows, right).reshape(-1, 3)
+    carrier, ring, sun = (w[:, CENTRAL.index(name)] for name in ("carrier", "ring", "sun"))
+    teeth = np.array([stage.teeth for stage in data.stages], float)
+    relative = sun - carrier
+    return TrainSpeeds(
+        sun=sun,
+        ring=ring,
+        carrier=carrier,
+        planet=carrier - relative * teeth[:, 0] / teeth[:, 1],
+        mesh_frequency=np.abs(relative) * teeth[:, 0] / (2.0 * math.pi),
+    )
+
+
+def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) -> TrainTorques:
+    """Torques on all members from that on the input, without losses.
+
+    Parameters
+    ----------
+    data : MultistageSet
+    torque : float
+        On the input [N m].
+    radii : bool
+        Balance of the lumped sets, from base radii and pressure angles (see `torque_shares`), instead of
+        tooth numbers. Both agree where the radii close.
+
+    Raises
+    ------
+    CaseError
+        As `train_speeds`.
+    """
+    _check_finite("torque", torque, "N m")
+    weights = _radius_weights(data) if radii else _tooth_weights(data)
+    rows = _rows(data, weights)
+    # unknown: lambda of every row, and the torque of the output
+    matrix = np.vstack([rows, -_unit(data, data.output)]).T
+    right = torque * _unit(data, data.input)
+    solution = _solved(data, matrix, right)
+    count, stages = len(data.couplings), len(data.stages)
+    on_stage = (solution[:stages, None] * weights).T
+    housing = np.zeros(stages)
+    held = [n for n, stage in enumerate(data.stages) if stage.fixed is not None]
+    housing[held] = -solution[stages + count : -1]
+    carrier, ring, sun = on_stage
+    return TrainTorques(
+        sun=sun,
+        ring=ring,
+        carrier=carrier,
+        coupling=solution[stages : stages + count],
+        housing=housing,
+        output=float(solution[-1]),
+    )
+
+
+def speed_ratio(data: MultistageSet) -> float:
+    """Speed of the input over that of the output.
+
+    Raises
+    ------
+    CaseError
+        As `train_speeds`, and an output that stands (E-MECHANISM).
+    """
+    output = train_speeds(data, 1.0).of(data.output)
+    if abs(output) < 1e-12:
+        raise CaseError(f"the output, {data.output}, stands still", code="E-MECHANISM")
+    return 1.0 / output
+
+
+def check_turns(data: MultistageSet) -> None:
+    """Refuse loops of couplings and fixed members: trains that are locked, or held twice.
+
+    Raises
+    ------
+    CaseError
+        E-MECHANISM.
+    """
+    rows = _rows(data, _radius_weights(data))
+    rank = np.linalg.matrix_rank(rows, tol=_RANK * np.linalg.norm(rows, 2))
+    if rank < len(rows) or rank == rows.shape[1]:
+        what = "cannot turn" if rank == rows.shape[1] else "is held twice in a loop"
+        raise CaseError(
+            f"the train {what}: {len(data.stages)} stages, {len(data.couplings)} couplings and "
+            f"{sum(stage.fixed is not None for stage in data.stages)} fixed members", code="E-MECHANISM",
+            limit="couplings and fixed members that close no loop",
+            remedy="leave out a coupling, or hold one member less",
+        )  # fmt: skip
+
+
+def _rows(data: MultistageSet, weights: np.ndarray) -> np.ndarray:
+    """Stages, couplings (first less second), and fixed members (rows, 3 S)."""
+    rows = np.zeros((len(data.stages), 3 * len(data.stages)))
+    for n, weight in enumerate(weights):
+        rows[n, 3 * n : 3 * n + 3] = weight
+    couplings = [_unit(data, one.first) - _unit(data, one.second) for one in data.couplings]
+    held = [
+        _unit(data, Member(n + 1, stage.fixed))
+        for n, stage in enumerate(data.stages)
+        if stage.fixed is not None
+    ]
+    return np.vstack([rows, *couplings, *held])
+
+
+def _tooth_weights(data: MultistageSet) -> np.ndarray:
+    """Carrier, ring and sun (S, 3) of ``z_s w_s + z_r w_r - (z_s + z_r) w_c = 0``, per tooth of the sun."""
+    missing = [n + 1 for n, stage in enumerate(data.stages) if stage.teeth is None]
+    if missing:
+        raise CaseError(
+            f"no tooth numbers in stage {missing[0]}", code="E-TEETH", key=f"stages[{missing[0] - 1}].teeth",
+            remedy="give the teeth of sun, planet and ring",
+        )  # fmt: skip
+    return np.array(
+        [(-(1.0 + ring / sun), ring / sun, 1.0) for sun, _, ring in (s.teeth for s in data.stages)]
+    )
+
+
+def _radius_weights(data: MultistageSet) -> np.ndarray:
+    """The same (S, 3) from the balance of forces on ``u`` of the lumped sets."""
+    weights = []
+    for stage in data.stages:
+        shares = torque_shares(stage.data)
+        weights.append([shares[name] * member_radius(stage.data, name) for name in CENTRAL])
+    table = np.array(weights)
+    return table / table[:, [CENTRAL.index("sun")]]
+
+
+def _unit(data: MultistageSet, member: Member) -> np.ndarray:
+    unit = np.zeros(3 * len(data.stages))
+    unit[3 * (member.stage - 1) + CENTRAL.index(member.name)] = 1.0
+    return unit
+
+
+def _solved(data: MultistageSet, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solution of a square system of full rank; refuses trains that are not determined."""
+    rows, columns = matrix.shape
+    size = np.linalg.svd(matrix, compute_uv=False)
+    if rows != columns or size[-1] < _RANK * size[0]:
+        fixed = sum(stage.fixed is not None for stage in data.stages)
+        raise CaseError(
+            f"{len(data.stages)} stages, {len(data.couplings)} couplings and {fixed} fixed members do not "
+            "determine all speeds and torques", code="E-MECHANISM",
+            limit="stages + couplings + fixed members + 1 = 3 x stages, none of them idle",
+            remedy="hold one member of every stage of a plain train",
+        )  # fmt: skip
+    solution = np.linalg.solve(matrix, right)
+    # one step of refinement: ratios of hundreds keep their last digits
+    return solution + np.linalg.solve(matrix, right - matrix @ solution)
+
+
+def _check_finite(name: str, value: float, unit: str) -> None:
+    if not math.isfinite(value):
+        raise CaseError(f"a {name} of {value} {unit}", code="E-VALUE", key=name, limit="finite")
+
+
+# difference of two carrier speeds, relative to the largest one, that is rounding
+_SAME_SPEED = 1e-12
+# entry of a rigid coupling, relative to its largest one, that is rounding
+_ROUNDING = 1e-12
+
+
+def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float = 0.0) -> MechanicalSystem:
+    """Matrices of the train; meshes and turning lateral couplings are columns of ``W`` and not in ``K``.
+
+    Parameters
+    ----------
+    data : MultistageSet
+    torque : float
+        On the input [N m]; it reacts on the output and on the fixed members, and chooses the loaded flanks
+        of every stage. Zero: flanks of suns that drive counter-clockwise.
+    speed : float
+        Of the input [rad/s], for gyroscopic matrices, centripetal stiffness and centrifugal load in every
+        carrier frame, so that the rotation of the whole train stays free.
+
+    Returns
+    -------
+    MechanicalSystem
+        ``gyroscopic`` multiplies the speed of the input and is None for zero. Columns: the 2N meshes of
+        every stage, then four for every coupling of `turning_couplings`, x and y of its first and of its
+        second member. ``C`` is zero.
+
+    Raises
+    ------
+    CaseError
+        A torque on a held member, a train that is not determined or locked (E-MECHANISM), centres joined
+        rigidly between frames of different speeds (E-COUPLING).
+    """
+    from scipy.linalg import block_diag
+
+    check_turns(data)
+    turning = turning_couplings(data, speed)
+    carrier = train_speeds(data, speed).carrier if speed else np.zeros(len(data.stages))
+    parts = [planar_system(one.data, carrier_speed=w) for one, w in zip(data.stages, carrier.tolist())]
+    Z = joined_motions(data)
+    K = block_diag(*(part.K for part in parts)) + _centrifugal_stiffness(data, carrier)
+    for number, coupling in enumerate(data.couplings):
+        columns, stiffness = _springs(data, coupling, lateral=number not in turning)
+        K += (columns * stiffness) @ columns.T
+    meshes = [free_motions(one.data).T @ mesh_directions(one.data, sign)
+              for one, sign in zip(data.stages, stage_flanks(data, torque))]  # fmt: skip
+    W = np.hstack([block_diag(*meshes), *(_ends(data, data.couplings[number]) for number in turning)])
+    load = np.concatenate([part.load for part in parts]) + _torque_load(data, torque)
+    return MechanicalSystem(
+        M=Z.T @ block_diag(*(part.M for part in parts)) @ Z,
+        C=np.zeros((Z.shape[1], Z.shape[1])),
+        K=Z.T @ K @ Z,
+        W=Z.T @ W,
+        load=Z.T @ load,
+        dofs=_names(data, Z),
+        gyroscopic=Z.T @ _gyroscopic(parts, carrier / speed) @ Z if speed else None,
+    )
+
+
+def mesh_columns(data: MultistageSet) -> tuple[np.ndarray, ...]:
+    """Columns of ``W`` with the 2N meshes of every stage."""
+    ends = np.cumsum([0] + [2 * stage.data.n_planets for stage in data.stages])
+    return tuple(np.arange(first, last) for first, last in pairwise(ends))
+
+
+def mean_mesh_stiffness(data: MultistageSet) -> np.ndarray:
+    """Of all meshes of all stages [N/m], in the order of `mesh_columns`."""
+    return np.concatenate([stage.data.mesh_stiffness for stage in data.stages])
+
+
+def stage_flanks(data: MultistageSet, torque: float) -> tuple[int, ...]:
+    """Loaded flanks of every stage: 1 where the sun drives counter-clockwise, else -1."""
+    if not torque:
+        return (1,) * len(data.stages)
+    on_sun = train_torques(data, torque, radii=True).sun
+    return tuple(flank_sign(one.data, PlanarTorque(float(t))) for one, t in zip(data.stages, on_sun))
+
+
+def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
+    """Lateral couplings between frames that turn against one another.
+
+    Parameters
+    ----------
+    data : MultistageSet
+    speed : float
+        Of the input [rad/s].
+
+    Returns
+    -------
+    dict of int to float
+        Number of the coupling (from 0): speed of the second frame less that of the first [rad/s].
+
+    Raises
+    ------
+    CaseError
+        Centres joined rigidly between such frames (E-COUPLING).
+    """
+    if not speed or not any(one.lateral for one in data.couplings):
+        return {}
+    carrier = train_speeds(data, speed).carrier
+    found = {}
+    for number, one in enumerate(data.couplings):
+        relative = carrier[one.second.stage - 1] - carrier[one.first.stage - 1]
+        if not one.lateral or abs(relative) <= _SAME_SPEED * np.abs(carrier).max():
+            continue
+        if math.isinf(one.lateral):
+            raise CaseError(
+                f"the centres of {one.first} and {one.second} are one, in frames of different speeds",
+                code="E-COUPLING", key=f"couplings[{number}].lateral", limit="a finite stiffness",
+                remedy="give the stiffness of the shaft, see shaft_stiffness",
+            )  # fmt: skip
+        found[number] = float(relative)
+    return found
+
+
+def joined_motions(data: MultistageSet) -> np.ndarray:
+    """Coordinates of all stages (n_stages, n) per unit of those that rigid couplings leave free.
+
+    The rows are those of the `planar_system` of every stage, one after the other. Of two joined coordinates
+    that of the earlier place stays.
+    """
+    size = sum(free_motions(stage.data).shape[1] for stage in data.stages)
+    Z = np.eye(size)
+    for coupling in data.couplings:
+        for row in _rigid_rows(data, coupling):
+            row = row @ Z
+            moved = np.flatnonzero(np.abs(row) > _ROUNDING * np.abs(row).max(initial=0.0))
+            if not len(moved):
+                continue
+            # the last coordinate follows the others
+            keep = np.delete(np.arange(Z.shape[1]), moved[-1])
+            Z = Z[:, keep] - np.outer(Z[:, moved[-1]], row[keep] / row[moved[-1]])
+    return Z
+
+
+def stage_slices(data: MultistageSet) -> tuple[slice, ...]:
+    """Rows of `joined_motions` that belong to every stage."""
+    ends = np.cumsum([0] + [free_motions(stage.data).shape[1] for stage in data.stages])
+    return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+
+def multistage_springs(data: MultistageSet) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Springs of the train at rest by name, for `femgear.solvers.linear.tracking.strain_shares`.
+
+    Returns
+    -------
+    dict of str to (columns (n, g), stiffness (g,))
+        Those of `planar_springs` of every stage, and the elastic couplings.
+    """
+    Z, springs = joined_motions(data), {}
+    for number, (stage, rows) in enumerate(zip(data.stages, stage_slices(data)), 1):
+        for name, (columns, stiffness) in planar_springs(stage.data).items():
+            springs[f"stage {number} {name}"] = (Z[rows].T @ columns, stiffness)
+    for coupling in data.couplings:
+        columns, stiffness = _springs(data, coupling, lateral=True)
+        if len(stiffness):
+            springs[f"{coupling.first} to {coupling.second}"] = (Z.T @ columns, stiffness)
+    return springs
+
+
+def _centrifugal_stiffness(data: MultistageSet, carrier: np.ndarray) -> np.ndarray:
+    """What makes the centripetal stiffness of the planets leave the rotation of the train free.
+
+    Lin and Parker take ``m Omega^2`` from all tangential motion eta of the planets, also where the set turns
+    as a whole. The pins turn with the carrier: with the planet at ``(a + zeta + i (eta - u_c)) exp(i (Omega t
+    + u_c / a))`` Lagrange's equations have the same gyroscopic terms, and the centripetal ones of zeta and
+    ``eta - u_c``. The difference is ``m Omega^2 (eta^2 - (eta - u_c)^2)`` a planet.
+    """
+    from scipy.linalg import block_diag
+
+    blocks = []
+    for stage, speed in zip(data.stages, carrier.tolist()):
+        T, N = free_motions(stage.data), stage.data.n_planets
+        tangential, turned = T[10 + 3 * np.arange(N)], T[2]
+        apart = tangential - turned
+        blocks.append(stage.data.planet.mass * speed**2 * (tangential.T @ tangential - apart.T @ apart))
+    return block_diag(*blocks)
+
+
+def _gyroscopic(parts: list[MechanicalSystem], ratio: np.ndarray) -> np.ndarray:
+    """Matrix per unit of the input's speed; ``ratio`` (S,) of the carriers' speeds to it."""
+    from scipy.linalg import block_diag
+
+    still = (np.zeros_like(part.M) if part.gyroscopic is None else part.gyroscopic for part in parts)
+    return block_diag(*(one * matrix for one, matrix in zip(ratio, still)))
+
+
+def _axis(data: MultistageSet, member: Member, axis: int) -> np.ndarray:
+    """Unit column of x, y or u of a member in the coordinates of all stages; zero where it is held."""
+    blocks = []
+    for number, stage in enumerate(data.stages, 1):
+        T = free_motions(stage.data)
+        rows = T[3 * CENTRAL.index(member.name) + axis] if number == member.stage else np.zeros(T.shape[1])
+        blocks.append(rows)
+    return np.concatenate(blocks)
+
+
+def _twist(data: MultistageSet, coupling: StageCoupling) -> np.ndarray:
+    """Rotation of the first member less that of the second, per coordinate."""
+    one, other = (
+        _axis(data, member, 2) / member_radius(data.stages[member.stage - 1].data, member.name)
+        for member in (coupling.first, coupling.second)
+    )
+    return one - other
+
+
+def _shift(data: MultistageSet, coupling: StageCoupling) -> np.ndarray:
+    """x and y (n, 2) of the first centre less the second, in the first frame, both as they stand."""
+    turn = data.stages[coupling.second.stage - 1].angle - data.stages[coupling.first.stage - 1].angle
+    ends, c, s = _ends(data, coupling), math.cos(turn), math.sin(turn)
+    return ends[:, :2] - ends[:, 2:] @ np.array([[c, s], [-s, c]])
+
+
+def _ends(data: MultistageSet, coupling: StageCoupling) -> np.ndarray:
+    """x and y of the first and of the second member (n, 4)."""
+    return np.stack([_axis(data, m, k) for m in (coupling.first, coupling.second) for k in (0, 1)], axis=1)
+
+
+def _springs(data: MultistageSet, coupling: StageCoupling, *, lateral: bool):
+    """Columns (n, g) and stiffnesses (g,) of what is elastic in a coupling."""
+    columns, stiffness = [], []
+    if math.isfinite(coupling.torsional):
+        columns, stiffness = [_twist(data, coupling)[:, None]], [coupling.torsional]
+    if lateral and coupling.lateral and math.isfinite(coupling.lateral):
+        columns.append(_shift(data, coupling))
+        stiffness += [coupling.lateral] * 2
+    size = sum(free_motions(stage.data).shape[1] for stage in data.stages)
+    return np.hstack([np.empty((size, 0)), *columns]), np.array(stiffness)
+
+
+def _rigid_rows(data: MultistageSet, coupling: StageCoupling) -> list[np.ndarray]:
+    rows = [_twist(data, coupling)] if math.isinf(coupling.torsional) else []
+    return rows + (list(_shift(data, coupling).T) if math.isinf(coupling.lateral) else [])
+
+
+def _torque_load(data: MultistageSet, torque: float) -> np.ndarray:
+    """Forces on ``u`` of input and output."""
+    if not torque:
+        return np.zeros(sum(free_motions(stage.data).shape[1] for stage in data.stages))
+    output = train_torques(data, torque, radii=True).output
+    load = 0.0
+    for member, value in ((data.input, torque), (data.output, output)):
+        column = _axis(data, member, 2)
+        if not np.any(column):
+            raise CaseError(
+                f"the torque acts on the {member}, which is held", code="E-MECHANISM",
+                remedy="choose members that can turn",
+            )  # fmt: skip
+        load = load + column * value / member_radius(data.stages[member.stage - 1].data, member.name)
+    return load
+
+
+def _names(data: MultistageSet, Z: np.ndarray) -> tuple[str, ...]:
+    """Name of every coordinate that is left: its own row of ``Z`` is a unit row."""
+    names = []
+    for number, stage in enumerate(data.stages, 1):
+        T = free_motions(stage.data)
+        own = np.argmax(T == 1.0, axis=0)
+        all_names = planar_dofs(stage.data.n_planets)
+        names += [f"stage {number} {all_names[row]}" for row in own]
+    return tuple(names[row] for row in np.argmax(Z == 1.0, axis=0))
+
+
+@dataclass(frozen=True)
+class TurningSprings:
+    """Isotropic springs between centres whose coordinates turn against one another.
+
+    With ``z = x + i y``, ``d = z_1 - z_2 exp(i phi)`` in the first frame and phi the angle of the second
+    frame seen from the first; the forces are ``k d`` on the first and ``-k d exp(-i phi)`` on the second
+    centre, of the energy ``k |d|^2 / 2``.
+
+    Parameters
+    ----------
+    columns : (g, 4) int array
+        x and y of the first, x and y of the second centre.
+    stiffness : (g,) array
+        [N/m]
+    wave : FourierSeries
+        ``cos phi`` and ``sin phi``, from `turning_wave`.
+
+    Raises
+    ------
+    CaseError
+        Columns that do not fit (E-SHAPE), stiffnesses out of range (E-COUPLING).
+    """
+
+    columns: np.ndarray
+    stiffness: np.ndarray
+    wave: FourierSeries
+
+    # the law is linear in the deflections: a grid of few samples is exact
+    degree = 1
+
+    def __post_init__(self):
+        columns = np.atleast_2d(np.array(self.columns))
+        stiffness = np.atleast_1d(np.array(self.stiffness, float))
+        if columns.shape != (len(stiffness), 4) or not np.issubdtype(columns.dtype, np.integer):
+            raise CaseError(
+                f"columns {columns.tolist()} for {len(stiffness)} springs", code="E-SHAPE",
+                limit="four column numbers of W a spring",
+            )  # fmt: skip
+        if not np.all(np.isfinite(stiffness)) or np.any(stiffness < 0.0):
+            raise CaseError(
+                f"lateral stiffnesses {stiffness.tolist()} N/m", code="E-COUPLING", limit="finite, 0 or more"
+            )
+        for name, value in (("columns", columns), ("stiffness", stiffness)):
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @property
+    def reference(self) -> np.ndarray:
+        """Every centre held by its spring, (g, 4) [N/m]."""
+        return np.repeat(self.stiffness[:, None], 4, axis=1)
+
+    def evaluate(self, x, theta):
+        """Forces (..., g, 4) and tangents (..., g, 4, 4)."""
+        c, s = np.moveaxis(self.wave.at(theta), -1, 0)
+        # d = D x with x = (x_1, y_1, x_2, y_2)
+        D = np.zeros((*c.shape, 2, 4))
+        D[..., 0, 0] = D[..., 1, 1] = 1.0
+        D[..., 0, 2], D[..., 0, 3] = -c, s
+        D[..., 1, 2], D[..., 1, 3] = -s, -c
+        square = np.swapaxes(D, -1, -2) @ D
+        tangent = self.stiffness[:, None, None] * square[..., None, :, :]
+        force = (tangent @ x[..., None])[..., 0]
+        return force, np.broadcast_to(tangent, (*force.shape, 4))
+
+
+def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSeries:
+    """Cosine and sine of ``phi = phase + orders . theta``.
+
+    Parameters
+    ----------
+    orders : tuple of int
+        Multiples of the base frequencies; negative ones for a frame that turns clockwise.
+    phase : float
+        phi at time zero [rad].
+    """
+    if not math.isfinite(phase):
+        raise CaseError(f"a phase of {phase} rad", code="E-VALUE", key="phase", limit="finite")
+    turned = np.exp(1j * phase)
+    return FourierSeries(np.array([[0.0, turned], [0.0, -1j * turned]]), orders)

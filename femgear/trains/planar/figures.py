@@ -1,0 +1,474 @@
+"""Figures of the lumped planetary set: response branches, orbits, bearing forces, tooth contact.
+
+Figures of branch.nc and response.nc, the results of planar cases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure
+from femgear.trains.planar.model import TAIL_LIMIT, merged_folds
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+# how parts of a curve are drawn and called, by what is known of them
+STABILITY = {1: ("-", "stable"), 0: ("--", "not stable"), -1: (":", "stability not known")}
+
+
+def response_branches(curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, quantity: str, x: str = ""):
+    """Amplitude over frequency, dashed where the response is not stable, dotted where that is not known.
+
+    Parameters
+    ----------
+    curves : sequence of (text, frequency (p,) [Hz], amplitude (p,) [m], stable (p,) bool or int)
+        1 stable, 0 not stable, -1 not known.
+    sweeps : sequence of (text, frequency (f,) [Hz], amplitude (f,) [m])
+        Drawn as markers.
+    quantity : str
+        Of the ordinate, without its unit.
+    x : str
+        Label of the abscissa; the weight's frequency when not given.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = new_figure(width=8.5, height=5.0)
+    for colour, (text, hertz, size, stable) in zip(COLOURS, curves):
+        for wanted, (dash, note) in STABILITY.items():
+            for number, part in enumerate(pieces(stable, wanted)):
+                ax.plot(
+                    hertz[part], 1e6 * size[part], color=colour, linestyle=dash,
+                    label=None if number else text + (f", {note}" if wanted != 1 else ""),
+                )  # fmt: skip
+    for marker, (text, hertz, size) in zip("^vso", sweeps):
+        ax.plot(hertz, 1e6 * size, marker, color=BLACK, markersize=4.5, fillstyle="none", label=text)
+    ax.set_ylim(bottom=0.0)
+    label(ax, x or "frequency of the weight in the carrier frame [Hz]", f"{quantity} [µm]")
+    legend_below(figure, columns=2)
+    return figure
+
+
+def pieces(stable, wanted: int) -> list[slice]:
+    """Runs of segments of a curve of one kind: 1 stable, 0 not stable, -1 not known.
+
+    A segment is drawn once: unknown where one of its ends is, otherwise unstable where one is.
+    """
+    stable = np.asarray(stable, int)
+    segment = np.minimum(stable[:-1], stable[1:]) == wanted
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], segment, [False]]).astype(int)))
+    return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
+
+
+def orbits(curves: Sequence[tuple], *, title: str = ""):
+    """Paths of a member's centre in the carrier frame.
+
+    Parameters
+    ----------
+    curves : sequence of (text, path (2, n) [m])
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = new_figure(width=6.2, height=6.2)
+    for number, (text, path) in enumerate(curves):
+        closed = 1e6 * np.concatenate([path, path[:, :1]], axis=1)
+        ax.plot(*closed, label=text, **line_style(number))
+    ax.plot(0.0, 0.0, "+", color=GREY)
+    ax.set_aspect("equal", adjustable="datalim")
+    label(ax, "x [µm]", "y [µm]", title)
+    legend_below(figure, columns=1)
+    return figure
+
+
+def bearing_forces(angle, curves: Sequence[tuple], *, title: str = ""):
+    """Sizes of bearing forces over one turn of the weight against the carrier.
+
+    Parameters
+    ----------
+    angle : (n,) array
+        [rad]
+    curves : sequence of (text, force (2, n) [N])
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = new_figure()
+    for number, (text, force) in enumerate(curves):
+        ax.plot(np.degrees(angle), 1e-3 * np.hypot(*force), label=text, **line_style(number))
+    ax.set_xlim(0.0, 360.0)
+    ax.set_xticks(np.arange(0.0, 361.0, 60.0))
+    label(ax, "phase of the weight [°]", "force [kN]", title)
+    legend_below(figure)
+    return figure
+
+
+def contact_over_frequency(hertz, shares, names: Sequence[str], *, title: str = ""):
+    """Share of the cycle in which every flank touches: 1 in contact, 0 not.
+
+    Parameters
+    ----------
+    hertz : (p,) array
+        In the order of the branch [Hz].
+    shares : (p, n) array
+    names : (n,) sequence
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = new_figure(rows=len(names), width=8.0, height=1.2 + 1.1 * len(names), sharex=True)
+    for number, (ax, name) in enumerate(zip(axes, names)):
+        ax.plot(hertz, np.asarray(shares)[:, number], color=COLOURS[number % len(COLOURS)])
+        ax.set_ylim(-0.05, 1.05)
+        label(ax, title=name)
+    label(axes[0], title=f"{title}: {names[0]}" if title else names[0])
+    label(axes[-1], "frequency of the weight in the carrier frame [Hz]")
+    return figure
+
+
+def contact_map(frequency, clearance, panels: Sequence[tuple], *, line: tuple | None = None):
+    """Share of the cycle in which flanks touch, over frequency and clearance; every panel on its own scale.
+
+    Parameters
+    ----------
+    frequency : (f,) array
+        [Hz]
+    clearance : (c,) array
+        [m]
+    panels : sequence of (title, share (f, c))
+        nan where nothing was found: grey.
+    line : (text, clearance), optional
+        Marked clearance [m].
+
+    Returns
+    -------
+    Figure
+    """
+    from matplotlib import colormaps
+
+    figure, axes = new_figure(columns=len(panels), width=5.6 * len(panels), height=4.6, sharey=True)
+    colours = colormaps["viridis"].with_extremes(bad="0.75")
+    for ax, (title, share) in zip(axes, panels):
+        share = np.asarray(share, float)
+        low, high = np.nanmin(share, initial=1.0), np.nanmax(share, initial=0.0)
+        if high - low < 1e-9:
+            title += f": {high:.3g} everywhere"
+            low, high = 0.0, 1.0
+        image = ax.pcolormesh(
+            frequency, 1e6 * np.asarray(clearance), np.ma.masked_invalid(share.T), vmin=low, vmax=high,
+            cmap=colours, shading="nearest",
+        )  # fmt: skip
+        if line is not None:
+            ax.axhline(1e6 * line[1], color="white", linestyle="--", label=line[0])
+            ax.annotate(
+                line[0], (0.98, 1e6 * line[1]), xycoords=("axes fraction", "data"), xytext=(0, 3),
+                textcoords="offset points", ha="right", color="white", fontsize=9,
+                bbox={"boxstyle": "round,pad=0.15", "facecolor": "0.25", "edgecolor": "none", "alpha": 0.7},
+            )  # fmt: skip
+        label(ax, "frequency of the weight [Hz]", title=title)
+        figure.colorbar(image, ax=ax).set_label("share of the cycle in contact [1]")
+    label(axes[0], y="clearance of the carrier bearing [µm]")
+    return figure
+
+
+_DOUBTFUL = "too few harmonics, not to be trusted (W-TAIL)"
+_PALE = "#F6D48F"
+_AXIS = "frequency of the weight in the carrier frame [Hz]"
+_PHASES = 721
+_LABELS = 4
+# difference of two curves, relative to the range they are drawn over, that cannot be seen
+_EQUAL = 5e-3
+# instants of a carrier turn in figures of two frequencies, at most
+_INSTANTS = 20_000
+
+
+def branch_figures(branch: xr.Dataset) -> dict[str, Figure]:
+    """All figures of a branch, by file name.
+
+    Parameters
+    ----------
+    branch : xarray.Dataset
+        Contents of branch.nc.
+    """
+    top = int(branch["shown_point"].values[-1])
+    figures = {
+        "weight_response": weight_response(branch),
+        "carrier_orbit": weight_orbits(branch),
+        "planet_bearing_forces": weight_bearing_forces(branch, top),
+        "tooth_contact": contact_over_branch(branch),
+    }
+    if np.any(branch["back_force_real"].values):
+        figures["wedged_teeth"] = mesh_forces(branch)
+    return figures
+
+
+def weight_response(branch: xr.Dataset) -> Figure:
+    """Amplitudes of carrier, ring and sun: drawn by what is known of their stability, folds marked."""
+    figure, axes = new_figure(rows=3, width=8.5, height=8.0, sharex=True)
+    hertz, folds = branch["weight_frequency"].values, merged_folds(
+        branch["weight_frequency"].values, branch["fold"].values
+    )  # fmt: skip
+    for ax, colour, member in zip(axes, COLOURS, branch["member"].values):
+        size = 1e6 * branch["rms"].sel(member=member).values[:, 0]
+        _mark_tails(ax, hertz, size, branch["tail"].values)
+        for dash, text, part in _parts(branch):
+            ax.plot(hertz[part], size[part], color=colour, linestyle=dash, label=text)
+        ax.plot(
+            hertz[folds], size[folds], "o", color=BLACK, markersize=6, markerfacecolor="none", label="fold"
+        )
+        ax.set_ylim(bottom=0.0)
+        label(ax, y=f"{member} x, r.m.s. [µm]")
+    # many labels would hide one another; the table of the report has them all
+    for point in folds if len(folds) <= _LABELS else ():
+        # outside of the turn, where the curve is not
+        right = hertz[point] >= hertz[max(point - 1, 0)]
+        axes[0].annotate(
+            f"{hertz[point]:.2f} Hz", (hertz[point], 1e6 * branch["rms"].values[point, 0, 0]),
+            xytext=(10, -3) if right else (-8, -14), ha="left" if right else "right",
+            textcoords="offset points", fontsize=SIZE - 1,
+        )  # fmt: skip
+    label(axes[-1], _AXIS)
+    legend_below(figure, axes[0], columns=4)
+    return figure
+
+
+def _mark_tails(ax, x, values, tail) -> None:
+    """Broad band under what too few lines make doubtful, W-TAIL."""
+    doubtful = tail > TAIL_LIMIT
+    if np.any(doubtful):
+        # a point alone has no length to be drawn along
+        ax.plot(x, np.where(doubtful, values, np.nan), "o-", color=_PALE, linewidth=9.0, markersize=8.0,
+                zorder=1.5, label=_DOUBTFUL)  # fmt: skip
+
+
+def _tails(data: xr.Dataset) -> np.ndarray:
+    """Share of forces or deflections in the upper half of the lines, the larger, of every point or speed."""
+    return np.maximum(data["tail"].values, data["force_tail"].values)
+
+
+def _doubt(tail) -> str:
+    """What a title adds to forces and contact that too few lines make."""
+    return f"\n{_DOUBTFUL}" if tail > TAIL_LIMIT else ""
+
+
+def _parts(branch: xr.Dataset) -> list[tuple]:
+    """(dash, words, slice) of the parts of a branch by their stability; one part where nothing was asked."""
+    if branch.attrs["stability"] == "not computed":
+        return [("-", "stability not computed", slice(None))]
+    stable = branch["stable"].values
+    return [(*STABILITY[wanted], part) for wanted in STABILITY for part in pieces(stable, wanted)]
+
+
+def weight_orbits(branch: xr.Dataset) -> Figure:
+    """Paths of the carrier's centre in the carrier frame during one turn of the weight against it."""
+    lines = branch["displacement_real"].values + 1j * branch["displacement_imag"].values
+    curves = []
+    for point, words in zip(branch["shown_point"].values, branch["shown_as"].values):
+        path = _wave(branch) @ np.swapaxes(lines[point, 0], 0, 1)
+        note = "flanks wedge" if branch["back_contact"].values[point].max() > 0.0 else "drive flanks only"
+        note += _doubt(branch["tail"].values[point])
+        curves.append((f"{branch['weight_frequency'].values[point]:.1f} Hz, {words!s}: {note}", path.real.T))
+    return orbits(curves)
+
+
+def weight_bearing_forces(branch: xr.Dataset, point: int) -> Figure:
+    """Sizes of the planet-bearing forces over one turn of the weight against the carrier."""
+    lines = (branch["planet_bearing_force_real"] + 1j * branch["planet_bearing_force_imag"]).values[point]
+    phase, wave = np.linspace(0.0, 2.0 * np.pi, _PHASES), _wave(branch)
+    curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
+    return bearing_forces(phase, curves, title=_top(branch))
+
+
+def _top(branch: xr.Dataset) -> str:
+    """The last shown point in words, for figures of forces."""
+    point = int(branch["shown_point"].values[-1])
+    words = f"{branch['weight_frequency'].values[point]:.1f} Hz, {branch['shown_as'].values[-1]!s}"
+    return words + _doubt(_tails(branch)[point])
+
+
+def mesh_forces(branch: xr.Dataset) -> Figure:
+    """Forces of drive and back flanks over one turn of the weight against the carrier."""
+    figure, axes = new_figure(rows=2, width=8.0, height=6.0, sharex=True)
+    names, degrees = [str(name) for name in branch["mesh"].values], np.degrees(branch["phase"].values)
+    for ax, kind, words in zip(axes, ("drive_force", "flank_force"), ("drive flanks", "back flanks")):
+        for number, mesh in enumerate((0, len(names) // 2)):
+            force = branch[kind].values[-1, mesh]
+            ax.plot(degrees, 1e-3 * force, label=names[mesh], **line_style(number))
+        label(ax, y="force [kN]", title=words)
+    axes[-1].set_xlim(0.0, 360.0)
+    axes[-1].set_xticks(np.arange(0.0, 361.0, 60.0))
+    # what is doubted stands on a line of its own, below
+    words, *doubt = _top(branch).split("\n")
+    label(axes[0], title="\n".join([f"{words}: drive flanks", *doubt]))
+    label(axes[-1], "phase of the weight [°]")
+    legend_below(figure, axes[0])
+    return figure
+
+
+def contact_over_branch(branch: xr.Dataset) -> Figure:
+    """Share of the cycle in which flanks touch over the frequency, drawn by stability."""
+    return _contact(branch, branch["weight_frequency"].values, _AXIS, _parts(branch))
+
+
+def response_figures(response: xr.Dataset, speed: int) -> dict[str, Figure]:
+    """Figures of one speed, and with the first one those over all speeds.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Contents of response.nc.
+    speed : int
+        Its number.
+    """
+    figures = {
+        "response_orbit": response_orbit(response, speed),
+        "response_bearing_forces": response_bearing_forces(response, speed),
+        "response_mesh_forces": response_mesh_forces(response, speed),
+        "response_spectrum": response_spectrum(response, speed),
+    }
+    return figures
+
+
+def contact_over_speed(response: xr.Dataset) -> Figure:
+    """Share of the time in which flanks touch over the speeds."""
+    speed = response["speed"].values
+    order = np.argsort(speed)
+    return _contact(response.isel(speed=order), speed[order], "speed of the input [rpm]", None)
+
+
+def response_orbit(response: xr.Dataset, speed: int) -> Figure:
+    """Paths of carrier, ring and sun in the carrier frame during one carrier turn."""
+    lines = (response["displacement_real"] + 1j * response["displacement_imag"]).values[speed]
+    _, wave = _carrier_turn(response, speed)
+    figure, axes = new_figure(columns=3, width=11.0, height=4.2)
+    for ax, colour, name, one in zip(axes, COLOURS, response["member"].values, lines):
+        x, y = 1e6 * (one @ wave.T).real
+        ax.plot(x, y, color=colour, linewidth=0.7)
+        ax.plot([x.mean()], [y.mean()], "+", color=GREY)
+        ax.set_aspect("equal", adjustable="datalim")
+        label(ax, "x [µm]", "y [µm]", f"{name}, {float(response['speed'][speed]):.6g} rpm")
+    if response["tail"].values[speed] > TAIL_LIMIT:
+        figure.suptitle(_DOUBTFUL, fontsize=SIZE)
+    return figure
+
+
+def response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
+    """Sizes of the planet-bearing forces over one carrier turn."""
+    lines = (response["planet_bearing_force_real"] + 1j * response["planet_bearing_force_imag"]).values[speed]
+    turn, wave = _carrier_turn(response, speed)
+    figure, (ax,) = new_figure()
+    for number, one in enumerate(lines):
+        force = np.hypot(*(one @ wave.T).real)
+        ax.plot(360.0 * turn, 1e-3 * force, linewidth=1.0, label=f"planet {number + 1}", **line_style(number))
+    ax.set_xlim(0.0, 360.0 * turn[-1])
+    title = f"{float(response['speed'][speed]):.6g} rpm" + _doubt(_tails(response)[speed])
+    label(ax, "carrier angle [°]", "force [kN]", title)
+    legend_below(figure)
+    return figure
+
+
+def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
+    """Mesh forces of the first planet over one carrier turn, and over the first mesh periods if they vary."""
+    lines = (response["mesh_force_real"] + 1j * response["mesh_force_imag"]).values[speed]
+    names = [str(name) for name in response["mesh"].values]
+    turn, wave = _carrier_turn(response, speed)
+    mesh, carrier = float(response["mesh_frequency"][speed]), _carrier_frequency(response, speed)
+    near = turn * mesh / carrier <= 6.0 if carrier else np.ones(len(turn), bool)
+    panels = [(slice(None), "one turn of the carrier")]
+    if response.attrs["mesh_lines"]:
+        panels.append((near, "six mesh periods"))
+    pair = (0, len(names) // 2)
+    forces = [1e-3 * (lines[one] @ wave.T).real for one in pair]
+    curves = [(names[one], force) for one, force in zip(pair, forces)]
+    # one curve would hide the other
+    if np.abs(forces[1] - forces[0]).max() <= _EQUAL * np.ptp(forces):
+        curves = [(f"{names[0]} and {names[pair[1]]}: equal", forces[0])]
+    figure, axes = new_figure(rows=len(panels), width=8.5, height=1.0 + 2.8 * len(panels))
+    for number, (text, force) in enumerate(curves):
+        for ax, (part, _) in zip(axes, panels):
+            ax.plot(360.0 * turn[part], force[part], linewidth=0.8, label=text, **line_style(number))
+    title, doubt = f"{float(response['speed'][speed]):.6g} rpm: ", _doubt(_tails(response)[speed])
+    for ax, (_, words) in zip(axes, panels):
+        label(ax, "carrier angle [°]", "mesh force [kN]", title + words + doubt)
+        title = doubt = ""
+    legend_below(figure, axes[0])
+    return figure
+
+
+def response_spectrum(response: xr.Dataset, speed: int) -> Figure:
+    """Lines of the first mesh's force and of the sun's displacement, by the mesh harmonic they stand at."""
+    force = (response["mesh_force_real"] + 1j * response["mesh_force_imag"]).values[speed, 0]
+    moved = (response["displacement_real"] + 1j * response["displacement_imag"]).values[speed, 0, 0]
+    hertz, mesh = np.abs(response["frequency"].values[speed]), response["mesh_order"].values
+    figure, axes = new_figure(rows=2, width=8.5, height=6.0, sharex=True)
+    quantities = (
+        (np.abs(force), f"force of {response['mesh'].values[0]!s} [N]"),
+        (1e6 * np.abs(moved), "carrier x [µm]"),
+    )
+    for ax, (size, text) in zip(axes, quantities):
+        # five decades below the largest line there is nothing to see
+        floor = 1e-5 * size[hertz > 0.0].max(initial=0.0)
+        shown = (size > floor) & (hertz > 0.0)
+        for number, (words, here) in enumerate((("weight", mesh == 0), ("mesh and side bands", mesh != 0))):
+            if np.any(here & shown):
+                ax.vlines(hertz[here & shown], floor, size[here & shown], color=COLOURS[number], label=words)
+        if np.any(shown):
+            ax.set_yscale("log")
+            ax.set_ylim(bottom=floor)
+        label(ax, y=text)
+    label(axes[-1], "frequency in the carrier frame [Hz]")
+    label(axes[0], title=f"{float(response['speed'][speed]):.6g} rpm" + _doubt(_tails(response)[speed]))
+    legend_below(figure)
+    return figure
+
+
+def _contact(data: xr.Dataset, x: np.ndarray, words: str, parts) -> Figure:
+    """Four panels: both flanks of the meshes of the first planet."""
+    count = data.sizes["mesh"] // 2
+    panels = [(side, mesh) for side in ("drive", "back") for mesh in (0, count)]
+    figure, axes = new_figure(rows=4, width=8.0, height=6.4, sharex=True)
+    for number, (ax, (side, mesh)) in enumerate(zip(axes, panels)):
+        share, colour = data[f"{side}_contact"].values[:, mesh], COLOURS[number]
+        _mark_tails(ax, x, share, _tails(data))
+        if parts is None:
+            ax.plot(x, share, "o-", color=colour, markersize=3)
+        else:
+            for dash, _, part in parts:
+                ax.plot(x[part], share[part], color=colour, linestyle=dash)
+        ax.set_ylim(-0.06, 1.06)
+        ax.set_yticks([0.0, 0.5, 1.0])
+        label(ax, title=f"{data['mesh'].values[mesh]!s}, {side} flanks")
+    label(axes[-1], words)
+    figure.supylabel("share of the time in contact [1]", fontsize=SIZE)
+    legend_below(figure)
+    return figure
+
+
+def _wave(branch: xr.Dataset) -> np.ndarray:
+    """``exp(i h phase)`` (n, H) over one turn."""
+    phase = np.linspace(0.0, 2.0 * np.pi, _PHASES)
+    return np.exp(1j * phase[:, None] * branch["harmonic"].values)
+
+
+def _carrier_frequency(response: xr.Dataset, speed: int) -> float:
+    return abs(float(response["carrier_speed"][speed])) / (2.0 * np.pi)
+
+
+def _carrier_turn(response: xr.Dataset, speed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Fractions of a carrier turn (ten mesh periods where it stands), and ``exp(i omega t)`` of the lines."""
+    carrier, mesh = _carrier_frequency(response, speed), float(response["mesh_frequency"][speed])
+    duration = 1.0 / carrier if carrier else 10.0 / mesh
+    highest = np.abs(response["frequency"].values[speed]).max()
+    count = int(np.clip(8.0 * highest * duration, 720, _INSTANTS))
+    turn = np.linspace(0.0, 1.0, count + 1)
+    wave = np.exp(2j * np.pi * duration * turn[:, None] * response["frequency"].values[speed])
+    return turn, wave

@@ -1,0 +1,578 @@
+"""Results of a planar case as xarray datasets: modes.nc, branch.nc, response.nc.
+
+What a planar case is, and the numbers of its run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case.checks import output_member
+from femgear.report.tables import Block
+from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset, in_space
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.case.sections import Case
+    from femgear.gears.kinematics import Speeds
+    from femgear.gears.planetary import PlanetarySet
+    from femgear.solvers.continuation.branches import Branch
+    from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
+    from femgear.system.lumped import PlanarSet
+    from femgear.system.system import Modes
+    from femgear.trains.planar.model import MotionLines, PlanarModel
+
+
+@dataclass(frozen=True)
+class PlanarModesResult:
+    """Modes of the set at standstill: mean mesh stiffness, bearings closed, back flanks open."""
+
+    planetary_set: PlanetarySet
+    data: PlanarSet
+    modes: Modes
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of modes.nc."""
+
+        return planar_modes_dataset(self)
+
+
+@dataclass(frozen=True)
+class BranchResult:
+    """Periodic responses to the weight over its frequency in the carrier frame."""
+
+    planetary_set: PlanetarySet
+    model: PlanarModel
+    branch: Branch
+    lines: tuple[MotionLines, ...]
+    sense: int
+    ending: str
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of branch.nc."""
+
+        return branch_dataset(self)
+
+
+@dataclass(frozen=True)
+class PlanarResponseResult:
+    """Responses to weight and mesh frequency together, one a speed."""
+
+    planetary_set: PlanetarySet
+    input_speed: np.ndarray
+    speeds: tuple[Speeds, ...]
+    solutions: tuple[PeriodicSolution, ...]
+    lines: tuple[MotionLines, ...]
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of response.nc."""
+
+        return response_dataset(self)
+
+
+FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
+
+
+# instants of a turn of the weight at which forces are stored
+PHASES = 721
+
+
+def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
+    """Contents of modes.nc of a planar case: axes and rotations of all bodies, no elastic ring."""
+    from femgear.system.assembler import free_motions
+
+    modes, gears = result.modes, result.planetary_set
+    shape, dofs = in_space(result.data, free_motions(result.data) @ modes.shape, ("x", "y", "rotation"))
+    n = 2 * gears.n_planets
+    variables = {
+        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
+        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
+        "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
+        "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
+        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
+        "mesh_stiffness": (("mesh",), modes.mesh_stiffness[:n], "N/m", "mean mesh stiffness"),
+        "mesh_deflection": (
+            ("mesh", "mode"), modes.mesh_deflection[:n], "kg^-1/2", "mesh deflection of the mode",
+        ),
+    }  # fmt: skip
+    return dataset(
+        variables,
+        coords={
+            "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
+            "dof": (("dof",), dofs, "1", "degree of freedom"),
+            "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+        },
+        attrs={
+            "title": "modes of the planar set at standstill, bearings closed, back flanks open",
+            "unknowns": len(modes.shape),
+            "planet_angles": np.asarray(gears.planet_angles),
+        },
+    )
+
+
+def branch_dataset(result: BranchResult) -> xr.Dataset:
+    """Contents of branch.nc."""
+    branch, point = result.branch, ("point",)
+    hertz = branch.parameter / (2.0 * np.pi)
+    known = len(branch.verdicts) > 0
+    folds, crossings = np.zeros((2, len(hertz)), bool)
+    folds[branch.folds], crossings[branch.branch_points] = True, True
+    carrier = result.sense * branch.parameter
+    stable = np.array([_state(one) for one in branch.verdicts] if known else [-1] * len(hertz))
+    variables = {
+        "weight_frequency": (point, hertz, "Hz", "frequency of the weight in the carrier frame"),
+        "carrier_speed": (point, carrier, "rad/s", "speed of the carrier, counter-clockwise positive"),
+        "fold": (point, folds, "1", "whether the point is a limit point"),
+        "branch_point": (point, crossings, "1", "whether another branch crosses"),
+        "tail": (point, branch.tail, "1", "share of the amplitude in the upper half of the harmonics"),
+        "spectral_radius": (point, branch.spectral_radius, "1", "spectral radius of the fixed point"),
+        "residual": (point, branch.residual, "1", "relative residual of the harmonic equations"),
+        "converged": (point, branch.converged, "1", "whether the solution satisfies its tolerance"),
+    }  # fmt: skip
+    variables |= _stability(branch, stable) | _flank_forces(result, stable)
+    variables |= _motions(result.lines, "point", "harmonic")
+    coords = _coordinates(result.planetary_set) | {
+        "point": (point, np.arange(len(hertz)), "1", "point along the branch"),
+        "harmonic": (("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
+        "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
+    }
+    data = dataset(
+        variables,
+        coords=coords,
+        attrs={
+            "title": "periodic responses to the weight",
+            "message": result.ending,
+            "complete": int(branch.complete),
+            "stability": "Floquet multipliers" if known else "not computed",
+            "fourier_convention": FOURIER,
+        },
+    )
+    data["stable"].attrs |= {"flag_values": [1, 0, -1], "flag_meanings": "stable not_stable not_known"}
+    return data
+
+
+def _stability(branch: Branch, stable: np.ndarray) -> dict[str, tuple]:
+    """Verdicts of all points; open ones where stability was not asked for."""
+    point, known, count = ("point",), len(branch.verdicts) > 0, len(stable)
+    nothing, unsaid = np.full(count, np.nan), [""] * count
+    return {
+        "stable": (point, stable, "1", "stability: 1 stable, 0 not stable, -1 not known"),
+        "stability_note": (
+            point, [_reason(one) for one in branch.verdicts] if known else unsaid, "1",
+            "why stability is not known",
+        ),
+        "largest_multiplier": (
+            point, branch.largest_multiplier if known else nothing, "1", "largest Floquet multiplier",
+        ),
+        "multiplier_distance": (
+            point, [_nearest(verdict) for verdict in branch.verdicts] if known else nothing, "1",
+            "distance of the nearest Floquet multiplier from 1, which is zero at a limit point of the motion",
+        ),
+        "loss": (point, list(branch.loss) if known else unsaid, "1", "how stability is lost"),
+    }  # fmt: skip
+
+
+def _state(verdict: FloquetVerdict) -> int:
+    return -1 if verdict.stable is None else int(verdict.stable)
+
+
+def _reason(verdict: FloquetVerdict) -> str:
+    return verdict.message if verdict.stable is None else ""
+
+
+def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
+    """Forces in time at the points that are drawn, from the laws of the contacts."""
+    from femgear.trains.planar.model import flank_forces, fluctuation, shown_points
+
+    rms = np.array([fluctuation(one.member[0, 0]) for one in result.lines])
+    back = np.array([one.back_contact.max() for one in result.lines])
+    points = shown_points(rms, back, stable)
+    theta = np.linspace(0.0, 2.0 * np.pi, PHASES)[:, None]
+    forces = [flank_forces(result.model, result.branch.solutions[point], theta) for point, _ in points]
+    drive, behind = (np.array([one[side].T for one in forces]) for side in (0, 1))
+    shown, dims = ("shown",), ("shown", "mesh", "phase")
+    return {
+        "shown_point": (shown, [point for point, _ in points], "1", "point whose forces are given in time"),
+        "shown_as": (shown, [words for _, words in points], "1", "what the point is"),
+        "drive_force": (dims, drive, "N", "force of the drive flanks in time, from the law of the contact"),
+        "flank_force": (dims, behind, "N", "force of back flanks on their own line in time, from its law"),
+    }
+
+
+def _nearest(verdict: FloquetVerdict) -> float:
+    return (
+        float(np.abs(verdict.multipliers - 1.0).min(initial=np.inf)) if len(verdict.multipliers) else np.nan
+    )
+
+
+def response_dataset(result: PlanarResponseResult) -> xr.Dataset:
+    """Contents of response.nc."""
+    found, speed = result.solutions, ("speed",)
+    mesh = [one.mesh_frequency for one in result.speeds]
+    variables = {
+        "carrier_speed": (
+            speed, [one.carrier for one in result.speeds], "rad/s",
+            "speed of the carrier, counter-clockwise positive",
+        ),
+        "mesh_frequency": (speed, mesh, "Hz", "mesh frequency"),
+        "frequency": (
+            ("speed", "line"), [one.line_frequency / (2 * np.pi) for one in found], "Hz",
+            "frequency of the line in the carrier frame",
+        ),
+        "converged": (
+            speed, [one.converged for one in found], "1", "whether the solution satisfies its tolerance",
+        ),
+        "iterations": (speed, [one.iterations for one in found], "1", "iterations of Newton's method"),
+        "residual": (
+            speed, [one.residual for one in found], "1", "relative residual of the harmonic equations",
+        ),
+        "tail": (
+            speed, [one.tail for one in found], "1", "share of the amplitude in the upper half of the lines",
+        ),
+        "spectral_radius": (
+            speed, [one.spectral_radius for one in found], "1", "spectral radius of the fixed point",
+        ),
+    }  # fmt: skip
+    variables |= _motions(result.lines, "speed", "line")
+    orders, line = found[0].orders, ("line",)
+    coords = _coordinates(result.planetary_set) | {
+        "speed": (speed, result.input_speed / RPM, "rpm", "speed of the input"),
+        "carrier_order": (line, orders[:, 0], "1", "multiple of the carrier's frequency"),
+        "mesh_order": (line, orders[:, 1], "1", "multiple of the mesh frequency"),
+    }
+    return dataset(
+        variables,
+        coords=coords,
+        attrs={
+            "title": "responses to weight and mesh frequency together",
+            "message": " ".join(dict.fromkeys(one.message for one in found)),
+            "mesh_lines": int(np.any(orders[:, 1] != 0)),
+            "fourier_convention": FOURIER,
+        },
+    )
+
+
+def _motions(lines, along: str, line: str) -> dict[str, tuple]:
+    """Displacements, forces and contact of all solutions."""
+    from femgear.trains.planar.model import fluctuation, stacked
+
+    found, out = stacked(lines), {}
+    member, mesh = (along, "member", "axis"), (along, "mesh")
+    out["force_tail"] = (
+        (along,), found["force_tail"], "1",
+        "share of the fluctuating force in the upper half of the lines, of the kind of mesh with more of it",
+    )  # fmt: skip
+    out["motion"] = ((along,), found["motion"], "m", "farthest that a member's centre moves from its place")
+    out["rms"] = (member, fluctuation(found["member"]), "m", "displacement about its mean, r.m.s.")
+    out |= complex_entries((
+        ("displacement", (*member, line), found["member"], "m", "displacement in the carrier frame"),
+        (
+            "mesh_force", (*mesh, line), found["mesh_force"], "N",
+            "mesh force along the line of the drive flanks",
+        ),
+        ("back_force", (*mesh, line), found["back_force"], "N", "force of the back flanks on their own line"),
+        (
+            "planet_bearing_force", (along, "planet", "direction", line), found["planet_bearing"], "N",
+            "force of the pin on the planet",
+        ),
+        (
+            "carrier_bearing_force", (along, "axis", line), found["carrier_bearing"], "N",
+            "force of the carrier bearing on the carrier",
+        ),
+    ))  # fmt: skip
+    for side in ("drive", "back"):
+        words = f"share of the time in which the {side} flanks touch: 1 in contact, 0 not"
+        out[f"{side}_contact"] = (mesh, found[f"{side}_contact"], "1", words)
+    return out
+
+
+def _coordinates(gears) -> dict[str, tuple]:
+    numbers = np.arange(1, gears.n_planets + 1)
+    return {
+        "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+        "planet": (("planet",), numbers, "1", "planet"),
+        "member": (("member",), list(MEMBERS), "1", "member"),
+        "axis": (("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
+        "direction": (("direction",), ["radial", "tangential"], "1", "direction at the planet"),
+    }
+
+
+_MANY = 8
+# distance of a multiplier from 1 at a limit point beyond which harmonics are missing
+_TRUNCATED = 0.2
+# share of the energy in the upper half of the lines beyond which it is said, as in the spectral stage
+_ENERGY = 1e-6
+# smoothing over mean compression that is said: the force is then wrong by (0.05 / 2)^2, 0.06 %
+_SMOOTH = 0.05
+_STABLE = {1: "yes", 0: "no", -1: "not known"}
+
+
+def describe_planar(case: Case, planetary: PlanetarySet) -> Block:
+    """Mesh stiffness, supports, weight and ranges of a planar case."""
+    planar = case.planar
+    notes = [_stiffness(case), _play(case, planetary)]
+    if planar.carrier_bearing is not None:
+        one = planar.carrier_bearing
+        notes.append(
+            f"bearing between carrier and {one.on}: {one.stiffness:.6g} N/m, radial clearance "
+            f"{one.clearance * 1e6:.6g} um"
+        )
+    held = "torsional supports" if planar.reaction == "supports" else f"the {output_member(case)}"
+    notes.append(f"the torque on the {case.operation.input} is taken up by {held}")
+    if planar.gravity is not None:
+        notes.append(f"weight {planar.gravity.acceleration:.6g} m/s^2; {_sense(case)}")
+    notes.append(_smoothing(case, planetary))
+    return Block("Planar model", _BODIES, tuple(_bodies(case)), tuple(notes))
+
+
+_BODIES = ("", "mass [kg]", "inertia [kg m^2]", "support [N/m]", "torsional support [N m/rad]")
+
+
+def _bodies(case: Case) -> Iterator[tuple[str, ...]]:
+    planar = case.planar
+    for name, one in (("sun", case.sun), ("ring", planar.ring), ("carrier", case.carrier)):
+        given = getattr(planar.torsion, name)
+        held = "held" if name == case.operation.fixed else "0"
+        torsion = held if given is None else f"{given:.6g}"
+        yield name, f"{one.mass:.6g}", f"{one.inertia:.6g}", f"{one.support_stiffness:.6g}", torsion
+    planet = case.planet
+    bearing = f"{planet.bearing_stiffness:.6g} (bearing)"
+    yield "planet", f"{planet.mass:.6g}", f"{planet.inertia:.6g}", bearing, "0"
+
+
+def _stiffness(case: Case) -> str:
+    given = case.planar.mesh_stiffness
+    if given is None:
+        return "mesh stiffness: of the static solution"
+    values = f"sun-planet {given.sun_planet:.6g}, planet-ring {given.planet_ring:.6g} N/m"
+    return f"mesh stiffness: {values}, as given"
+
+
+def _play(case: Case, planetary: PlanetarySet) -> str:
+    play = case.planar.line_backlash
+    values = (planetary.backlash_sun_planet, planetary.backlash_planet_ring) if play is None else (play,)
+    text = " and ".join(dict.fromkeys(f"{max(value, 0.0) * 1e6:.6g}" for value in values))
+    own = "on lines of action of their own" if case.planar.back_flanks else "on those of the drive flanks"
+    return f"play along the line of action {text} um, back flanks {own}"
+
+
+def _smoothing(case: Case, planetary: PlanetarySet) -> str:
+    """Length over which contact sets in, beside the mean compression where the stiffness is given."""
+    from femgear.gears.kinematics import torques
+
+    given, smoothing = case.planar.mesh_stiffness, case.planar.smoothing
+    text = f"contact sets in over {smoothing * 1e6:.6g} um"
+    if given is None:
+        return text
+    torque = torques(planetary, member=case.operation.input, torque=case.operation.torque).sun
+    force = abs(torque) / (planetary.n_planets * planetary.sun.base_radius)
+    compression = force / max(given.sun_planet, given.planet_ring)
+    text += f", {smoothing / compression:.2g} of the mean compression {compression * 1e6:.4g} um"
+    if smoothing <= _SMOOTH * compression:
+        return text
+    return f"[W-SMOOTHING] {text}: lower planar.smoothing where teeth part or wedge"
+
+
+def _sense(case: Case) -> str:
+    """How torque and turning of the carrier belong together."""
+    operation = case.operation
+    if operation.fixed == "carrier":
+        return "the carrier stands"
+    # the output works against its turning, unless the torque itself brakes
+    driven = (operation.input == "carrier") == (operation.torque > 0.0)
+    return f"the torque on the carrier acts {'with' if driven else 'against'} its turning"
+
+
+def describe_branch(data: xr.Dataset) -> Block:
+    """Table of branch.nc: ends, folds and the largest responses."""
+    from femgear.trains.planar.model import merged_folds
+
+    hertz, rms = data["weight_frequency"].values, data["rms"].values
+    known = data.attrs["stability"] != "not computed"
+    stable = data["stable"].values
+    chosen = {0: "start", len(hertz) - 1: "end"}
+    chosen |= {int(point): "fold" for point in merged_folds(hertz, data["fold"].values)}
+    chosen[int(np.argmax(rms[:, 0, 0]))] = "largest carrier x"
+    chosen[int(np.argmax(rms[:, 1, 0]))] = "largest ring x"
+    rows = []
+    for point in sorted(chosen):
+        back = float(data["back_contact"].values[point].max())
+        rows.append(
+            (
+                f"{hertz[point]:.4f}",
+                chosen[point],
+                *(f"{1e6 * rms[point, member, 0]:.3f}" for member in range(3)),
+                f"{back:.3f}",
+                _STABLE[int(stable[point])] if known else "-",
+            )
+        )
+    header = (
+        "weight [Hz]", "", "carrier x rms [um]", "ring x rms [um]", "sun x rms [um]", "back contact",
+        "stable",
+    )  # fmt: skip
+    notes = [
+        f"{len(hertz)} points; {data.attrs['message']!s}",
+        "back contact: largest share of the cycle in which back flanks touch",
+    ]
+    notes += _verdicts(data) if known else ["stability was not computed"]
+    notes += _truncation(data) if known else []
+    notes += [_tails(data), *tail_warnings(data, "planar.branch.harmonics")]
+    return Block("Response to the weight", header, tuple(rows), tuple(notes))
+
+
+def _tails(data: xr.Dataset) -> str:
+    tail, force = (float(data[name].max()) for name in ("tail", "force_tail"))
+    return (
+        f"tail, share of the amplitude in the upper half of the lines: up to {tail:.2g} of the deflections, "
+        f"{force:.2g} of the mesh forces"
+    )
+
+
+def tail_warnings(data: xr.Dataset, key: str) -> tuple[str, ...]:
+    """What truncation of the lines does to branch.nc or response.nc, in sentences.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    key : str
+        Entry of the case file to raise.
+    """
+    from femgear.trains.planar.model import TAIL_LIMIT
+
+    tail, force = data["tail"].values, data["force_tail"].values
+    worst = np.maximum(tail, force)
+    if (wrong := worst > TAIL_LIMIT).any():
+        return (
+            f"[W-TAIL] {_where(data, wrong)}: {worst.max():.2g} of the amplitude lies in the upper half of "
+            f"the lines ({tail.max():.2g} of the deflections, {force.max():.2g} of the mesh forces): forces "
+            f"and contact shares of this response are not to be trusted, raise {key}",
+        )
+    if (cut := worst**2 > _ENERGY).any():
+        return (
+            f"{_where(data, cut)}: {worst.max() ** 2:.2g} of the energy of deflections or mesh forces lies "
+            f"in the upper half of the lines; {key} says how many there are",
+        )
+    return ()
+
+
+def _where(data: xr.Dataset, bad: np.ndarray) -> str:
+    """Points or speeds, in words."""
+    if "weight_frequency" in data:
+        hertz = data["weight_frequency"].values[bad]
+        return f"{len(hertz)} of {len(bad)} points, {hertz.min():.4g} to {hertz.max():.4g} Hz"
+    listed = ", ".join(f"{value:.6g}" for value in data["speed"].values[bad][:_MANY])
+    return f"{np.count_nonzero(bad)} of {len(bad)} speeds, {listed} rpm"
+
+
+def planar_verdicts(branch: xr.Dataset | None, response: xr.Dataset | None) -> Iterator[str]:
+    """What speaks against results of a planar case, for the head of the report."""
+    if branch is not None:
+        if not bool(branch.attrs["complete"]):
+            yield f"the branch of the response to the weight: {branch.attrs['message']!s}"
+        yield from tail_warnings(branch, "planar.branch.harmonics")
+    if response is not None:
+        yield from tail_warnings(response, response_key(response))
+
+
+def response_key(data: xr.Dataset) -> str:
+    """Entries of the case file that hold the lines of response.nc."""
+    if not data.attrs["mesh_lines"]:
+        return "planar.response.carrier_harmonics"
+    return "planar.response.carrier_harmonics, side_bands or dynamics.response_harmonics"
+
+
+def _truncation(data: xr.Dataset) -> Iterator[str]:
+    """Limit points that are none of the motion itself: there one multiplier would be 1."""
+    from femgear.trains.planar.model import merged_folds
+
+    hertz, distance = data["weight_frequency"].values, data["multiplier_distance"].values
+    for point in merged_folds(hertz, data["fold"].values):
+        if distance[point] > _TRUNCATED:
+            yield (
+                f"at the fold at {hertz[point]:.3f} Hz the nearest multiplier lies {distance[point]:.2g} "
+                "from 1: too few harmonics there, raise planar.branch.harmonics"
+            )
+
+
+def _verdicts(data: xr.Dataset) -> Iterator[str]:
+    """Parts of the branch that are not stable, or not known to be, in words."""
+    stable, hertz = data["stable"].values, data["weight_frequency"].values
+    edges = np.flatnonzero(np.diff(stable, prepend=stable[0] + 5, append=stable[-1] + 5))
+    for first, last in pairwise(edges):
+        state, what = stable[first], data["stability_note" if stable[first] < 0 else "loss"]
+        if state == 1:
+            continue
+        reasons = ", ".join(dict.fromkeys(str(text) for text in what.values[first:last]))
+        span = f"{hertz[first]:.3f} to {hertz[last - 1]:.3f} Hz along the branch"
+        yield f"not stable: {span} ({reasons})" if state == 0 else f"not determined: {span} ({reasons})"
+
+
+def describe_response(data: xr.Dataset) -> Block:
+    """Table of response.nc."""
+    rows, count = [], data.sizes["speed"]
+    force = np.hypot(data["mesh_force_real"].values, data["mesh_force_imag"].values)
+    fluctuation = np.sqrt(0.5 * (force[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
+    for i in range(count):
+        if count > _MANY and _MANY // 2 <= i < count - _MANY // 2:
+            continue
+        one = data.isel(speed=i)
+        rows.append(
+            (
+                f"{float(one.speed):.4g}",
+                f"{float(one.mesh_frequency):.4f}",
+                f"{1e6 * one.rms.values[0, 0]:.4f}",
+                f"{1e-3 * fluctuation[i]:.4f}",
+                f"{float(one.drive_contact.min()):.3f}",
+                f"{float(one.back_contact.max()):.3f}",
+                f"{float(one['tail']):.2g}",
+                f"{float(one['force_tail']):.2g}",
+            )
+        )
+    header = (
+        "speed [rpm]", "mesh [Hz]", "carrier x rms [um]", "mesh force rms [kN]", "drive contact",
+        "back contact", "tail", "force tail",
+    )  # fmt: skip
+    notes = [
+        f"{data.sizes['line']} {_kind_of_lines(data)}; mesh force: the largest fluctuation of "
+        "all meshes; contact: least share of the time of the drive flanks, largest of the back flanks",
+        "the stability of these responses is not computed",
+    ]
+    hertz = np.sort(np.abs(data["frequency"].values), axis=1)
+    if np.any(np.diff(hertz, axis=1) <= 1e-9 * hertz.max()):
+        notes.append(
+            "some lines have one frequency: planar.response.carrier_harmonics or side_bands reach from the "
+            "weight to the mesh frequency; r.m.s. values count such lines apart"
+        )
+    notes += tail_warnings(data, response_key(data))
+    return Block("Weight and mesh frequency", header, tuple(rows), tuple(notes))
+
+
+def _kind_of_lines(data: xr.Dataset) -> str:
+    if data.attrs["mesh_lines"]:
+        return "lines of weight and mesh frequency"
+    return "lines of the weight alone: a constant mesh stiffness leaves none of the mesh frequency"
+
+
+def published_modes(case: Case, data: xr.Dataset) -> Block | None:
+    """Natural frequencies that the case calls published, beside the nearest mode of the kind."""
+    planar = case.planar
+    entries = [one for one in planar.published if one.frequency is not None] if planar else []
+    if not entries:
+        return None
+    kinds, found = np.array([str(kind) for kind in data["kind"].values]), data["frequency"].values
+    rows = []
+    for one in entries:
+        same = found[kinds == one.kind]
+        near = same[np.argmin(np.abs(same - one.frequency))] if len(same) else np.nan
+        difference = f"{100 * (near / one.frequency - 1):+.2f}" if len(same) else "-"
+        rows.append(
+            (one.kind, f"{one.frequency:.6g}", f"{near:.6g}" if len(same) else "none", difference, one.source)
+        )
+    header = ("kind", "published [Hz]", "nearest here [Hz]", "difference [%]", "source")
+    return Block("Published natural frequencies", header, tuple(rows))

@@ -1,0 +1,217 @@
+"""The section of a case file that asks for the set of rigid bodies in their plane, and what it goes with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    model_validator,
+)
+
+from femgear.case.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.case.units import ACCELERATION, ANGLE, FREQUENCY, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
+
+SMOOTHING = 0.3e-6
+"""Length over which tooth contact sets in [m], of the examples of NREL/CP-5000-55355."""
+
+Frequency = Quantity(FREQUENCY, 0.01, 1e5)
+Clearance = Quantity(LENGTH, 0.0, 0.01)
+Torsion = Quantity(TORSION, 0.0, 1e15)
+Ratio = Number(0.0, 1.0, open_high=True)
+
+
+FIGURES = (
+    "mode_shapes",
+    "weight_response",
+    "carrier_orbit",
+    "planet_bearing_forces",
+    "tooth_contact",
+    "wedged_teeth",
+    "response_orbit",
+    "response_bearing_forces",
+    "response_mesh_forces",
+    "response_spectrum",
+    "contact_over_speed",
+)
+"""Figures of a planar case that may be compared with published ones."""
+
+
+def _sentence(value: object) -> str:
+    if not isinstance(value, str):
+        raise refuse(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
+    if len(value) > 600 or not value.isprintable():
+        raise refuse(
+            "the comparison must be one printable line", code="E-RANGE", limit="600 printable characters"
+        )
+    return value
+
+
+def _some(values: tuple) -> tuple:
+    # pydantic's own min_length counts valid entries alone, and would complain twice
+    if not values:
+        raise refuse("there is no entry", code="E-RANGE", limit="1 or more")
+    return values
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class MeshStiffnessSection(_Section):
+    """Constant stiffness of every mesh, in place of the static solution's."""
+
+    sun_planet: Quantity(STIFFNESS, 1e3, 1e13)
+    planet_ring: Quantity(STIFFNESS, 1e3, 1e13)
+
+
+class PlanarRingSection(_Section):
+    """The ring as a rigid body on its support in the housing."""
+
+    mass: Quantity(MASS, 1e-6, 1e6)
+    inertia: Quantity(INERTIA, 1e-12, 1e8)
+    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
+
+
+class TorsionSection(_Section):
+    """Torsional supports of the members; the fixed member is held where it has none."""
+
+    sun: Torsion | None = None
+    ring: Torsion | None = None
+    carrier: Torsion | None = None
+
+
+class CarrierBearingSection(_Section):
+    """A bearing of the carrier beside its support."""
+
+    stiffness: Quantity(STIFFNESS, 1.0, 1e15)
+    clearance: Clearance = 0.0
+    on: Literal["ring", "housing"] = "housing"
+
+
+class GravitySection(_Section):
+    """Weight of all bodies; its direction counts from the x axis when the carrier's phase is zero."""
+
+    acceleration: Quantity(ACCELERATION, 1e-3, 1e3) = 9.80665
+    direction: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = -0.5 * math.pi
+
+
+class BranchSection(_Section):
+    """Periodic responses to the weight, followed over its frequency in the carrier frame."""
+
+    start: Frequency = Field(alias="from")
+    to: Frequency
+    harmonics: Count(1, 60) = 9
+    stability: StrictBool = True
+    points: Count(10, 5000) = 600
+
+
+class ResponseSection(_Section):
+    """Responses to weight and mesh frequency together at the speeds of the operation."""
+
+    carrier_harmonics: Count(1, 500) = 3
+    side_bands: Count(0, 100) = 3
+
+
+class PlanarPublished(_Section):
+    """What somebody published: a natural frequency, or a figure and how ours compares with it."""
+
+    kind: Literal["rotational", "translational", "planet"] | None = None
+    frequency: Frequency | None = None
+    figure: Literal[FIGURES] | None = None
+    comparison: Annotated[str, BeforeValidator(_sentence)] | None = None
+    source: Title
+
+    @model_validator(mode="after")
+    def _one_of_two(self):
+        given = {
+            name for name in ("kind", "frequency", "figure", "comparison") if getattr(self, name) is not None
+        }
+        if given not in ({"kind", "frequency"}, {"figure", "comparison"}):
+            raise refuse(
+                "a published entry is a frequency with its kind, or a figure with a comparison",
+                code="E-CHOICE",
+                remedy='write kind = "rotational" and frequency = "69.5 Hz"',
+            )
+        return self
+
+
+class PlanarSection(_Section):
+    """Rigid bodies that move in their plane: sun, ring, carrier and planets.
+
+    With this section a run solves the lumped set of Lin and Parker in place of the elastic ring.
+    """
+
+    mesh_stiffness: MeshStiffnessSection | None = None
+    line_backlash: Clearance | None = None
+    smoothing: Quantity(LENGTH, 0.0, 1e-3) = SMOOTHING
+    back_flanks: StrictBool = False
+    damping_ratios: Annotated[tuple[Ratio, ...], AfterValidator(_some), Field(max_length=1000)] | None = None
+    gyroscopic: StrictBool = False
+    reaction: Literal["supports", "output"] = "output"
+    ring: PlanarRingSection
+    torsion: TorsionSection = TorsionSection()
+    carrier_bearing: CarrierBearingSection | None = None
+    gravity: GravitySection | None = None
+    branch: BranchSection | None = None
+    response: ResponseSection | None = None
+    published: Annotated[tuple[PlanarPublished, ...], Field(max_length=100)] = ()
+
+
+def planar_notices(data: dict) -> Iterator[str]:
+    """What a planar case gives without effect.
+
+    Parameters
+    ----------
+    data : dict
+        Tables of a case file that was checked, with a section planar.
+    """
+    planar = data["planar"]
+    unused = [name for name in ("motor", "brake", "housing") if name in data]
+    keys = ["tolerance"]
+    if "response" not in planar:
+        keys += ["mesh_harmonics", "response_harmonics"]
+    unused += [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
+    foundations = ("foundation_radial", "foundation_tangential")
+    unused += [f"ring.{key}" for key in foundations if key in data["ring"]]
+    if unused:
+        yield f"{_listed(unused)} no effect in this planar case"
+    if "mesh_stiffness" in planar and (unused := _without_static(data)):
+        yield f"{_listed(unused)} no effect while planar.mesh_stiffness is given"
+    if "response" in planar and "mesh_stiffness" in planar:
+        still = "no weight acts" if "gravity" not in planar else ""
+        if data["operation"].get("fixed", "ring") == "carrier":
+            still = "the weight does not turn against a carrier that stands"
+        if still:
+            yield (
+                "planar.response: nothing varies in time, every response is static: planar.mesh_stiffness is "
+                f"constant and {still}"
+            )
+    if data["planet"].get("bearing_clearance") and not {"branch", "response"} & planar.keys():
+        yield "planet.bearing_clearance has no effect without planar.branch or planar.response"
+
+
+def _listed(names: list[str]) -> str:
+    return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
+
+
+def _without_static(data: dict) -> list[str]:
+    """Entries that act on the static solution alone, which a given mesh stiffness replaces."""
+    unused = ["static"] if "static" in data else []
+    if "response" in data["planar"]:
+        keys = ("mesh_harmonics", "response_harmonics")
+        unused += [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
+        unused += ["planar.response.side_bands"] if "side_bands" in data["planar"]["response"] else []
+    if data["planar"].get("line_backlash") is not None and "backlash" in data["set"]:
+        unused.append("set.backlash")
+    for name in ("sun", "planet", "ring", "carrier"):
+        keys = ("modifications", "errors", "individual")
+        unused += [f"{name}.{key}" for key in keys if data.get(name, {}).get(key)]
+    return unused

@@ -1,0 +1,271 @@
+"""What the phases of the meshes do to the harmonics of a set, and tooth numbers nearby, as tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case.case import shaft_lines
+from femgear.gears.checks import check_set, tip_clearances
+from femgear.gears.deviation_checks import check_deviations
+from femgear.gears.gear import tooth_thickness
+from femgear.gears.kinematics import MEMBERS, speeds, torques
+from femgear.gears.phasing import KINDS, ZERO, phasing_of_set, phasing_table
+from femgear.gears.teeth_numbers import ToothChoices, neighbouring_teeth
+from femgear.report.tables import Block
+from femgear.trains.elastic.model import MAX_DIAMETER
+from femgear.trains.elastic.results import _MANY
+from femgear.trains.helical.results import describe_helical
+from femgear.trains.planar.results import describe_planar
+
+if TYPE_CHECKING:
+    from femgear.case.sections import Case
+    from femgear.gears.planetary import PlanetarySet
+
+HARMONICS = 6
+DISTANCE, TOLERANCE = 3, 0.02
+ROWS = 8
+_SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
+
+
+def describe_phasing(planetary_set: PlanetarySet) -> tuple[Block, ...]:
+    """Phasing of the first harmonics of the mesh frequency, and of neighbouring tooth numbers.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+        Of a case that `femgear.gears.check_set` accepts.
+
+    Returns
+    -------
+    tuple of Block
+    """
+    return _harmonics(planetary_set), _neighbours(planetary_set)
+
+
+def _harmonics(s: PlanetarySet) -> Block:
+    phasing = phasing_of_set(s)
+    table = phasing_table(phasing, range(1, HARMONICS + 1))
+    rows = [
+        (
+            str(h),
+            kind,
+            "-" if k < 0 else str(k),
+            _share(size[:, 0].max()),
+            _share(size[:, 1].max()),
+            ", ".join(modes),
+        )
+        for h, kind, k, size, modes in zip(
+            table.harmonics, table.kind, table.cyclic, table.members, table.excited
+        )
+    ]
+    header = ("harmonic", "planets are", "k", "torque", "lateral force", "can excite modes")
+    common = math.gcd(s.sun.teeth, s.planet.teeth), math.gcd(s.planet.teeth, s.ring.teeth)
+    notes = (
+        "k = mod(h z_sun, N); torque, lateral force: what is left of equal mesh forces on sun, ring, carrier",
+        f"a planet's ring mesh follows its sun mesh by {phasing.lag:.4f} periods",
+        f"common divisors of the teeth: sun and planet {common[0]}, planet and ring {common[1]}",
+    )
+    return Block("Mesh phasing", header, tuple(rows), notes)
+
+
+def _share(value: float) -> str:
+    return "cancelled" if value < ZERO else f"{100.0 * value:.1f} %"
+
+
+def _neighbours(s: PlanetarySet) -> Block:
+    wanted = (s.sun.teeth, s.planet.teeth, s.ring.teeth)
+    closure = max(1, abs(wanted[2] - wanted[0] - 2 * wanted[1]))
+    found = neighbouring_teeth(
+        *wanted, s.n_planets, distance=DISTANCE, ratio_tolerance=TOLERANCE, closure=min(closure, 10)
+    )
+    found = found.only(np.any(found.teeth != np.array(wanted), axis=1))
+    # sets with equal spacing first, each group by its ratio
+    found = found.only(np.argsort(~found.equally_spaced, kind="stable"))
+    rows = tuple(_row(found, i) for i in range(min(len(found), ROWS)))
+    header = ("teeth", "ratio", "change", "spacing", "harmonics 1 to 4", "hunting", "room [modules]")
+    notes = (
+        f"{len(found)} within {DISTANCE} teeth and {100 * TOLERANCE:g} % of the ratio; room: unshifted tips",
+    )
+    return Block("Neighbouring tooth numbers", header, rows, notes)
+
+
+def _row(found: ToothChoices, i: int) -> tuple[str, ...]:
+    kinds = [_SHORT[name] for name in found.kind_names[i]]
+    off = f"off by {math.degrees(found.spacing_error[i]):.2f} deg"
+    return (
+        "/".join(str(z) for z in found.teeth[i]),
+        f"{found.ratio[i]:.4f}",
+        f"{100.0 * found.ratio_change[i]:+.2f} %",
+        "equal" if found.equally_spaced[i] else off,
+        kinds[0] if len(set(kinds)) == 1 else ", ".join(kinds),
+        "yes" if found.hunting[i] else "no",
+        f"{found.room[i]:.2f}",
+    )
+
+
+RPM = math.pi / 30
+
+
+# Angle between the ends of a coupling that is worth a warning [rad].
+MOST_WINDING = 1.0
+
+
+def describe_case(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
+    """Geometry, operation and warnings of a case.
+
+    Parameters
+    ----------
+    case : Case
+    planetary : PlanetarySet
+        As `femgear.case.case.planetary_set` makes it.
+
+    Returns
+    -------
+    tuple of Block
+    """
+    planar = () if case.planar is None else (describe_planar(case, planetary),)
+    helical = () if case.helical is None else describe_helical(case, planetary)
+    return (
+        Block(case.title),
+        _gears(planetary),
+        _meshes(planetary),
+        *describe_phasing(planetary),
+        _operation(case, planetary),
+        *planar,
+        *helical,
+        Block("Warnings", notes=warnings_of(case, planetary) or ("none",)),
+    )
+
+
+def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
+    """What is allowed but deserves a look, in sentences."""
+    found = [str(warning) for warning in check_set(planetary)] + list(case.notices)
+    from femgear.case.case import set_deviations
+
+    found += [str(warning) for warning in check_deviations(set_deviations(case), planetary)]
+    if case.operation.torque == 0:
+        found.append(
+            "[W-TORQUE] operation.torque: without torque no tooth touches; only static results exist"
+        )
+    if case.operation.torque < 0:
+        found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
+    elastic = case.planar is None and case.helical is None
+    if elastic and case.dynamics.damping_ratio == 0.0 and case.operation.fixed == "ring":
+        found.append(
+            "[W-DAMPING] dynamics.damping_ratio: without damping resonances have no limit, and levels depend "
+            "on how near a line lies to one; 0.02 to 0.05 is usual"
+        )
+    if elastic:
+        found += _wound_up(case, planetary)
+    if elastic and case.planet.bearing_clearance and case.operation.fixed == "ring":
+        found.append(
+            "[W-BEARING] planet.bearing_clearance: the dynamics have linear planet bearings; the clearance "
+            'acts in the static results alone, with static.members = "elastic"'
+        )
+    if elastic and case.housing.form == "linear" and case.housing.points <= 2 * MAX_DIAMETER:
+        found.append(
+            f"[W-POINTS] housing.points: {case.housing.points} points do not resolve the ring's "
+            f"{MAX_DIAMETER} nodal diameters; use more than {2 * MAX_DIAMETER}"
+        )
+    return tuple(found)
+
+
+def _wound_up(case: Case, planetary: PlanetarySet) -> Iterator[str]:
+    """Couplings that the torque turns further than any stands: a slip of units, as a rule."""
+    acting = torques(planetary, member=case.operation.input, torque=case.operation.torque)
+    output = next(name for name in MEMBERS if name not in (case.operation.input, case.operation.fixed))
+    for name, member in (("motor", case.operation.input), ("brake", output)):
+        section = getattr(case, name)
+        angle = 0.0 if section is None else abs(getattr(acting, member)) / section.coupling_stiffness
+        if angle > MOST_WINDING:
+            yield (
+                f"[W-COUPLING] {name}.coupling_stiffness: {section.coupling_stiffness:.4g} N m/rad lets the "
+                f"torque turn the coupling by {math.degrees(angle):.4g} deg; couplings stand a few degrees, "
+                "elastic ones twenty"
+            )
+
+
+def _gears(s: PlanetarySet) -> Block:
+    gears = (s.sun, s.planet, s.ring)
+
+    def row(name, value):
+        return (name, *(value(gear) for gear in gears))
+
+    rows = (
+        row("teeth", lambda g: str(g.teeth)),
+        row("profile shift", lambda g: f"{g.profile_shift:.5f}"),
+        row("reference diameter [mm]", lambda g: f"{2e3 * g.reference_radius:.4f}"),
+        row("tip diameter [mm]", lambda g: f"{2e3 * g.tip_radius:.4f}"),
+        row("root diameter [mm]", lambda g: f"{2e3 * g.root_radius:.4f}"),
+        row("start of involute, diameter [mm]", lambda g: f"{2e3 * g.form_radius:.4f}"),
+        row(
+            "tooth thickness at the tip [mm]",
+            lambda g: f"{1e3 * float(tooth_thickness(g, g.tip_radius)):.4f}",
+        ),
+        row("bore or outer diameter [mm]", lambda g: f"{2e3 * g.rim_radius:.4f}"),
+    )
+    angles = ", ".join(f"{math.degrees(angle):.6g}" for angle in s.planet_angles[:12])
+    notes = (
+        f"module {s.sun.module * 1e3:.6g} mm, pressure angle {math.degrees(s.sun.pressure_angle):.6g} deg, "
+        f"face width {s.sun.face_width * 1e3:.6g} mm, centre distance {s.centre_distance * 1e3:.6g} mm",
+        f"{s.n_planets} planets at {angles} deg",
+        "profile shift of the ring: positive moves the flank outwards (the opposite of ISO 21771)",
+    )
+    return Block("Gears", ("", "sun", "planet", "ring"), rows, notes)
+
+
+def _meshes(s: PlanetarySet) -> Block:
+    n = s.n_planets
+    phases = s.mesh_phases
+
+    def listing(values):
+        text = ", ".join(f"{value:.4f}" for value in values[:6])
+        return text + (", ..." if len(values) > 6 else "")
+
+    clearance = {name: f"{1e3 * value:.3f}" for name, value in tip_clearances(s).items()}
+    rows = (
+        (
+            "working pressure angle [deg]",
+            f"{math.degrees(s.working_pressure_angle_sun_planet):.4f}",
+            f"{math.degrees(s.working_pressure_angle_planet_ring):.4f}",
+        ),
+        ("contact ratio", f"{s.contact_ratio_sun_planet:.4f}", f"{s.contact_ratio_planet_ring:.4f}"),
+        (
+            "normal backlash [um]",
+            f"{round(s.backlash_sun_planet * 1e6, 2) + 0.0:.2f}",
+            f"{round(s.backlash_planet_ring * 1e6, 2) + 0.0:.2f}",
+        ),
+        (
+            "tip clearances [mm]",
+            f"{clearance['sun tip to planet root']}, {clearance['planet tip to sun root']}",
+            f"{clearance['planet tip to ring root']}, {clearance['ring tip to planet root']}",
+        ),
+        ("mesh phases [periods]", listing(phases[:n]), listing(phases[n:])),
+    )
+    return Block("Meshes", ("", "sun-planet", "planet-ring"), rows)
+
+
+def _operation(case: Case, s: PlanetarySet) -> Block:
+    operation = case.operation
+    chosen = operation.speeds
+    if len(chosen) > _MANY:
+        chosen = (*chosen[: _MANY // 2], *chosen[-_MANY // 2 :])
+    rows = []
+    for speed in chosen:
+        v = speeds(s, input=operation.input, fixed=operation.fixed, speed=speed)
+        turns = (f"{value / RPM:.4f}" for value in (v.sun, v.carrier, v.ring, v.planet))
+        rows.append((*turns, f"{v.mesh_frequency:.4f}"))
+    load = torques(s, member=operation.input, torque=operation.torque)
+    notes = [
+        f"input {operation.input}, fixed {operation.fixed}; torque on sun {load.sun:.6g} N m, "
+        f"carrier {load.carrier:.6g} N m, ring {load.ring:.6g} N m"
+    ]
+    if len(operation.speeds) > _MANY:
+        notes.append(f"{len(operation.speeds)} speeds, of which the first and the last are shown")
+    notes += shaft_lines(case)
+    header = ("sun [rpm]", "carrier [rpm]", "ring [rpm]", "planet [rpm]", "mesh frequency [Hz]")
+    return Block("Operation", header, tuple(rows), tuple(notes))

@@ -1,0 +1,721 @@
+"""Figures of static.nc: what the gears themselves do over one mesh period.
+
+Figures of stress.nc: one tooth on its way through the mesh, along its roots, pressures, load spectra.
+
+Figures of deviations as measuring machines draw them: profiles over roll angle, pitches over teeth.
+
+Figures of mesh phasing: phases round the carrier, what they cancel and excite, mesh-force spectra.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.gears.modifications import form_deviation
+from femgear.gears.phasing import MODES, MeshPhasing, PhasingTable, phase_factors, phasing_table
+from femgear.report.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    DASHES,
+    GREY,
+    ORANGE,
+    SIZE,
+    VERMILION,
+    distinct_lines,
+    family,
+    label,
+    legend_below,
+    line_style,
+    new_figure,
+    periodic,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from femgear.gears.deviations import SetDeviations
+    from femgear.gears.gear import Gear
+    from femgear.gears.planetary import PlanetarySet
+
+POSITION = "position in the mesh period [1]"
+
+
+def static_transmission_error(static: xr.Dataset) -> Figure:
+    """Static transmission error of every mesh, and of sun to ring over every planet.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        With ``ste`` (mesh, position) and ``ste_overall`` (planet, position) [m].
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (left, right) = new_figure(columns=2, width=9.5, sharex=True)
+    names = static["mesh"].values
+    drawn = distinct_lines(names, static["ste"])
+    for i, (text, row) in enumerate(drawn):
+        left.plot(*periodic(static["position"], static["ste"][row] * 1e6), label=text, **line_style(i))
+    label(left, POSITION, "transmission error [µm]", "each mesh, along its line of action")
+    planets = [f"sun to ring over planet {p}" for p in static["planet"].values]
+    position, overall = periodic(static["position"], static["ste_overall"] * 1e6)
+    rows = list(zip(planets, range(len(planets))))
+    if _equal(overall):
+        rows = [("sun to ring over every planet (identical)", 0)]
+    for i, (text, row) in enumerate(rows):
+        right.plot(position, overall[row], label=text, **line_style(i + len(drawn)))
+    label(right, POSITION, "sum of both meshes [µm]", "sun to ring")
+    right.set_xlim(0, position[-1])
+    legend_below(figure, columns=2)
+    return figure
+
+
+def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Figure:
+    """Tangent and secant stiffness of every mesh.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        With ``mesh_stiffness`` and ``mesh_stiffness_secant`` (mesh, position) [N/m].
+    face_width : float, optional
+        [m]; adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
+
+    Returns
+    -------
+    Figure
+    """
+    lines = distinct_lines(static["mesh"].values, static["mesh_stiffness"])
+    # two families of curves that differ from planet to planet would cover one another
+    kinds = list(dict.fromkeys(family(text) for text, _ in lines)) if len(lines) > 2 else [""]
+    figure, axes = new_figure(rows=len(kinds), height=1.6 + 3.2 * len(kinds), sharex=True)
+    for i, (text, row) in enumerate(lines):
+        ax = axes[kinds.index(family(text)) if len(kinds) > 1 else 0]
+        for name, width, kind in (("mesh_stiffness", 2.2, ""), ("mesh_stiffness_secant", 0.9, "secant")):
+            position, value = periodic(static["position"], static[name][row] * 1e-6)
+            # the legend tells meshes by colour and dash, the two kinds of stiffness by width
+            ax.plot(position, value, linewidth=width, label="_" * bool(kind) + text, **line_style(i))
+    for kind, width in (("tangent (thick)", 2.2), ("secant (thin)", 0.9)):
+        axes[-1].plot([], [], color=BLACK, linewidth=width, label=kind)
+    axes[-1].set_xlim(0, position[-1])
+    label(axes[-1], POSITION)
+    # N/m over m of width is 1e-9 N/(mm µm)
+    factor = 1e-3 / face_width if face_width else 0.0
+    for ax, kind in zip(axes, kinds):
+        label(ax, y="mesh stiffness [N/µm]", title=f"{kind} meshes" if kind else "")
+        if factor:
+            second = ax.secondary_yaxis("right", functions=(lambda k: k * factor, lambda c: c / factor))
+            second.set_ylabel("per face width [N/(mm µm)]", fontsize=11)
+            second.tick_params(labelsize=10)
+    legend_below(figure, columns=2 if len(lines) < 4 else 4)
+    return figure
+
+
+def load_sharing(static: xr.Dataset) -> Figure:
+    """Share of every planet in the sun's torque over the mesh period.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        With ``load_share`` (planet, position) [1].
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = new_figure(height=3.8)
+    position, share = periodic(static["position"], static["load_share"] * 100)
+    identical = _equal(share)
+    for i, planet in enumerate(static["planet"].values[:1] if identical else static["planet"].values):
+        text = "every planet (identical)" if identical else f"planet {planet}"
+        ax.plot(position, share[i], label=text, linewidth=2.0, **line_style(i))
+    equal = 100.0 / len(share)
+    ax.axhline(equal, color="0.4", linewidth=0.8, linestyle=(0, (1, 3)), label=f"equal share {equal:.4g} %")
+    spread = np.abs(share - equal).max()
+    if spread < 0.05 * equal:
+        ax.set_ylim(0.94 * equal, 1.06 * equal)
+    ax.set_xlim(0, position[-1])
+    title = f"largest departure from equal shares: {spread:.3g} %" if spread > 1e-6 else "equal shares"
+    label(ax, POSITION, "share of the torque [%]", title)
+    legend_below(figure, columns=4)
+    return figure
+
+
+def tooth_loads(static: xr.Dataset) -> Figure:
+    """Load of one tooth pair from its first to its last contact, in a sun-planet and a planet-ring mesh.
+
+    The simultaneous pairs of the dataset are one base pitch apart on the path of contact, and a pair goes on
+    to the next place with every mesh period: from period to period and place to place the loads are the
+    history of one pair. The meshes are those of the first planet.
+
+    Parameters
+    ----------
+    static : xarray.Dataset
+        With ``tooth_load`` (mesh, tooth, position) and ``mesh_force`` (mesh, position) [N].
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = new_figure(columns=2, width=9.5, sharey=True)
+    names = [str(name) for name in static["mesh"].values]
+    position, largest = static["position"].values, 0.0
+    periods = int(static.attrs.get("mesh_periods", 1))
+    for ax, kind in zip(axes, ("sun-planet", "planet-ring")):
+        row = next(i for i, name in enumerate(names) if family(name) == kind)
+        load, force = static["tooth_load"].values[row], static["mesh_force"].values[row]
+        place = np.arange(len(load))[:, None]
+        each = np.arange(len(position)).reshape(periods, -1)[place.ravel() % periods]
+        path, load = (place + position[each] % 1.0).ravel(), load[place, each].ravel()
+        carried = np.flatnonzero(load > 1e-9 * force.max(initial=0.0))
+        first, last = (carried[0], carried[-1]) if len(carried) else (0, load.size - 1)
+        shown = slice(max(first - 1, 0), last + 2)
+        ax.plot(path[shown] - path[first], load[shown], label="one tooth pair", color=COLOURS[0])
+        largest = max(largest, load.max(initial=0.0), force.mean())
+        ax.axhline(force.mean(), color="0.45", linewidth=1.0, linestyle=(0, (1, 2)), label="whole mesh, mean")
+        label(ax, "path since the first contact [base pitches]", title=names[row])
+    # the axes share one scale, which holds what both of them show
+    axes[0].set_ylim(0, 1.05 * largest or 1.0)
+    label(axes[0], y="load along the line of action [N]")
+    legend_below(figure, columns=3)
+    return figure
+
+
+def _equal(rows) -> bool:
+    return bool(np.abs(rows - rows[0]).max() <= 1e-6 * np.abs(rows).max(initial=0.0))
+
+
+TENSION, COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
+# tangent of the critical section after ISO 6336-3, external and internal gears
+CRITICAL_SLOPE = {False: 30.0, True: 60.0}
+KINDS = ("sun-planet", "planet-ring")
+
+
+def root_stress_history(stress: xr.Dataset) -> Figure:
+    """Root stresses of one tooth of every gear from mesh to mesh, on the planet with the largest tension.
+
+    Parameters
+    ----------
+    stress : xarray.Dataset
+        With ``root_tension`` and ``root_compression`` [Pa] and ``root_path`` [1] (mesh, gear, step); where
+        it has ``iso_root_stress`` [Pa] (mesh, gear), the nominal stress is drawn too.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharex=True, sharey=True)
+    for ax, (title, row, _) in zip(axes, _four_gears(stress)):
+        path = row["root_path"].values
+        ax.plot(path, row["root_tension"].values * 1e-6, color=VERMILION, label=TENSION)
+        ax.plot(path, row["root_compression"].values * 1e-6, color=BLUE, linestyle="--", label=COMPRESSION)
+        ax.axhline(0.0, color="0.4", linewidth=0.8)
+        _nominal(ax, row, "iso_root_stress", "σ_F0 of ISO 6336-3")
+        largest = float(row["root_tension"].max()) * 1e-6
+        lowest = float(row["root_compression"].min()) * 1e-6
+        label(ax, title=f"{title}: {largest:.3g} and {lowest:.3g} MPa")
+    for ax in axes[2:]:
+        label(ax, "path from the pitch point [base pitches]")
+    for ax in axes[::2]:
+        label(ax, y="stress [MPa]")
+    legend_below(figure, columns=2)
+    return figure
+
+
+def root_stress_profile(stress: xr.Dataset) -> Figure:
+    """Stress along both roots of a tooth when its tension is largest, on the planet where that is largest.
+
+    Parameters
+    ----------
+    stress : xarray.Dataset
+        With ``root_profile`` (mesh, gear, root, point) [Pa], ``root_arc`` [m] and ``root_slope`` [rad]
+        (mesh, gear, point).
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
+    for ax, (title, row, internal) in zip(axes, _four_gears(stress)):
+        arc, slope = row["root_arc"].values * 1e3, np.degrees(row["root_slope"].values)
+        for side, colour, dash in (("loaded", VERMILION, "-"), ("back", BLUE, "--")):
+            values = row["root_profile"].sel(root=side).values * 1e-6
+            ax.plot(
+                arc, values, dash, color=colour, marker="o", markersize=3, label=f"root of the {side} flank"
+            )
+        ax.axhline(0.0, color="0.4", linewidth=0.8)
+        angle = CRITICAL_SLOPE[internal]
+        known = np.isfinite(arc)
+        place = _crossing(slope[known], arc[known], angle)
+        if place is not None:
+            text = "critical section of ISO 6336-3 (tangent 30°, internal gears 60°)"
+            ax.axvline(place, color=GREY, linewidth=1.2, linestyle=":", label=text)
+        label(ax, "arc from the end of the flank [mm]", title=title)
+    for ax in axes[::2]:
+        label(ax, y="stress [MPa]")
+    legend_below(figure, columns=3)
+    return figure
+
+
+def contact_pressure(stress: xr.Dataset) -> Figure:
+    """Contact pressure of one tooth pair over its path, for both meshes of the planet with the largest.
+
+    Parameters
+    ----------
+    stress : xarray.Dataset
+        With ``pressure_distribution`` [Pa] (mesh, pair, cell, position), ``pressure_offset`` (mesh, cell),
+        ``pressure_centre`` and ``pressure_path`` (mesh, pair, position) [m], ``contact_pressure`` [Pa] (mesh,
+        position) and ``iso_contact_stress`` [Pa] (mesh).
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6)
+    top = float(stress["contact_pressure"].max()) * 1e-6 or 1.0
+    # at the end of a flank the pressure grows as cells shrink: it only decides where there is no other
+    edge = stress["pressure_distribution"].max(("pair", "cell", "position")).values
+    planet = _worst_planet(stress, stress["contact_pressure"].max("position").values, edge)
+    for upper, lower, kind in zip(axes[:2], axes[2:], KINDS):
+        row = _mesh_of(stress, kind, planet)
+        path, place, pressure = _along_path(row)
+        upper.plot(path, pressure.max(axis=0), color=VERMILION, label="largest pressure")
+        _nominal(upper, row, "iso_contact_stress", "σ_H0 of ISO 6336-2")
+        upper.set_ylim(0.0, 1.6 * top)
+        largest = float(row["contact_pressure"].max()) * 1e-6
+        label(upper, title=f"{row['mesh'].item()}: {largest:.4g} MPa away from flank ends")
+        image = lower.pcolormesh(
+            np.broadcast_to(path, place.shape),
+            place,
+            np.ma.masked_less_equal(pressure, 0.0),
+            shading="nearest",
+            cmap="viridis",
+            vmin=0.0,
+            vmax=1.2 * top,
+        )
+        lower.set_xlim(upper.get_xlim())
+        reach = 1.1 * np.abs(place[pressure > 0.0]).max(initial=0.0)
+        lower.set_ylim(-reach or -1.0, reach or 1.0)
+        label(lower, "path from the pitch point [mm]")
+    label(axes[0], y="pressure [MPa]")
+    label(axes[2], y="along the common tangent [µm]")
+    figure.colorbar(image, ax=axes[2:], label="pressure [MPa]", extend="max")
+    legend_below(figure, columns=2)
+    highest = float(stress["pressure_distribution"].max()) * 1e-6
+    if highest > top:
+        text = f"up to {highest:.0f} MPa where a tip edge carries, cut here: no limit as cells shrink"
+        figure.legends[0].set_title(text, prop={"size": SIZE - 1})
+    return figure
+
+
+def _along_path(row):
+    """Path (k,) [mm], place (C, k) [um] and pressure (C, k) [MPa] of a tooth pair from entry to exit."""
+    path = row["pressure_path"].values.ravel()
+    pressure = row["pressure_distribution"].values.swapaxes(0, 1).reshape(-1, len(path))
+    place = row["pressure_offset"].values[:, None] + row["pressure_centre"].values.ravel()
+    order = np.argsort(path, kind="stable")
+    loaded = np.flatnonzero(pressure[:, order].any(axis=0))
+    first, last = (loaded[0], loaded[-1]) if len(loaded) else (0, len(order) - 1)
+    order = order[max(first - 1, 0) : last + 2]
+    return path[order] * 1e3, place[:, order] * 1e6, pressure[:, order] * 1e-6
+
+
+def load_spectrum(stress: xr.Dataset) -> Figure:
+    """Load spectrum of the teeth in both meshes of the planet with the largest load.
+
+    Parameters
+    ----------
+    stress : xarray.Dataset
+        With ``load_time_share`` and ``load_cycle_share`` (mesh, load_bin) [1], ``load_bin_low`` and
+        ``load_bin_high`` (load_bin) [N], ``load_cycles`` (mesh, gear) [1].
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = new_figure(columns=2, width=9.5, sharex=True, sharey=True)
+    edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
+    time = stress["load_time_share"].values
+    planet = _worst_planet(stress, (edges[1:] * (time > 0.0)).max(axis=1), time @ edges[1:])
+    for ax, kind in zip(axes, KINDS):
+        row = _mesh_of(stress, kind, planet)
+        time, cycles = (100 * row[f"load_{name}_share"].values for name in ("time", "cycle"))
+        ax.stairs(time, edges, fill=True, color=BLUE, alpha=0.75, label="share of the time under load")
+        ax.stairs(
+            cycles, edges, color=VERMILION, linewidth=1.8, label="share of the load cycles, by their peak"
+        )
+        counts = zip(kind.split("-"), row["load_cycles"].values)
+        text = ", ".join(f"{name} {float(count):.3g}" for name, count in counts)
+        label(ax, "load of the tooth [N]", title=f"{row['mesh'].item()}; cycles a turn: {text}")
+    axes[0].set_ylim(0.0, 105.0)
+    label(axes[0], y="share [%]")
+    legend_below(figure, columns=2)
+    return figure
+
+
+def planet_bending(stress: xr.Dataset) -> Figure:
+    """Stress in both roots of a tooth of the worst planet while it turns once against the carrier.
+
+    Parameters
+    ----------
+    stress : xarray.Dataset
+        With ``planet_root_stress`` [Pa] (mesh, turn).
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = new_figure()
+    values = stress["planet_root_stress"].values * 1e-6
+    planets = len(values) // 2
+    worst = int(np.ptp(values, axis=1).argmax()) % planets
+    lines = ((worst, VERMILION, "-", "sun side"), (worst + planets, BLUE, "--", "ring side"))
+    for row, colour, dash, side in lines:
+        text = f"root of the {side} flank: {values[row].min():.4g} to {values[row].max():.4g} MPa"
+        ax.plot(stress["turn"].values, values[row], dash, color=colour, label=text)
+    ax.axhline(0.0, color="0.4", linewidth=0.8)
+    label(ax, "turns since the pitch point with the sun [1]", "stress [MPa]", f"planet {worst + 1}")
+    legend_below(figure, columns=1)
+    return figure
+
+
+def _mesh_of(stress: xr.Dataset, kind: str, planet: int) -> xr.Dataset:
+    """The mesh of a kind on a planet (from 0)."""
+    names = [str(name) for name in stress["mesh"].values]
+    return stress.isel(mesh=[i for i, name in enumerate(names) if family(name) == kind][planet])
+
+
+def _worst_planet(stress: xr.Dataset, *measures: np.ndarray) -> int:
+    """Planet (from 0) whose meshes have the largest of a measure (mesh,); the next measure decides ties."""
+    kinds = [family(str(name)) for name in stress["mesh"].values]
+    of_planets = [
+        np.max([measure[[kind == wanted for kind in kinds]] for wanted in KINDS], axis=0)
+        for measure in measures
+    ]
+    left = np.arange(len(of_planets[0]))
+    for values in of_planets:
+        known = np.nan_to_num(values[left])
+        # equal planets differ by rounding
+        left = left[known >= known.max() - 1e-6 * np.abs(known).max()]
+    return int(left[0])
+
+
+def _nominal(ax, row: xr.Dataset, name: str, text: str) -> None:
+    """Line at a nominal stress, where it is known."""
+    if name in row and np.isfinite(row[name].item()) and row[name].item() > 0.0:
+        ax.axhline(row[name].item() * 1e-6, color=BLACK, linewidth=1.2, linestyle="-.", label=text)
+
+
+def _four_gears(stress: xr.Dataset):
+    """Title, rows and whether it is internal, of sun, planet on both sides, and ring."""
+    tension = stress["root_tension"].max([dim for dim in stress["root_tension"].dims if dim != "mesh"])
+    n = _worst_planet(stress, tension.values)
+    sides = (
+        ("sun", f"planet {n + 1}, sun side"),
+        (f"planet {n + 1}, ring side", "ring"),
+    )
+    for kind, titles in zip(KINDS, sides):
+        for gear, title in enumerate(titles):
+            yield title, _mesh_of(stress, kind, n).isel(gear=gear), title == "ring"
+
+
+def _crossing(slope, arc, angle) -> float | None:
+    """First place at which the slope passes an angle; None when it does not."""
+    above = np.flatnonzero((slope[:-1] < angle) & (slope[1:] >= angle))
+    if not len(above):
+        return None
+    i = above[0]
+    return float(arc[i] + (arc[i + 1] - arc[i]) * (angle - slope[i]) / (slope[i + 1] - slope[i]))
+
+
+def has_profiles(deviations: SetDeviations, planetary_set: PlanetarySet) -> bool:
+    """Whether any loaded flank differs from its involute, so that `profile_chart` shows something."""
+    d, s = deviations, planetary_set
+    forms = ((d.sun, s.sun), (d.planet_sun_side, s.planet), (d.planet_ring_side, s.planet), (d.ring, s.ring))
+    return any(form_deviation(form, gear, _stations(form, gear)).any() for form, gear in forms)
+
+
+def has_pitches(deviations: SetDeviations) -> bool:
+    """Whether any tooth stands off its place, so that `pitch_chart` shows something."""
+    d = deviations
+    return any(p.any() for p in (d.sun_pitch, d.planet_pitch, d.planet_ring_side_pitch, d.ring_pitch))
+
+
+def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
+    """Profiles of the four kinds of loaded flanks over the roll angle, positive with more material.
+
+    Parameters
+    ----------
+    deviations : SetDeviations
+    planetary_set : PlanetarySet
+
+    Returns
+    -------
+    Figure
+        The involute is the zero line; the part that meets the mate is marked.
+    """
+    d, s = deviations, planetary_set
+    active = active_rolls(s)
+    flanks = (
+        ("sun", d.sun, s.sun),
+        ("planet, sun side", d.planet_sun_side, s.planet),
+        ("planet, ring side", d.planet_ring_side, s.planet),
+        ("ring", d.ring, s.ring),
+    )
+    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
+    for ax, (name, form, gear), ends in zip(axes, flanks, active):
+        roll = _stations(form, gear)
+        ax.plot(_degrees(gear, roll), -1e6 * form_deviation(form, gear, roll), color=BLUE, label="profile")
+        ax.axhline(0.0, color=BLACK, linewidth=0.8, label="involute")
+        ax.axvspan(*_degrees(gear, np.array(ends)), color="0.93", label="meets the mate")
+        for place, roll_length, dash in (
+            ("form circle", gear.form_roll, ":"),
+            ("tip circle", gear.tip_roll, "--"),
+        ):
+            ax.axvline(float(_degrees(gear, roll_length)), color=GREY, linestyle=dash, label=place)
+        label(ax, "roll angle [deg]", title=name)
+    for ax in axes[::2]:
+        label(ax, y="deviation [µm], material positive")
+    low, high = axes[0].get_ylim()
+    axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
+    legend_below(figure, columns=5)
+    return figure
+
+
+def pitch_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
+    """Cumulative pitch deviations of the loaded flanks over the tooth number, positive with more material.
+
+    Parameters
+    ----------
+    deviations : SetDeviations
+    planetary_set : PlanetarySet
+
+    Returns
+    -------
+    Figure
+        Along the line of action; a line for each planet and flank that has any.
+    """
+    d, N = deviations, planetary_set.n_planets
+    rows = (
+        ("sun", [("sun", d.sun_pitch)]),
+        ("planets, sun side", [(f"planet {n + 1}", d.planet_pitch[n]) for n in range(N)]),
+        ("planets, ring side", [(f"planet {n + 1}", d.planet_ring_side_pitch[n]) for n in range(N)]),
+        ("ring", [("ring", d.ring_pitch)]),
+    )
+    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
+    for ax, (title, lines) in zip(axes, rows):
+        for i, (name, values) in enumerate(lines):
+            # sun, ring and planets differ in the common legend
+            style = line_style(i if len(lines) > 1 else N + (title == "ring"))
+            ax.step(np.arange(len(values)), -1e6 * values, where="mid", label=name, **style)
+        label(ax, "tooth number [1]", title=title)
+    for ax in axes[::2]:
+        label(ax, y="deviation [µm], material positive")
+    low, high = axes[0].get_ylim()
+    axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
+    legend_below(figure, columns=5)
+    return figure
+
+
+def active_rolls(planetary_set: PlanetarySet) -> tuple[tuple[float, float], ...]:
+    """Roll lengths [m] of the parts of the flanks that rigid gears use: sun, planet twice, ring.
+
+    From the path of contact: ``r_b tan(alpha_w)`` and the path coordinate, which runs down the flank of a
+    driven external gear.
+    """
+    s = planetary_set
+    sun_side, ring_side = (
+        math.tan(s.working_pressure_angle_sun_planet),
+        math.tan(s.working_pressure_angle_planet_ring),
+    )
+    (a, b), (c, e) = s.path_sun_planet, s.path_planet_ring
+    planet = s.planet.base_radius
+    return (
+        (s.sun.base_radius * sun_side + a, s.sun.base_radius * sun_side + b),
+        (planet * sun_side - b, planet * sun_side - a),
+        (planet * ring_side + c, planet * ring_side + e),
+        (s.ring.base_radius * ring_side + c, s.ring.base_radius * ring_side + e),
+    )
+
+
+def _stations(form, gear: Gear) -> np.ndarray:
+    """Roll lengths close enough for curves, the corners of all laws and the measured points among them."""
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    corners = [getattr(m, "roll", None) or (m.start, m.end) for m in form.modifications]
+    extra = [roll for pair in corners for roll in pair if roll is not None and low < roll < high]
+    return np.unique(np.concatenate([np.linspace(low, high, 301), extra]))
+
+
+def _degrees(gear: Gear, roll):
+    return np.degrees(np.asarray(roll) / gear.base_radius)
+
+
+_CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 121))
+_MARKS = {"rotational": ("o", BLUE), "translational": ("^", VERMILION), "planet": ("s", BLACK)}
+
+
+def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 4)) -> Figure:
+    """Phases of sun and ring meshes as hands of a dial at every planet, one picture a harmonic.
+
+    Parameters
+    ----------
+    phasing : MeshPhasing
+    harmonics : sequence of int
+        A hand upwards has phase zero; phase grows counter-clockwise.
+
+    Returns
+    -------
+    Figure
+    """
+    table, factors = phasing_table(phasing, list(harmonics)), phase_factors(phasing, list(harmonics))
+    columns = min(4, len(harmonics))
+    rows = -(-len(harmonics) // columns)
+    figure, axes = new_figure(rows=rows, columns=columns, width=2.9 * columns, height=3.4 * rows + 0.5)
+    centres = np.exp(1j * phasing.planet_angles)
+    nearest = np.abs(np.diff([*centres, centres[0]])).min() if phasing.n_planets > 1 else 1.0
+    dial = min(0.44 * nearest, 0.42)
+    for ax in axes:
+        ax.set_axis_off()
+        ax.set_aspect("equal")
+    for h, (ax, row) in enumerate(zip(axes, factors)):
+        ax.plot(_CIRCLE.real, _CIRCLE.imag, color="0.85", linewidth=1.0)
+        for n, centre in enumerate(centres):
+            ax.plot(*_xy(centre + dial * _CIRCLE), color=GREY, linewidth=1.0)
+            number = centre * (1.0 + 1.35 * dial)
+            ax.text(*_xy(number), str(n + 1), ha="center", va="center", fontsize=SIZE - 2)
+            ends = centre + 0.9j * dial * row[[n, phasing.n_planets + n]]
+            ax.plot(*_xy(np.array([centre, ends[0]])), color=BLUE, linewidth=3.6, label="sun mesh")
+            ax.plot(*_xy(np.array([centre, ends[1]])), color=ORANGE, linewidth=1.6, label="ring mesh")
+        ax.text(0.0, 0.0, _verdict(table, h), ha="center", va="center", fontsize=SIZE - 2)
+        ax.set_title(f"harmonic {table.harmonics[h]}: {table.kind[h]}", fontsize=SIZE - 1)
+        ax.set_xlim(-1.05 - 1.6 * dial, 1.05 + 1.6 * dial)
+        ax.set_ylim(-1.05 - 1.6 * dial, 1.05 + 1.6 * dial)
+    legend_below(figure, columns=2)
+    return figure
+
+
+def _verdict(table: PhasingTable, row: int) -> str:
+    """What is left of the mesh forces on sun and ring."""
+    torque, lateral = table.members[row, :2, :2].max(axis=0)
+    left = [
+        f"{name} {100 * size:.0f} %"
+        for name, size in (("torque", torque), ("lateral", lateral))
+        if size > 1e-9
+    ]
+    return "\n".join(left) or "nothing on\nsun and ring"
+
+
+def resultant_chart(tables: Mapping[str, PhasingTable]) -> Figure:
+    """Resultants that are left and kinds of modes excited, harmonic by harmonic, one picture a set.
+
+    The counterpart of Fig. 4 of A. Kahraman (J. Mech. Des. 116, 1994, 713-720); the area of a mark is the
+    share of the mesh forces.
+
+    Parameters
+    ----------
+    tables : mapping of str to PhasingTable
+        Titles and sets.
+
+    Returns
+    -------
+    Figure
+    """
+    count = len(tables)
+    columns = min(4, count)
+    rows = -(-count // columns)
+    tall = max(len(table.harmonics) for table in tables.values())
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=3.0 * columns, height=(0.42 * tall + 1.9) * rows + 0.4
+    )
+    names = ("torque, thrust", "lateral force, tilting", *(f"{name} modes" for name in MODES))
+    for ax in axes[count:]:
+        ax.set_visible(False)
+    for ax, (title, table) in zip(axes, tables.items()):
+        shares = np.column_stack(
+            [table.members[..., 0].max(axis=1), table.members[..., 1].max(axis=1), table.modes]
+        )
+        for column, values in enumerate(shares.T):
+            marker, colour = ("D", GREY) if column < 2 else _MARKS[MODES[column - 2]]
+            there = np.flatnonzero(values > 1e-9)
+            place = np.full(len(there), column)
+            ax.scatter(
+                place, table.harmonics[there], s=130 * values[there], color=colour, marker=marker, zorder=3
+            )
+            text = "resultant" if column < 2 else names[column]
+            ax.plot([], [], marker, color=colour, label=text)
+        ax.axvline(1.5, color="0.6", linewidth=1.0)
+        ax.set_xticks(range(5), names, rotation=40, ha="right", fontsize=SIZE - 2)
+        ax.set_yticks(table.harmonics)
+        ax.set_xlim(-0.6, 4.6)
+        ax.set_ylim(table.harmonics[-1] + 0.6, table.harmonics[0] - 0.6)
+        label(ax, y="harmonic of the mesh frequency [1]", title=title)
+    legend_below(figure, columns=4)
+    return figure
+
+
+def mesh_force_spectra(
+    frequency,
+    forces: Mapping[str, np.ndarray],
+    *,
+    modes: Mapping[str, np.ndarray] | None = None,
+    meshes: Sequence[str] = ("sun-planet 1",),
+) -> Figure:
+    """Mesh forces over the frequency of each harmonic, one picture a set.
+
+    The counterpart of Fig. 6 of A. Kahraman (J. Mech. Des. 116, 1994, 713-720).
+
+    Parameters
+    ----------
+    frequency : (F,) array
+        Of the harmonic itself, h times the mesh frequency [Hz].
+    forces : mapping of str to (H, F, n) array
+        Titles, and amplitudes [N] of harmonics 1 to H at the meshes drawn.
+    modes : mapping of str to (m,) array, optional
+        Natural frequencies [Hz] by kind, for marks along the axis.
+    meshes : sequence of str
+        Names of the n meshes; the second and further ones are drawn where they differ from the first.
+
+    Returns
+    -------
+    Figure
+    """
+    columns = 2 if len(forces) > 1 else 1
+    rows = -(-len(forces) // columns)
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=5.4 * columns, height=3.3 * rows + 0.8, sharex=True, sharey=True
+    )
+    hertz, top = np.asarray(frequency) * 1e-3, max(np.abs(f).max() for f in forces.values())
+    for ax in axes[len(forces) :]:
+        ax.set_visible(False)
+    for ax, (title, force) in zip(axes, forces.items()):
+        size = np.abs(force)
+        for h in range(len(size)):
+            for j, name in enumerate(meshes):
+                if j and np.abs(size[h, :, j] - size[h, :, 0]).max() < 1e-6 * top:
+                    continue
+                # wide below narrow: lines that coincide are all seen
+                text = f"harmonic {h + 1}, {name}"
+                ax.plot(hertz, size[h, :, j], DASHES[j % 4], color=COLOURS[h % 7], label=text,
+                        linewidth=4.5 - 1.2 * min(h, 3), zorder=2 + h)  # fmt: skip
+        for kind, values in (modes or {}).items():
+            marker, colour = _MARKS.get(kind, ("x", GREY))
+            ax.plot(np.asarray(values) * 1e-3, np.full(len(values), -0.05 * top), marker, color=colour,
+                    markersize=5, label=f"{kind} modes", clip_on=False)  # fmt: skip
+        ax.set_ylim(-0.09 * top, 1.05 * top)
+        label(ax, title=title)
+    for ax in axes[-columns:]:
+        label(ax, x="frequency of the harmonic [kHz]")
+    for ax in axes[::columns]:
+        label(ax, y="mesh force [N]")
+    legend_below(figure, columns=4)
+    return figure
+
+
+def _xy(points):
+    return np.real(points), np.imag(points)

@@ -1,0 +1,564 @@
+"""Contents of stress.nc: root stresses, pressures and load spectra, every variable with its units.
+
+The table of stresses: finite elements beside ISO 6336.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case.dependencies import Entries
+from femgear.contact.root_stress import BACK, LOADED, RootCycle, worst_history
+from femgear.report.tables import Block
+from femgear.storage.dataset import dataset
+from femgear.trains.static.checks import static_warnings
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.contact.assembly import Bodies
+    from femgear.contact.bodies import Sectors
+    from femgear.contact.cycle import MeshCycle
+    from femgear.contact.load_spectrum import LoadSpectrum, RootRange
+    from femgear.contact.root_stress import RootStresses
+    from femgear.gears.planetary import PlanetarySet
+
+
+@dataclass(frozen=True)
+class StaticResult:
+    """Static transmission error, load sharing and mesh stiffness of all meshes.
+
+    ``entries`` are those of the case that it depends on, as in the results that follow.
+    """
+
+    planetary_set: PlanetarySet
+    sectors: Sectors
+    bodies: Bodies
+    cycle: MeshCycle
+    sun_torque: float
+    entries: Entries
+    period_message: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What an engineer should not overlook in this result."""
+        return static_warnings(self.cycle, self.planetary_set.sun.module)
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of static.nc."""
+
+        return static_dataset(self)
+
+
+@dataclass(frozen=True)
+class NominalStresses:
+    """Nominal stresses after ISO 6336 with equal load on all planets and no load factors.
+
+    Parameters
+    ----------
+    contact : (2,) array
+        sigma_H0 of sun-planet and planet-ring [Pa] (ISO 6336-2, method B).
+    root : (2, 2) array
+        sigma_F0 of gear 1 and gear 2 of both [Pa] (ISO 6336-3, method B).
+    message : str
+        Why a value is NaN: gears outside the range of the method; otherwise empty.
+    """
+
+    contact: np.ndarray
+    root: np.ndarray
+    message: str
+
+
+@dataclass(frozen=True)
+class StressResult:
+    """Stresses of all meshes and gears over the mesh cycle.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    cycle : MeshCycle
+        The static solution that it belongs to.
+    influences : RootStresses
+    roots : tuple of RootCycle
+        Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on; of records beyond `WHOLE_RECORD` mesh periods
+        those periods in which the worst tooth of that gear passes the mesh.
+    first_period : (4N,) int array
+        Mesh period of the record with which each of `roots` begins.
+    ranges : tuple of RootRange
+        In the same order.
+    spectrum : LoadSpectrum
+    nominal : NominalStresses
+    sun_torque : float
+        [N m]
+    closes : bool
+        Whether the record repeats after its end. Where it does not, a tooth that the end of the record cuts
+        off is followed on from the beginning of the record.
+    """
+
+    planetary_set: PlanetarySet
+    cycle: MeshCycle
+    influences: RootStresses
+    roots: tuple[RootCycle, ...]
+    first_period: np.ndarray
+    ranges: tuple[RootRange, ...]
+    spectrum: LoadSpectrum
+    nominal: NominalStresses
+    sun_torque: float
+    closes: bool
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of stress.nc."""
+
+        return stress_dataset(self)
+
+
+def static_dataset(result: StaticResult) -> xr.Dataset:
+    """Contents of static.nc."""
+    cycle, gears = result.cycle, result.planetary_set
+    mesh_position = ("mesh", "position")
+    teeth = cycle.tooth_load.shape[1]
+    variables = {
+        "ste": (mesh_position, cycle.deflection, "m", "static transmission error of the mesh"),
+        "ste_overall": (
+            ("planet", "position"),
+            cycle.overall_deflection,
+            "m",
+            "static transmission error from sun to ring",
+        ),
+        "mesh_force": (mesh_position, cycle.force, "N", "mesh force along the line of action"),
+        "back_force": (mesh_position, cycle.back_force, "N", "force on the back flanks of the mesh"),
+        "member_motion": (
+            ("member", "position"),
+            cycle.member_motion,
+            "m",
+            "displacement of the axis of a member that moves",
+        ),
+        "bearing_force": (
+            ("planet", "axis", "position"),
+            cycle.bearing_force,
+            "N",
+            "force of the pin on the planet in the frame of the carrier",
+        ),
+        "mesh_stiffness": (mesh_position, cycle.stiffness, "N/m", "tangent mesh stiffness"),
+        "mesh_stiffness_secant": (mesh_position, cycle.secant_stiffness, "N/m", "secant mesh stiffness"),
+        "tooth_load": (("mesh", "tooth", "position"), cycle.tooth_load, "N", "load of a tooth pair"),
+        "back_tooth_load": (
+            ("mesh", "tooth", "position"),
+            cycle.back_tooth_load,
+            "N",
+            "load of a tooth pair on its back flanks",
+        ),
+        "load_share": (("planet", "position"), cycle.load_share, "1", "share of the planet in the torque"),
+        "max_pressure": (
+            mesh_position,
+            cycle.max_pressure,
+            "Pa",
+            "largest contact pressure away from flank ends",
+        ),
+        "edge_contact": (
+            mesh_position,
+            cycle.edge_contact,
+            "1",
+            "whether a contact reaches the end of a flank",
+        ),
+        "residual": (("position",), cycle.residual, "1", "residual of contact conditions and equilibrium"),
+        "iterations": (("position",), cycle.iterations, "1", "steps of the active set"),
+    }
+    return dataset(
+        variables,
+        coords={
+            "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
+            "position": (("position",), cycle.position, "1", "position in mesh periods"),
+            "planet": (("planet",), np.arange(1, gears.n_planets + 1), "1", "planet"),
+            "axis": (("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
+            "member": (("member",), list(cycle.member_names), "1", "moving member and direction"),
+            "tooth": (("tooth",), np.arange(teeth), "1", "tooth pair in the order of the path"),
+        },
+        attrs={
+            "title": "static transmission error, load sharing and mesh stiffness",
+            "contact_ratio_sun_planet": gears.contact_ratio_sun_planet,
+            "contact_ratio_planet_ring": gears.contact_ratio_planet_ring,
+            "working_pressure_angle_sun_planet": gears.working_pressure_angle_sun_planet,
+            "working_pressure_angle_planet_ring": gears.working_pressure_angle_planet_ring,
+            "mesh_phases": np.asarray(gears.mesh_phases),
+            "planet_angles": np.asarray(gears.planet_angles),
+            "centre_distance": gears.centre_distance,
+            "face_width": gears.sun.face_width,
+            "teeth": np.array([gears.sun.teeth, gears.planet.teeth, gears.ring.teeth]),
+            "sun_torque": result.sun_torque,
+            "contact": cycle.contact,
+            "mesh_periods": cycle.periods,
+            "period": result.period_message,
+            "pressure_cells": cycle.unknowns,
+            "unknowns": np.array(
+                [b.unknowns for b in (result.bodies.sun, result.bodies.planet, result.bodies.ring)]
+            ),
+            "message": cycle.message,
+            "warnings": " ".join(result.warnings),
+        },
+    )
+
+
+COUNTING = (
+    "one load cycle an engagement, from zero to the largest load of the tooth (peak counting between "
+    "crossings of zero, ASTM E1049)"
+)
+
+
+def stress_dataset(result: StressResult) -> xr.Dataset:
+    """Contents of stress.nc: `root_stress_dataset`, and the rest of a `StressResult`."""
+    cycle, edges = result.cycle, result.spectrum.edges
+    entries = {
+        **_worst_entries(result),
+        **_range_entries(result),
+        **_pressure_entries(cycle),
+        **_load_entries(result.spectrum),
+        **_nominal_entries(result),
+    }
+    data = root_stress_dataset(result.roots, result.planetary_set.mesh_names)
+    data = data.assign({name: _variable(*entry) for name, entry in entries.items()})
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    coordinates = {
+        "position": _variable(("position",), cycle.position, "1", "position in mesh periods"),
+        "load_bin": _variable(("load_bin",), middle, "N", "middle of the load class"),
+    }
+    if "turn" in data.dims:
+        n = data.sizes["turn"]
+        words = "turns of the planet against the carrier since the pitch point with the sun"
+        coordinates["turn"] = _variable(("turn",), (np.arange(n) - n // 4) / n, "1", words)
+    attributes = {
+        "title": "root stresses, contact pressures and load spectra",
+        "sun_torque": result.sun_torque,
+        "mesh_periods": cycle.periods,
+        "repeats": int(result.closes),
+        "load_counting": COUNTING,
+        "iso": result.nominal.message,
+    }
+    return data.assign_coords(coordinates).assign_attrs(attributes)
+
+
+def _load_entries(spectrum: LoadSpectrum) -> dict:
+    """Load classes, and how often the teeth of every mesh are in them."""
+    by_class = ("mesh", "load_bin")
+    words = {
+        "time": "share of the time under load that a tooth spends in the load class",
+        "cycle": "share of the load cycles whose largest load lies in the load class",
+        "cycles": "load cycles of this flank of a tooth per turn of the gear against the carrier",
+    }
+    return {
+        "load_bin_low": (("load_bin",), spectrum.edges[:-1], "N", "lower limit of the load class"),
+        "load_bin_high": (("load_bin",), spectrum.edges[1:], "N", "upper limit of the load class"),
+        "load_time_share": (by_class, spectrum.time, "1", words["time"]),
+        "load_cycle_share": (by_class, spectrum.engagements, "1", words["cycle"]),
+        "load_cycles": (("mesh", "gear"), spectrum.cycles, "1", words["cycles"]),
+        "loaded_contact_ratio": (("mesh",), spectrum.duration, "1", "mesh periods a tooth pair is loaded"),
+    }
+
+
+def _nominal_entries(result: StressResult) -> dict:
+    """Nominal stresses of both kinds of mesh, repeated for every planet."""
+    nominal, N = result.nominal, result.planetary_set.n_planets
+    contact, root = np.repeat(nominal.contact, N), np.repeat(nominal.root, N, axis=0)
+    return {
+        "iso_contact_stress": (("mesh",), contact, "Pa", "nominal contact stress sigma_H0, ISO 6336-2"),
+        "iso_root_stress": (
+            ("mesh", "gear"),
+            root,
+            "Pa",
+            "nominal root stress sigma_F0, ISO 6336-3 method B",
+        ),
+    }
+
+
+def _variable(dims, values, units, long_name):
+    return dims, np.asarray(values), {"units": units, "long_name": long_name}
+
+
+def _worst_entries(result: StressResult) -> dict:
+    """Largest stress in the root of the loaded flank of every gear in every mesh, and where it is."""
+    rows = []
+    each = len(result.cycle.position) // result.cycle.periods
+    for root, first in zip(result.roots, result.first_period, strict=True):
+        slot, position, point = root.worst
+        record = (first * each + position) % len(result.cycle.position)
+        place = root.arc[point], root.slope[point]
+        rows.append(
+            (root.tension[slot, position], *place, result.cycle.position[record], root.path[slot, position])
+        )
+    values = np.array(rows).reshape(-1, 2, 5)
+    words = {
+        "root_worst": ("Pa", "largest stress in the root of the loaded flank"),
+        "root_worst_arc": ("m", "its arc length from the end of the flank"),
+        "root_worst_slope": ("rad", "its angle of the root to the centreline of the tooth"),
+        "root_worst_position": ("1", "its position in mesh periods"),
+        "root_worst_path": ("1", "its path from the pitch point in base pitches"),
+    }
+    return {name: (("mesh", "gear"), values[..., i], *words[name]) for i, name in enumerate(words)}
+
+
+def _range_entries(result: StressResult) -> dict:
+    """Stress ranges over a turn, of single teeth where they differ, and the history of the planets' roots."""
+    ranges, by_gear = result.ranges, ("mesh", "gear")
+
+    def table(values):
+        values = np.array(values)
+        return values.reshape(-1, 2, *values.shape[1:])
+
+    arcs = [root.arc[one.point] for root, one in zip(result.roots, ranges, strict=True)]
+    entries = {
+        "root_range_maximum": (
+            by_gear,
+            table([one.maximum for one in ranges]),
+            "Pa",
+            "largest stress over a turn at the point of the root with the widest range",
+        ),
+        "root_range_minimum": (
+            by_gear,
+            table([one.minimum for one in ranges]),
+            "Pa",
+            "smallest stress there",
+        ),
+        "root_range_arc": (by_gear, table(arcs), "m", "arc length of that point from the end of the flank"),
+    }
+    planets = [one.history for one in ranges if one.kind == "planet"]
+    if planets[0] is not None:
+        words = "stress over a turn at the point of the planet's root with the widest range"
+        entries["planet_root_stress"] = (("mesh", "turn"), np.array(planets), "Pa", words)
+    if result.cycle.periods > 1:
+        longest = max(len(one.tooth_maximum) for one in ranges)
+        for name, words in (("maximum", "largest"), ("minimum", "smallest")):
+            rows = [getattr(one, f"tooth_{name}") for one in ranges]
+            padded = [np.pad(row, (0, longest - len(row)), constant_values=np.nan) for row in rows]
+            long_name = f"{words} stress of every tooth at the point of its root with the widest range"
+            entries[f"tooth_root_{name}"] = (("mesh", "gear", "tooth"), table(padded), "Pa", long_name)
+    return entries
+
+
+def _pressure_entries(cycle) -> dict:
+    """Largest pressures, and the distributions where the cycle has them."""
+    largest = "largest contact pressure away from flank ends"
+    entries = {"contact_pressure": (("mesh", "position"), cycle.max_pressure, "Pa", largest)}
+    if cycle.pressure is None:
+        return entries
+    by_pair = ("mesh", "pair", "position")
+    return entries | {
+        "pressure_distribution": (
+            ("mesh", "pair", "cell", "position"),
+            cycle.pressure,
+            "Pa",
+            "contact pressure in the cells of a tooth pair",
+        ),
+        "pressure_offset": (
+            ("mesh", "cell"),
+            cycle.pressure_offset,
+            "m",
+            "place of a cell along the common tangent from the middle of its window",
+        ),
+        "pressure_centre": (by_pair, cycle.pressure_centre, "m", "middle of the window from the path point"),
+        "pressure_path": (by_pair, cycle.path, "m", "path of the tooth pair from the pitch point"),
+    }
+
+
+def root_stress_dataset(roots: tuple[RootCycle, ...], mesh_names) -> xr.Dataset:
+    """Root stresses as they are stored and drawn.
+
+    Parameters
+    ----------
+    roots : tuple of RootCycle
+        As `root_stress_cycle` gives them.
+    mesh_names : sequence of str
+        Label of each mesh.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``root_tension`` and ``root_compression`` (mesh, gear, step) [Pa]: extremes along the root of the
+        loaded and of the back flank of one tooth on its way through the mesh, with ``root_path`` [1] and
+        ``root_load`` [N]; ``root_profile`` (mesh, gear, root, point) [Pa] along both roots when the tension
+        is largest, with ``root_arc`` [m] and ``root_slope`` [rad] (mesh, gear, point). The tooth is the one
+        with the largest stress. Points that a root does not have are NaN.
+    """
+    import xarray as xr
+
+    variables = {
+        "root_tension": ("mesh gear step", "Pa", "largest stress in the root of the loaded flank"),
+        "root_compression": ("mesh gear step", "Pa", "lowest stress in the root of the back flank"),
+        "root_path": ("mesh gear step", "1", "path from the pitch point in base pitches"),
+        "root_load": ("mesh gear step", "N", "load of the tooth pair"),
+        "root_profile": ("mesh gear root point", "Pa", "stress along the root at the largest tension"),
+        "root_arc": ("mesh gear point", "m", "arc length from the end of the flank"),
+        "root_slope": ("mesh gear point", "rad", "angle of the root to the centreline of the tooth"),
+    }
+    points = max(len(root.arc) for root in roots)
+    rows = [_row(root, points) for root in roots]
+    data = {}
+    for name, (dims, units, words) in variables.items():
+        values = np.array([row[name] for row in rows])
+        values = values.reshape(len(mesh_names), 2, *values.shape[1:])
+        data[name] = (tuple(dims.split()), values, {"units": units, "long_name": words})
+    return xr.Dataset(
+        data,
+        coords={
+            "mesh": ("mesh", list(mesh_names), {"units": "1", "long_name": "gear mesh"}),
+            "gear": ("gear", ["first", "second"], {"units": "1", "long_name": "gear of the mesh"}),
+            "root": ("root", ["loaded", "back"], {"units": "1", "long_name": "flank above the root"}),
+        },
+        attrs={"title": "root stresses over the mesh cycle"},
+    )
+
+
+def _row(root: RootCycle, points: int) -> dict[str, np.ndarray]:
+    """Variables of one gear of one mesh, points padded with NaN."""
+    slot, position, _ = root.worst
+    history = worst_history(root)
+
+    def padded(values):
+        missing = [(0, 0)] * (values.ndim - 1) + [(0, points - values.shape[-1])]
+        return np.pad(values, missing, constant_values=np.nan)
+
+    return {
+        "root_tension": history.stress[:, LOADED].max(axis=-1),
+        "root_compression": history.stress[:, BACK].min(axis=-1),
+        "root_path": history.path,
+        "root_load": history.load,
+        "root_profile": padded(root.stress[slot, position]),
+        "root_arc": padded(root.arc),
+        "root_slope": padded(root.slope),
+    }
+
+
+def describe_stress(data: xr.Dataset) -> Block:
+    """Largest stresses of all meshes beside the nominal ones, with place and range.
+
+    Parameters
+    ----------
+    data : Dataset
+        Contents of stress.nc.
+
+    Returns
+    -------
+    Block
+        One row for the contact and one for the root of every kind of gear, each of its worst mesh.
+    """
+    names = [str(name) for name in data["mesh"].values]
+    kinds = {"sun-planet": ("sun", "planet, sun side"), "planet-ring": ("planet, ring side", "ring")}
+    contact, roots = [], []
+    for kind, titles in kinds.items():
+        meshes = [i for i, name in enumerate(names) if ("ring" in name) == (kind == "planet-ring")]
+        contact.append(_contact_row(kind, data.isel(mesh=meshes)))
+        roots += [_root_row(title, data.isel(mesh=meshes, gear=g)) for g, title in enumerate(titles)]
+    header = (
+        "[MPa]",
+        "FE",
+        "ISO 6336",
+        "FE/ISO",
+        "position",
+        "arc [mm]",
+        "tangent [°]",
+        "range",
+        "cycles",
+    )
+    return Block("Stresses", header, (*contact, *roots), _notes(data))
+
+
+def _notes(data: xr.Dataset) -> tuple[str, ...]:
+    notes = [
+        "ISO 6336: nominal stresses sigma_H0 and sigma_F0 (method B) with equal load on all planets and no "
+        "load factors; FE: largest contact pressure away from flank ends, and largest tension in the root",
+        "position in mesh periods; arc from the end of the flank, tangent to the centreline of the tooth; "
+        "range: smallest to largest stress at the root point where they differ most, while the gear turns "
+        "once against the carrier; cycles: load cycles of the flank in that turn",
+    ]
+    if data.attrs.get("iso"):
+        notes.append(f"outside the range of ISO 6336: {data.attrs['iso']}")
+    if not data.attrs.get("repeats", 1):
+        notes.append("the record does not repeat: stress ranges are those that it shows")
+    return tuple(notes)
+
+
+def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:
+    pressure = data["contact_pressure"].values
+    mesh, position = np.unravel_index(pressure.argmax(), pressure.shape)
+    found, nominal = float(pressure[mesh, position]), float(data["iso_contact_stress"][mesh])
+    place = f"{float(data['position'][position]):.3f}" if found else "-"
+    return (f"contact {kind}", *_compared(found, nominal), place, *["-"] * 4)
+
+
+def _root_row(title: str, data: xr.Dataset) -> tuple[str, ...]:
+    mesh = int(data["root_worst"].values.argmax())
+    one = data.isel(mesh=mesh)
+    found = float(one["root_worst"])
+    low, high = (float(one[f"root_range_{name}"]) for name in ("minimum", "maximum"))
+    place = ["-"] * 3
+    if found:
+        place = [
+            f"{float(one['root_worst_position']):.3f}",
+            f"{float(one['root_worst_arc']) * 1e3:.3f}",
+            f"{np.degrees(float(one['root_worst_slope'])):.1f}",
+        ]
+    return (
+        f"root {title}",
+        *_compared(found, float(one["iso_root_stress"])),
+        *place,
+        f"{low * 1e-6:.1f} to {high * 1e-6:.1f}",
+        f"{float(one['load_cycles']):g}",
+    )
+
+
+def _compared(found: float, nominal: float) -> tuple[str, str, str]:
+    """Both values in MPa and their ratio; a dash where there is none."""
+    known = np.isfinite(nominal)
+    ratio = f"{found / nominal:.2f}" if known and nominal else "-"
+    return f"{found * 1e-6:.1f}", f"{nominal * 1e-6:.1f}" if known else "-", ratio
+
+
+def _static(data: xr.Dataset) -> Block:
+    rows = []
+    for mesh in data.mesh.values:
+        one = data.sel(mesh=mesh)
+        ste = one.ste.values
+        rows.append(
+            (
+                str(mesh),
+                f"{ste.mean() * 1e6:.4f}",
+                f"{np.ptp(ste) * 1e6:.4f}",
+                f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
+                f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
+                f"{one.mesh_force.values.mean():.3f}",
+                f"{one.max_pressure.values.max() / 1e6:.1f}" if one.max_pressure.values.any() else "-",
+            )
+        )
+    share = data.load_share.values
+    header = (
+        "mesh",
+        "STE mean [um]",
+        "STE p-p [um]",
+        "k mean [N/um]",
+        "k p-p [N/um]",
+        "force [N]",
+        "p max [MPa]",
+    )
+    notes = [
+        f"load share of a planet {share.min():.4f} to {share.max():.4f} "
+        f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
+    ]
+    notes += _stiffness_notes(elastic=data.sizes.get("member", 0) > 0)
+    if data.attrs.get("mesh_periods", 1) > 1:
+        notes.append(str(data.attrs["period"]))
+    if warnings := str(data.attrs.get("warnings", "")):
+        notes += [f"[{text.strip()}" for text in warnings.split("[") if text]
+    return Block("Static", header, tuple(rows), tuple(notes))
+
+
+def _stiffness_notes(*, elastic: bool) -> list[str]:
+    """What the columns k and STE of the static table contain."""
+    held = "k: tangent stiffness dF/dx of teeth and bodies"
+    if not elastic:
+        return [f"{held}, held at their bores and at the outer surface of the ring"]
+    return [
+        f"{held}; of planet-ring with the ring on its foundation in series, so that it is no",
+        "stiffness of the teeth alone; the STE contains that and the motion of the members",
+    ]

@@ -1,0 +1,256 @@
+"""Stage "stress": root stresses, contact pressures, load spectra and nominal stresses of a static result."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case.case import planetary_set, set_deviations
+from femgear.case.dependencies import check_entries, static_entries
+from femgear.case.sections import Case
+from femgear.contact.load_spectrum import load_spectrum, loaded_teeth, root_ranges
+from femgear.errors import GeometryError
+from femgear.threads import one_blas_thread
+from femgear.trains.protocol import Progress
+from femgear.trains.static.checks import check_motions
+from femgear.trains.static.results import NominalStresses, StaticResult, StressResult
+
+if TYPE_CHECKING:
+    from femgear.contact.cycle import MeshCycle
+    from femgear.contact.root_stress import RootStresses
+    from femgear.gears.planetary import PlanetarySet
+
+
+@one_blas_thread()
+def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | None = None) -> StaticResult:
+    """Static transmission error, load sharing and mesh stiffness over one mesh period.
+
+    Parameters
+    ----------
+    case : Case
+    cache : path, optional
+        Folder of generated grids.
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    GeometryError, GridError, ContactError
+    """
+    from femgear.contact.bodies import make_bodies, make_sectors
+    from femgear.contact.cycle import walk_either_flank
+    from femgear.fe.elasticity import Material
+    from femgear.gears.deviations import common_period
+    from femgear.gears.kinematics import torques
+
+    gears, deviations = planetary_set(case), set_deviations(case)
+    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
+    foundation = _ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
+    bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
+    sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
+    periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
+    cycle = walk_either_flank(
+        gears,
+        bodies,
+        sun_torque=sun_torque,
+        positions=gears.equal_positions(case.static.positions),
+        contact=case.static.contact,
+        # thickness errors separate the back flanks alone
+        deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
+        supports=_supports(case),
+        periods=periods,
+        both_flanks=case.static.back_flanks,
+        pressures=case.static.stresses and periods == 1,
+        progress=None if progress is None else lambda done, total: progress("contact", done, total),
+    )
+    check_motions(cycle, gears.sun.module)
+    return StaticResult(gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message)
+
+
+def _ring_foundation(case: Case, sector):
+    """Elastic foundation of one sector of the ring [N/m]."""
+    from femgear.fe.elasticity import foundation
+
+    ring, width = case.ring, sector.gear.face_width
+    return foundation(sector.grid, "rim", ring.foundation_radial, ring.foundation_tangential, thickness=width)
+
+
+def _supports(case: Case):
+    """Supports of the static problem: rigid, or those of the case's bodies."""
+    from femgear.contact.supports import RIGID
+
+    return RIGID if case.static.members == "fixed" else _supports_of(case)
+
+
+def _supports_of(case: Case):
+    """Supports of the case's bodies."""
+    from femgear.contact.supports import Supports
+
+    return Supports(
+        sun=case.sun.support_stiffness,
+        carrier=case.carrier.support_stiffness,
+        planet=case.planet.bearing_stiffness,
+        planet_clearance=case.planet.bearing_clearance,
+    )
+
+
+def _backlash(gears: PlanetarySet) -> np.ndarray:
+    n = gears.n_planets
+    return np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], n)
+
+
+# beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
+# would take a quarter of a gigabyte for three planets
+WHOLE_RECORD = 16
+# longer than any record: the true common period of a set
+UNLIMITED = 10**12
+
+
+@one_blas_thread()
+def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None = None) -> StressResult:
+    """Root stresses of every gear in every mesh, stress ranges over a turn, load spectra, nominal stresses.
+
+    The static solution need not have pressures (`StaticResult.cycle.pressure`); where it has, they are part
+    of the result.
+
+    Parameters
+    ----------
+    case : Case
+    static : StaticResult
+        Of that case.
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    GridError
+        When the root of a tooth is not one chain of edges or a body can move freely.
+    """
+    from femgear.gears.deviations import common_period
+
+    check_entries(static.entries, static_entries(case), "static solution")
+    gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
+    influences = _influences(case, static)
+    if progress is not None:
+        progress("stress", 1, 2)
+    repeats, _ = common_period(set_deviations(case), gears, limit=UNLIMITED)
+    closes = repeats == cycle.periods
+    teeth = loaded_teeth(cycle, reverse=reverse)
+    ranges = root_ranges(gears, influences, teeth, closes=closes)
+    roots, first = _root_cycles(gears, influences, cycle, ranges, reverse)
+    return StressResult(
+        planetary_set=gears,
+        cycle=cycle,
+        influences=influences,
+        roots=roots,
+        first_period=first,
+        ranges=ranges,
+        spectrum=load_spectrum(teeth, closes=closes),
+        nominal=nominal_stresses(
+            gears, static.sun_torque, case.material.youngs_modulus, case.material.poisson_ratio
+        ),
+        sun_torque=static.sun_torque,
+        closes=closes,
+    )
+
+
+def _influences(case: Case, static: StaticResult) -> RootStresses:
+    """Root influences of the bodies as the static solution holds them.
+
+    Sun and planet were observed with their flanks; only the ring, whose contact has two plane states, is
+    solved again.
+    """
+    from femgear.contact.root_stress import RootStresses, observed_root_stress, root_stress
+    from femgear.fe.elasticity import Material, foundation
+
+    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    sectors, bodies = static.sectors, static.bodies
+    pairs = (sectors.sun, bodies.sun), (sectors.planet, bodies.planet)
+    sun, planet = (observed_root_stress(sector.gear, flank.root) for sector, flank in pairs)
+    grid, gear = sectors.ring.grid, sectors.ring.gear
+    held, support = "rim", None
+    if case.static.members == "elastic":
+        stiffness = case.ring.foundation_radial, case.ring.foundation_tangential
+        held, support = None, foundation(grid, "rim", *stiffness, thickness=gear.face_width)
+    return RootStresses(sun, planet, root_stress(grid, gear, material, held=held, support=support))
+
+
+def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
+    """Root stress of every gear in every mesh, and the mesh period with which each begins."""
+    from femgear.contact.root_stress import root_stress_cycle
+
+    if cycle.periods <= WHOLE_RECORD:
+        roots = root_stress_cycle(gears, influences, cycle, reverse=reverse)
+        return roots, np.zeros(len(roots), int)
+    each, slots = len(cycle.position) // cycle.periods, cycle.tooth_load.shape[1]
+    # one slot more at either end, and a period before and after
+    length = min(slots + 4, cycle.periods)
+    done, roots, first = {}, [], []
+    for number, one in enumerate(ranges):
+        slot, position = one.worst
+        start = (position // each - slot - 2) % cycle.periods
+        if start not in done:
+            part = _excerpt(cycle, start, length)
+            done[start] = root_stress_cycle(gears, influences, part, reverse=reverse)
+        roots.append(done[start][number])
+        first.append(start)
+    return tuple(roots), np.array(first)
+
+
+def _excerpt(cycle: MeshCycle, start: int, length: int) -> MeshCycle:
+    """Loads of some mesh periods of a cycle; tooth numbers stay those of its first period."""
+    each = len(cycle.position) // cycle.periods
+    take = (start * each + np.arange(length * each)) % len(cycle.position)
+    names = ("tooth_load", "path", "back_tooth_load", "back_path", "back_force")
+    parts = {name: getattr(cycle, name)[..., take] for name in names}
+    return replace(cycle, position=np.arange(len(take)) / each, periods=length, **parts)
+
+
+def nominal_stresses(
+    planetary_set: PlanetarySet, sun_torque: float, youngs_modulus: float, poisson_ratio: float
+) -> NominalStresses:
+    """sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    sun_torque : float
+        Of either sign [N m].
+    youngs_modulus, poisson_ratio : float
+        [Pa, 1]
+    """
+    from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
+
+    s = planetary_set
+    # torque over reference radius: the same at all three gears
+    force = abs(sun_torque) / (s.n_planets * s.sun.reference_radius)
+    contact, root, messages = np.full(2, math.nan), np.full((2, 2), math.nan), []
+    meshes = (
+        (s.sun, s.planet, s.working_pressure_angle_sun_planet, s.contact_ratio_sun_planet),
+        (s.planet, s.ring, s.working_pressure_angle_planet_ring, s.contact_ratio_planet_ring),
+    )
+    for i, (one, two, angle, ratio) in enumerate(meshes):
+        small, large = (one, two) if two.internal or one.teeth <= two.teeth else (two, one)
+        try:
+            contact[i] = nominal_contact_stress(
+                small,
+                large,
+                working_angle=angle,
+                contact_ratio=ratio,
+                tangential_force=force,
+                youngs_modulus=youngs_modulus,
+                poisson_ratio=poisson_ratio,
+            ).stress
+        except GeometryError as error:
+            messages.append(f"{one.name}-{two.name}: {error.message}")
+        for j, gear in enumerate((one, two)):
+            try:
+                root[i, j] = nominal_root_stress(gear, contact_ratio=ratio, tangential_force=force).stress
+            except GeometryError as error:
+                messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
+    return NominalStresses(contact, root, "; ".join(dict.fromkeys(messages)))
