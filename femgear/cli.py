@@ -127,9 +127,10 @@ def check(case: Path, /) -> int:
         TOML case file.
     """
     from femgear.case.case import read_case
-    from femgear.report.summary import describe
+    from femgear.trains.registry import train_of
 
-    _print(describe(read_case(case)))
+    data = read_case(case)
+    _print(train_of(data).describe(data))
     return 0
 
 
@@ -166,16 +167,17 @@ def run(
     from femgear.report.summary import case_warnings, describe_results, result_warnings
     from femgear.run import run_case
     from femgear.storage.results import open_results, run_folder
-    from femgear.trains.registry import check_case
+    from femgear.trains.registry import check_case, train_of
 
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
-    _warn(case_warnings(data))
+    train = train_of(data)
+    _warn(case_warnings(train, data))
     with run_folder(output, force=force) as folder, _Progress() as progress:
         run_case(data, folder, only=only, pictures=pictures, progress=progress)
     results = open_results(output)
-    _print(describe_results(results))
-    _warn(result_warnings(results))
+    _print(describe_results(train, results))
+    _warn(result_warnings(train, results))
     print(f"results: {output}")
     if "report.html" in results.manifest.files:
         print(f"report:  {output / 'report.html'}")

@@ -7,12 +7,10 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from femgear.case.case import planetary_set, set_deviations
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, record
-from femgear.trains import protocol
-from femgear.trains.drivetrain.section import DrivetrainCase
-from femgear.trains.registry import KINDS, check_case, kind_of, stages_of
+from femgear.trains.protocol import Context, Drawn, Progress
+from femgear.trains.registry import check_case, stages_of, train_of
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -34,7 +32,7 @@ def run_case(
     *,
     only: str | None = None,
     pictures: bool = True,
-    progress: protocol.Progress | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Compute a case and write its results.
 
@@ -42,9 +40,9 @@ def run_case(
     ----------
     case : Case
     folder : path
-        From `storage.run_folder`; its manifest says after every stage what is there.
+        From `run_folder`; its manifest says after every stage what is there.
     only : str, optional
-        Last stage to compute, one of `trains.registry.KINDS`; ``"stress"`` computes the stresses
+        Last stage to compute, ``"stress"`` computes the stresses
         whatever ``static.stresses`` says.
     pictures : bool
         Draw figures, fields and report.
@@ -61,47 +59,35 @@ def run_case(
     names, timings, convergence = ["case.toml"], {}, {}
     record(folder, names, timings=timings, convergence=convergence)
     results, data = {}, {}
+    context = Context(cache, progress)
     with one_blas_thread():
-        for stage in _stages(case, only):
+        for stage in stages_of(case, only):
+            name = stage.name
             if progress is not None:
-                progress(stage, 0, 1)
+                progress(name, 0, 1)
             start = time.perf_counter()
-            results[stage] = _compute(stage, case, results, cache, progress)
-            timings[stage] = time.perf_counter() - start
-            data[stage] = results[stage].dataset()
-            write_dataset(data[stage], folder / f"{stage}.nc")
-            names.append(f"{stage}.nc")
-            convergence[stage] = _convergence(stage, results[stage], kind_of(case))
+            results[name] = stage.solve(case, results, context)
+            timings[name] = time.perf_counter() - start
+            data[name] = results[name].dataset()
+            write_dataset(data[name], folder / f"{name}.nc")
+            names.append(f"{name}.nc")
+            convergence[name] = stage.verdict(results[name])
             record(folder, names, timings=timings, convergence=convergence)
             if progress is not None:
-                progress(stage, 1, 1)
+                progress(name, 1, 1)
     if pictures:
         from femgear.report.draw import write_pictures
 
         start = time.perf_counter()
-        names += write_pictures(folder, case, results, data=data, cache=cache, progress=progress)
+        drawn = Drawn(case, data, results, cache)
+        names += write_pictures(folder, train_of(case), drawn, progress=progress)
         timings["pictures"] = time.perf_counter() - start
     finish(folder, names, timings=timings, convergence=convergence)
     if pictures:
         from femgear.report.html import write_report
 
-        write_report(folder)
+        write_report(train_of(case), folder)
         finish(folder, [*names, "report.html"], timings=timings, convergence=convergence)
-
-
-def _stages(case: Case, only: str | None) -> tuple[str, ...]:
-    """Stages to compute, in order."""
-    return stages_of(case, only)
-
-
-def _compute(stage, case, results, cache, progress):
-    """One stage from those before it."""
-    return KINDS[kind_of(case)].stages[stage].compute(case, results, cache, progress)
-
-
-def _convergence(stage, result, kind) -> dict:
-    """What a stage says about its own trustworthiness, for the manifest."""
-    return KINDS[kind].stages[stage].verdict(result)
 
 
 def report_again(folder: Path) -> None:
@@ -112,24 +98,17 @@ def report_again(folder: Path) -> None:
     folder : path
         Results of a complete run.
     """
-    from femgear.report.draw import write_figures
+    from femgear.report.draw import write_pictures
     from femgear.report.html import write_report
     from femgear.storage.results import folder_lock, open_results
-    from femgear.trains.drivetrain.figures import write_drivetrain_pictures
 
     with folder_lock(folder):
         results = open_results(folder, partial=False)
-        manifest = results.manifest
+        manifest, train = results.manifest, train_of(results.case)
         names = [name for name in manifest.files if name != "report.html"]
         if not any(name.endswith(".png") for name in names):
-            data = {stage: getattr(results, stage) for stage in results.stages}
-            case = results.case
-            if isinstance(case, DrivetrainCase):
-                names += write_drivetrain_pictures(results.folder, case, data)
-            else:
-                names += write_figures(
-                    results.folder, planetary_set(case), data, deviations=set_deviations(case)
-                )
+            data = {stage: results.stage(stage) for stage in results.stages}
+            names += write_pictures(results.folder, train, Drawn(results.case, data))
             finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
-        write_report(folder)
+        write_report(train, folder)
         finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)

@@ -8,7 +8,7 @@ import numpy as np
 from femgear.case.case import parse_case, planetary_set
 from femgear.case.sections import Case
 from femgear.errors import GeometryError
-from femgear.trains.static.description import MOST_WINDING
+from femgear.trains.elastic.checks import MOST_WINDING
 
 KINDS = ("in phase", "out of phase", "unequal")
 PLANETS = (2, 3, 4, 5, 6, 7)

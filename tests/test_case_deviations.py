@@ -10,7 +10,7 @@ from femgear.case.case import parse_case, planetary_set, read_case, set_deviatio
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.gears.deviations import Ovality, Runout, body_separation, common_period
 from femgear.gears.modifications import ProfileCrowning, ProfileSlope, RootRelief, TipRelief, form_deviation
-from femgear.trains.static.description import warnings_of
+from femgear.trains.static.description import set_warnings
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -313,7 +313,7 @@ def test_negative_amounts_of_reliefs_are_a_warning(kind):
     start = "" if kind == "profile crowning" else 'start_diameter = "43.5 mm"\n'
     extra = f'\n[[sun.modifications]]\nkind = "{kind}"\namount = "-12 um"\n{start}'
     case = case_of(RELIEF + extra)
-    found = [text for text in warnings_of(case, planetary_set(case)) if "W-RELIEF-SIGN" in text]
+    found = [text for text in set_warnings(case) if "W-RELIEF-SIGN" in text]
     assert len(found) == 1 and "sun.modifications[1].amount" in found[0] and "-12 um" in found[0]
     assert not with_value(case, "sun.modifications[1].amount", "12 um").notices
     slope = RELIEF.replace("tip relief", "profile slope").replace("12 um", "-12 um")

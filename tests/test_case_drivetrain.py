@@ -10,7 +10,7 @@ from published.wind_turbine_drivetrain import paper_torques, ratio_of_radii, win
 from femgear.case import text as case_text
 from femgear.case.case import case_schema, parse_case, planetary_set, read_case, to_toml, with_value
 from femgear.errors import CaseError
-from femgear.report.summary import describe
+from femgear.trains.drivetrain.results import describe_drivetrain
 from femgear.trains.drivetrain.section import DrivetrainCase
 from femgear.trains.drivetrain.setup import case_model, check_drivetrain, drivetrain_of, torque_histories
 
@@ -250,7 +250,7 @@ def test_other_cases_are_read_as_before(own):
 
 
 def test_check_prints_the_chain(paper):
-    blocks = {block.title: block for block in describe(paper)}
+    blocks = {block.title: block for block in describe_drivetrain(paper)}
     assert set(blocks) >= {"Bodies", "Shafts", "Gear stages", "Operation", "Warnings"}
     stages = {row[0]: row for row in blocks["Gear stages"].rows}
     assert stages["carrier-sun"][-1] == "18.4000" and stages["gear 2-gear 3"][-1] == "128.8766"

@@ -12,8 +12,8 @@ from femgear.errors import CaseError, GeometryError
 from femgear.gears.checks import check_set
 from femgear.trains.helical.checks import check_helical_case
 from femgear.trains.helical.model import HelicalSet
+from femgear.trains.helical.stages import HELICAL
 from femgear.trains.helical.virtual_gears import base_helix_angle, helical_data, overlap_ratio, rotation_sense
-from femgear.trains.static.description import describe_case
 
 ROOT = Path(__file__).parents[1]
 GIVEN = {"sun_planet": "200e6 N/m", "planet_ring": "200 N/um"}
@@ -258,7 +258,7 @@ def test_refusals_of_the_gears_say_that_they_are_of_the_transverse_section(case)
 
 def test_check_tells_helix_and_contact_ratios(case):
     gears = planetary_set(case)
-    blocks = {block.title: block for block in describe_case(case, gears)}
+    blocks = {block.title: block for block in HELICAL.describe(case)}
     rows = {row[0]: row[1:] for row in blocks["Helix"].rows}
     assert rows["overlap ratio"] == ("1.8102", "1.8102")
     assert rows["transverse contact ratio"] == (

@@ -11,8 +11,7 @@ from femgear.errors import CaseError
 from femgear.gears.checks import check_set
 from femgear.system.lumped import PlanarSet
 from femgear.trains.planar.checks import check_planar_case, check_smoothing, mean_compression
-from femgear.trains.planar.stages import planar_data, planar_model
-from femgear.trains.static.description import describe_case
+from femgear.trains.planar.stages import PLANAR, planar_data, planar_model
 
 CASES = Path(__file__).parents[1] / "cases"
 PGA, PGB, PGB_STATIC = (CASES / f"nrel_{name}.toml" for name in ("pga", "pgb", "pgb_static"))
@@ -186,7 +185,7 @@ def test_the_sense_of_torque_and_turning_is_that_of_the_operation(pgb, input_, t
     case = with_value(with_value(pgb, "planar.reaction", "output"), "planar.torsion", None)
     case = with_value(with_value(case, "operation.torque", f"{torque * 1e5} N m"), "operation.input", input_)
     gears = planetary_set(case)
-    block = next(one for one in describe_case(case, gears) if one.title == "Planar model")
+    block = next(one for one in PLANAR.describe(case) if one.title == "Planar model")
     assert any(f"acts {words} its turning" in note for note in block.notes)
     # power: torque on the carrier times its turning, from the load vector and the order of the weight
     problem = planar_model(case, gears).problem
@@ -226,9 +225,7 @@ def test_smoothing_is_bound_by_play_and_compression(pgb):
             check_smoothing(case, gears, planar_model(case, gears))
         assert info.value.code == "E-RANGE"
     notes = [
-        note
-        for block in describe_case(with_value(pgb, "planar.smoothing", "2 um"), gears)
-        for note in block.notes
+        note for block in PLANAR.describe(with_value(pgb, "planar.smoothing", "2 um")) for note in block.notes
     ]
     assert any("[W-SMOOTHING]" in note for note in notes)
-    assert not any("[W-SMOOTHING]" in note for block in describe_case(pgb, gears) for note in block.notes)
+    assert not any("[W-SMOOTHING]" in note for block in PLANAR.describe(pgb) for note in block.notes)

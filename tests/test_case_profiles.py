@@ -10,7 +10,7 @@ from femgear.case.case import parse_case, planetary_set, read_case, set_deviatio
 from femgear.case.tables import read_profile
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.modifications import MeasuredProfile
-from femgear.trains.static.description import warnings_of
+from femgear.trains.static.description import set_warnings
 
 TEXT = (Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")
 UM = 1e-6
@@ -183,7 +183,7 @@ def test_a_profile_that_meets_the_flank_is_taken(folder):
 def test_little_of_the_flank_is_a_warning(folder):
     """A measured profile is constant beyond its points: most of this flank is not what was measured."""
     case = read_case(folder("roll angle [deg], deviation [um]\n34, 1\n35, 2\n60, 3\n"))
-    found = [text for text in warnings_of(case, planetary_set(case)) if "W-PROFILE" in text]
+    found = [text for text in set_warnings(case) if "W-PROFILE" in text]
     assert len(found) == 1 and "roll angles 34 to 60 deg" in found[0] and "sun.modifications" in found[0]
     case = read_case(folder(GOOD))
-    assert not [text for text in warnings_of(case, planetary_set(case)) if "W-PROFILE" in text]
+    assert not [text for text in set_warnings(case) if "W-PROFILE" in text]

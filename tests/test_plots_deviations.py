@@ -11,8 +11,9 @@ from femgear.gears.deviations import no_deviations
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import FlankForm, MeasuredProfile, ProfileSlope, TipRelief
 from femgear.gears.planetary import close_set, equal_planet_angles
-from femgear.report.draw import write_figures
 from femgear.report.style import png_bytes
+from femgear.trains.protocol import Drawn
+from femgear.trains.static import figures as static_figures
 from femgear.trains.static.figures import active_rolls, has_pitches, has_profiles, pitch_chart, profile_chart
 
 ALPHA = math.radians(20.0)
@@ -100,16 +101,15 @@ def test_axes_say_their_units_and_nothing_is_drawn_twice(gears, deviations, char
     assert png_bytes(chart(deviations, gears))[:4] == b"\x89PNG"
 
 
-def test_charts_are_left_out_where_there_is_nothing_of_their_kind(gears, deviations, tmp_path):
+def test_charts_are_left_out_where_there_is_nothing_of_their_kind(gears, deviations, monkeypatch):
     ideal = no_deviations(gears)
     pins = replace(ideal, pin_errors=np.full((3, 2), 5 * UM))
     forms = replace(deviations, sun_pitch=np.zeros(27))
     pitches = replace(pins, ring_pitch=deviations.sun_pitch[0] + UM * np.arange(108))
     none = replace(ideal, sun=FlankForm((ProfileSlope(0.0),)))
-    both = ["profile_deviations.png", "pitch_deviations.png"]
+    both = ["profile_deviations", "pitch_deviations"]
     for d, names in ((pins, []), (none, []), (forms, both[:1]), (pitches, both[1:]), (deviations, both)):
-        folder = tmp_path / str(len(list(tmp_path.iterdir())))
-        folder.mkdir()
-        assert write_figures(folder, gears, {}, deviations=d) == names
-        assert sorted(path.name for path in folder.iterdir()) == sorted(names)
+        monkeypatch.setattr(static_figures, "planetary_set", lambda _: gears)
+        monkeypatch.setattr(static_figures, "set_deviations", lambda _, d=d: d)
+        assert list(static_figures.DEVIATIONS.draw(Drawn(None, {}))) == names
         assert [has_profiles(d, gears), has_pitches(d)] == [name in names for name in both]

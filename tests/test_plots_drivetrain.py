@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from femgear.case.case import read_case, with_value
-from femgear.report.html import comparisons
 from femgear.report.style import png_bytes
 from femgear.trains.drivetrain.figures import (
     backlash_forces,
@@ -22,6 +21,7 @@ from femgear.trains.drivetrain.figures import (
     stiffness_series,
     transient_figures,
 )
+from femgear.trains.drivetrain.stages import remarks
 
 CASE = Path(__file__).parents[1] / "cases" / "own_chain.toml"
 
@@ -170,10 +170,10 @@ def test_titles_follow_the_contact_and_the_low_pass(contact, words):
 
 def test_captions_follow_the_contact():
     case = read_case(CASE)
-    assert "real teeth would part" in " ".join(comparisons(case, "transient_forces"))
+    assert "real teeth would part" in " ".join(remarks(SimpleNamespace(case=case), "transient_forces"))
     parted = with_value(case, "simulation.contact_loss", True)
-    assert "back flanks touch" in " ".join(comparisons(parted, "transient_forces"))
-    assert not list(comparisons(case, "transient_speeds"))
+    assert "back flanks touch" in " ".join(remarks(SimpleNamespace(case=parted), "transient_forces"))
+    assert not list(remarks(SimpleNamespace(case=case), "transient_speeds"))
 
 
 def test_picture_of_a_mode(tmp_path):

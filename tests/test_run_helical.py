@@ -21,7 +21,7 @@ from femgear.trains.helical.results import describe_helical_static
 from femgear.trains.helical.stages import solve_helical_dynamics, solve_helical_modes, solve_helical_static
 from femgear.trains.helical.virtual_gears import normal_record, section_stiffness, shared_load
 from femgear.trains.planar.stages import solve_planar_modes
-from femgear.trains.registry import stages_of
+from femgear.trains.registry import stages_of as stages_of_case
 
 ROOT = Path(__file__).parents[1]
 GIVEN = {"sun_planet": "200e6 N/m", "planet_ring": "200e6 N/m"}
@@ -35,6 +35,10 @@ STIFF = {
     **{f"helical.{body}.axial_stiffness": "1e14 N/m" for body in ("sun", "ring", "carrier", "planet")},
     **{f"helical.{body}.tilt_stiffness": "1e13 N m/rad" for body in ("sun", "ring", "carrier", "planet")},
 }
+
+
+def stages_of(case, only=None):
+    return tuple(stage.name for stage in stages_of_case(case, only))
 
 
 def changed(case, changes):

@@ -12,7 +12,6 @@ from published.wind_turbine_response import member_rms, resonance, weight_branch
 from femgear import cli
 from femgear.case.case import planetary_set, read_case, to_toml, with_value
 from femgear.errors import CaseError, ConvergenceError
-from femgear.report.html import comparisons, doubts
 from femgear.run import run_case
 from femgear.solvers.periodic.solution import open_verdict
 from femgear.solvers.stability.floquet import floquet_verdicts
@@ -28,13 +27,17 @@ from femgear.trains.planar.figures import (
     weight_response,
 )
 from femgear.trains.planar.model import TAIL_LIMIT, judged_branch, merged_folds, motion_lines
-from femgear.trains.planar.results import describe_branch, planar_verdicts, tail_warnings
+from femgear.trains.planar.results import comparisons, describe_branch, doubts, planar_verdicts, tail_warnings
 from femgear.trains.planar.stages import planar_model, solve_branch, solve_planar_modes, solve_planar_response
-from femgear.trains.registry import stages_of
+from femgear.trains.registry import stages_of as stages_of_case
 from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ("weight_response", "carrier_orbit", "planet_bearing_forces", "tooth_contact", "wedged_teeth")
+
+
+def stages_of(case, only=None):
+    return tuple(stage.name for stage in stages_of_case(case, only))
 
 
 def changed(case, **changes):
@@ -199,8 +202,10 @@ def test_an_interrupted_run_keeps_its_finished_stages(tmp_path, pgb, monkeypatch
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    table = registry.PLANAR
-    monkeypatch.setitem(table, "branch", replace(table["branch"], compute=interrupt))
+    stages = [
+        replace(one, solve=interrupt) if one.name == "branch" else one for one in registry.PLANAR.stages
+    ]
+    monkeypatch.setattr(registry, "TRAINS", (replace(registry.PLANAR, stages=tuple(stages)),))
     with pytest.raises(KeyboardInterrupt), run_folder(tmp_path / "out") as out:
         run_case(pgb, out, pictures=False)
     with pytest.warns(UserWarning, match="interrupted after: modes"):

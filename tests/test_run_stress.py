@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from femgear.case.case import planetary_set, read_case, with_value
+from femgear.case.case import read_case, with_value
 from femgear.report.draw import write_figures
 from femgear.report.html import page
 from femgear.report.summary import describe_results
-from femgear.run import _stages, run_case
+from femgear.run import run_case
 from femgear.storage.results import open_results, run_folder
+from femgear.trains.elastic.stages import ELASTIC
+from femgear.trains.protocol import Drawn
+from femgear.trains.registry import stages_of
 from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).parents[1]
@@ -97,9 +100,13 @@ def test_variables_belong_together(results, library):
 def test_stages_with_and_without_the_key(case):
     without, others = coarse(**{"static.stresses": False}), ("modes", "dynamics", "housing")
     assert case.static.stresses and not without.static.stresses
-    assert _stages(case, None) == ("static", "stress", *others) and _stages(case, "static") == ("static",)
-    assert _stages(coarse(**{"static.stresses": True}), None) == ("static", "stress", *others)
-    assert _stages(without, None) == ("static", *others) and _stages(without, "modes") == ("static", "modes")
+
+    def names(*given):
+        return tuple(stage.name for stage in stages_of(*given))
+
+    assert names(case, None) == ("static", "stress", *others) and names(case, "static") == ("static",)
+    assert names(coarse(**{"static.stresses": True}), None) == ("static", "stress", *others)
+    assert names(without, None) == ("static", *others) and names(without, "modes") == ("static", "modes")
 
 
 def test_only_static_has_none(tmp_path):
@@ -114,15 +121,15 @@ def test_only_stress_of_no_torque_is_a_valid_run(tmp_path, recwarn):
     results = run(tmp_path / "out", case, only="stress")
     assert results.stages == ("static", "stress") and "pressure_distribution" in results.stress
     assert not results.stress["root_worst"].values.any()
-    blocks = {block.title: block for block in describe_results(results)}
+    blocks = {block.title: block for block in describe_results(ELASTIC, results)}
     assert len(blocks["Stresses"].rows) == 6
-    names = write_figures(tmp_path, planetary_set(case), {"stress": results.stress})
+    names = write_figures(tmp_path, ELASTIC, Drawn(case, {"stress": results.stress}))
     assert len(names) == 5
     assert [str(w.message) for w in recwarn if issubclass(w.category, RuntimeWarning)] == []
 
 
 def test_table_of_the_summary(results):
-    block = next(block for block in describe_results(results) if block.title == "Stresses")
+    block = next(block for block in describe_results(ELASTIC, results) if block.title == "Stresses")
     assert all(len(row) == len(block.header) for row in block.rows)
     assert [row[0].split()[0] for row in block.rows] == ["contact"] * 2 + ["root"] * 4
     for row, name in zip(block.rows[:2], ("sun-planet", "planet-ring"), strict=True):
@@ -138,16 +145,16 @@ def test_table_of_the_summary(results):
 
 
 def test_report_has_the_section_with_its_figures(tmp_path, case, library, results):
-    static, result = library
-    figures = write_figures(tmp_path, static.planetary_set, {"stress": result.dataset()})
+    _, result = library
+    figures = write_figures(tmp_path, ELASTIC, Drawn(case, {"stress": result.dataset()}))
     assert set(figures) == {
         f"{name}.png"
         for name in ("root_stress", "root_profile", "contact_pressure", "load_spectrum", "planet_bending")
     }
     from femgear.report.html import caption_of
 
-    assert {caption_of(name.removesuffix(".png"))[1] for name in figures} == {"Stresses"}
-    text = page(results)
+    assert {caption_of(ELASTIC, name.removesuffix(".png"))[1] for name in figures} == {"Stresses"}
+    text = page(ELASTIC, results)
     assert '<h2 id="stress' in text and "FE/ISO" in text
     assert text.index('<h2 id="static') < text.index('<h2 id="stress') < text.index('<h2 id="modes')
 

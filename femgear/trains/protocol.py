@@ -1,14 +1,69 @@
+"""What a train is to the run, the report and the command line: stages, their results, figures and words."""
+
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from femgear.case.sections import Case
+    import xarray as xr
+    from matplotlib.figure import Figure
 
-Results = Mapping[str, Any]
+    from femgear.report.tables import Block
+    from femgear.storage.results import Results
+
+Progress = Callable[[str, float, float], None]
+"""Called with (stage, done, total)."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """Where generated grids are kept, and whom to tell how far a stage has come."""
+
+    cache: Path | None = None
+    progress: Progress | None = None
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What pictures are made of.
+
+    Parameters
+    ----------
+    case : case of the train
+    data : mapping of str to Dataset
+        Contents of the stages' files by stage, as far as computed.
+    results : mapping of str to result
+        Of the same stages; empty where the files alone are there.
+    cache : path, optional
+        Folder of generated grids.
+    """
+
+    case: Any
+    data: Mapping[str, xr.Dataset]
+    results: Mapping[str, Any] = field(default_factory=dict)
+    cache: Path | None = None
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Pictures of a stage and what is said under them.
+
+    Parameters
+    ----------
+    captions : mapping of str to str
+        By the beginning of the file name, in the order of the page; " ({})" takes up the rest of the name.
+    draw : callable
+        ``(Drawn) -> {file name: Figure}``.
+    write : tuple of callables
+        ``(Drawn, folder) -> file names`` of pictures and fields that are no figures.
+    """
+
+    captions: Mapping[str, str]
+    draw: Callable[[Drawn], Mapping[str, Figure]] = lambda drawn: {}
+    write: tuple[Callable[[Drawn, Path], list[str]], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -17,32 +72,75 @@ class Stage:
 
     Parameters
     ----------
-    compute : callable
-        ``(case, results, cache, progress) -> result`` from the results of the stages before, by name.
+    name, title : str
+        Of the file, and of its section on the page.
+    solve : callable
+        ``(case, results, context) -> result`` from the results of the stages before, by name.
     verdict : callable
         ``(result) -> dict`` for the manifest.
+    describe : callable
+        ``(Results) -> Block``: the numbers of the stage, read from its folder.
+    figures : callable
+        ``() -> Figures``; called when something is drawn, so that drawing libraries are loaded late.
     wanted : callable
         ``(case) -> bool``: whether a run without ``only`` computes it.
-    possible : callable
+    unavailable : callable
         ``(case) -> str``: why the case cannot have the stage, empty where it can.
     needs : callable
         ``(case) -> tuple of str``: stages that must come before.
+    check : callable, optional
+        ``(case) -> None``: refuses, before a run, what the stage cannot represent.
+    tables : callable
+        ``(Results) -> blocks`` that the page shows beside the numbers.
     """
 
-    compute: Callable[[Case, Results, Path, Progress | None], Any]
+    name: str
+    title: str
+    solve: Callable[[Any, Mapping[str, Any], Context], Any]
     verdict: Callable[[Any], dict]
-    wanted: Callable[[Case], bool] = lambda case: True
-    possible: Callable[[Case], str] = lambda case: ""
-    needs: Callable[[Case], tuple[str, ...]] = lambda case: ()
+    describe: Callable[[Results], Block]
+    figures: Callable[[], Figures] = lambda: Figures({})
+    wanted: Callable[[Any], bool] = lambda case: True
+    unavailable: Callable[[Any], str] = lambda case: ""
+    needs: Callable[[Any], tuple[str, ...]] = lambda case: ()
+    check: Callable[[Any], None] | None = None
+    tables: Callable[[Results], Iterable[Block]] = lambda results: ()
 
 
 @dataclass(frozen=True)
-class Kind:
-    """Stages of a kind of case in order, its check before a run, and its name in messages."""
+class Train:
+    """A kind of case and what is computed of it.
 
-    stages: Mapping[str, Stage]
-    check: Callable[[Case, Any], None]
+    Parameters
+    ----------
+    name, words : str
+        ``"planar"``, ``"a planar case"``.
+    owns : callable
+        ``(case) -> bool``: whether a case is one of this train.
+    stages : tuple of Stage
+        In order.
+    describe : callable
+        ``(case) -> blocks``: its title first, its warnings last.
+    warnings : callable
+        ``(case) -> sentences``: what is allowed but deserves a look.
+    result_warnings : callable
+        ``(Results) -> sentences``: what the solvers say against their own results.
+    figures : callable
+        ``() -> Figures`` of the case, whatever is computed of it.
+    remarks : callable
+        ``(Results, name of a picture) -> sentences`` that this case adds to a caption.
+    """
+
+    name: str
     words: str
+    owns: Callable[[Any], bool]
+    stages: tuple[Stage, ...]
+    describe: Callable[[Any], tuple[Block, ...]]
+    warnings: Callable[[Any], Iterable[str]]
+    result_warnings: Callable[[Results], Iterable[str]] = lambda results: ()
+    figures: Callable[[], Figures] = lambda: Figures({})
+    remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
 
-
-Progress = Callable[[str, float, float], None]
+    def stage(self, name: str) -> Stage | None:
+        """The stage of a name, None where the train has none of it."""
+        return next((stage for stage in self.stages if stage.name == name), None)

@@ -26,12 +26,11 @@ from femgear.trains.drivetrain.data import Drivetrain, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel, coordinates_of, free_coordinates
 from femgear.trains.drivetrain.results import _MOST_PANELS, chosen_meshes, symbols
 from femgear.trains.drivetrain.time import PASS_BAND
+from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.trains.drivetrain.section import DrivetrainCase
-    from femgear.trains.protocol import Progress
 
 # Inches: beside the panels, below the last, above the first, between two with and without numbers in between.
 _LEFT, _RIGHT, _BOTTOM, _TOP, _GAP, _SHARED = 0.95, 0.2, 0.95, 0.35, 0.75, 0.5
@@ -579,40 +578,19 @@ def _side_bands(data, base: int, lines, title: str):
     )  # fmt: skip
 
 
-def write_drivetrain_pictures(
-    folder: Path, case: DrivetrainCase, data: dict[str, xr.Dataset], *, progress: Progress | None = None
-) -> list[str]:
-    """Figures of the stages in `data`, by stage name; returns the names of the files.
-
-    Parameters
-    ----------
-    folder : path
-    case : DrivetrainCase
-    data : dict of str to Dataset
-        Contents of the stages' files.
-    progress : callable, optional
-        Called with ("pictures", done, total).
-    """
-    from femgear.report.style import save_figure
+def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
     from femgear.trains.drivetrain.setup import case_model
 
-    model, figures, names = case_model(case), {}, []
-    if "modes" in data and len(model.meshes):
-        figures["stiffness_series"] = stiffness_figure(model)
-    if "modes" in data:
-        figures["campbell"] = campbell_figure(data["modes"])
-        names += mode_pictures(folder, model, data["modes"], case.simulation.modes)
-    if progress is not None:
-        progress("pictures", 1, 2)
-    if "transient" in data:
-        figures |= transient_figures(data["transient"])
-    if "spectrum" in data:
-        figures |= spectrum_figures(data["spectrum"], data.get("transient"))
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    if progress is not None:
-        progress("pictures", 2, 2)
-    return [*(f"{name}.png" for name in figures), *names]
+    model = case_model(drawn.case)
+    figures = {"stiffness_series": stiffness_figure(model)} if len(model.meshes) else {}
+    return figures | {"campbell": campbell_figure(drawn.data["modes"])}
+
+
+def _write_modes(drawn: Drawn, folder: Path) -> list[str]:
+    from femgear.trains.drivetrain.setup import case_model
+
+    count = drawn.case.simulation.modes
+    return mode_pictures(folder, case_model(drawn.case), drawn.data["modes"], count)
 
 
 def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
@@ -838,3 +816,62 @@ def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
         3.0 * xi**2 - 2.0 * xi**3 + phi * xi,
         -length * (xi**2 * rest + 0.5 * phi * xi * rest),
     ], axis=-1) / (1.0 + phi)  # fmt: skip
+
+
+FIGURES = {
+    "modes": Figures(
+        {
+            "stiffness_series": (
+                "Mesh stiffness over the mesh period as the model takes it: a Fourier series, and the "
+                "rectangular wave of the number of tooth pairs in contact that it stands for."
+            ),
+            "campbell": (
+                "Natural frequencies over the speed of the first body, with gyroscopic terms and mean mesh "
+                "stiffness, and the mesh frequencies."
+            ),
+            "drivetrain_mode": (
+                "Mode shape of the drivetrain ({}), by the number in the table, where the free spin is the "
+                "first; magnified, at rest in grey. The rays show how far each wheel turns. Shafts are "
+                "drawn as bent beams between the places that the model knows. The drawing is a scheme: "
+                "bodies without gears have a radius that is not theirs."
+            ),
+        },
+        draw=_modes_figures,
+        write=(_write_modes,),
+    ),
+    "transient": Figures(
+        {
+            "transient_speeds": (
+                "Speed of the first and of the last body, low-passed to the rate of the records. Where the "
+                "records are denser than the pixels, the band of their values is drawn."
+            ),
+            "transient_deviations": (
+                "Rotation of the bodies less that of the free spin, which is the motion of the rigid chain "
+                "under the same torques; low-passed to the rate of the records. Bands: least to largest "
+                "record."
+            ),
+            "transient_forces": (
+                "Mesh forces along the lines of action, low-passed to the rate of the records: peaks that "
+                "are shorter are higher than here, the least and the largest force of all steps stand in "
+                "the table. Bands: least to largest record."
+            ),
+        },
+        draw=lambda drawn: transient_figures(drawn.data["transient"]),
+    ),
+    "spectrum": Figures(
+        {
+            "mesh_force_spectrum": (
+                "Amplitude spectra of mesh forces after the start: segments under Hann's window that "
+                "overlap by half, root of the mean square, peak values. Dotted: mesh frequencies and their "
+                "second and third harmonics at the mean speed. Where the speed changes, which the title "
+                "tells, lines smear over frequency; over orders they do not."
+            ),
+            "side_bands": (
+                "Mesh force around a mesh line over orders of the first body, in one segment ({}); a change "
+                "of the speed does not smear them. Dotted: distances of the carrier's turn, or of the mesh "
+                "line of the planetary stage."
+            ),
+        },
+        draw=lambda drawn: spectrum_figures(drawn.data["spectrum"], drawn.data.get("transient")),
+    ),
+}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,17 @@ import numpy as np
 
 from femgear.errors import ConvergenceError
 from femgear.threads import one_blas_thread
-from femgear.trains.drivetrain.results import DrivetrainModesResult, SpectrumResult, TransientResult
+from femgear.trains.drivetrain.results import (
+    DrivetrainModesResult,
+    SpectrumResult,
+    TransientResult,
+    describe_drivetrain,
+    describe_drivetrain_modes,
+    describe_spectrum,
+    describe_transient,
+    drivetrain_warnings,
+    transient_warnings,
+)
 from femgear.trains.drivetrain.section import DrivetrainCase, settle_time
 from femgear.trains.drivetrain.setup import (
     BENDING,
@@ -22,9 +33,10 @@ from femgear.trains.drivetrain.setup import (
     record_rate,
     torque_histories,
 )
-from femgear.trains.protocol import Progress
+from femgear.trains.protocol import Figures, Progress, Stage, Train
 
 if TYPE_CHECKING:
+    from femgear.storage.results import Results
     from femgear.trains.drivetrain.time import DrivetrainRun
 
 # Campbell diagram: speeds, and modes up to so many times those of operation and mesh lines.
@@ -166,3 +178,82 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
         )
         amplitudes[variant] = line_amplitudes(force, angle, run.spin_speed[late], lines, record_rate=rate)
     return SpectrumResult(transient, settle, speed, spectra, tracked, lines, amplitudes, distance)
+
+
+def _transient_verdict(result: TransientResult) -> dict:
+    runs = result.runs.values()
+    return {
+        "steps": next(iter(runs)).steps,
+        "energy": max(run.ledger.error for run in runs),
+        "momentum": max(run.momentum for run in runs),
+        "pulling": {variant: float(np.max(run.pulling, initial=0.0)) for variant, run in result.runs.items()},
+    }
+
+
+def _figures(name: str) -> Callable[[], Figures]:
+    """Figures of a stage, loaded when they are drawn."""
+
+    def load() -> Figures:
+        from femgear.trains.drivetrain.figures import FIGURES
+
+        return FIGURES[name]
+
+    return load
+
+
+def remarks(results: Results, stem: str) -> Iterator[str]:
+    """What a force without its usual sign means, for the caption of its picture."""
+    if stem == "transient_forces":
+        if results.case.simulation.contact_loss:
+            yield "Zero: the teeth are apart; negative: their back flanks touch."
+        else:
+            yield "Negative: the mesh is linear and pulls; real teeth would part."
+
+
+DRIVETRAIN = Train(
+    name="drivetrain",
+    words="a drivetrain",
+    owns=lambda case: isinstance(case, DrivetrainCase),
+    stages=(
+        Stage(
+            name="modes",
+            title="Modes",
+            solve=lambda case, *_: solve_drivetrain_modes(case),
+            verdict=lambda result: {
+                "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
+            },
+            describe=lambda results: describe_drivetrain_modes(results.modes),
+            figures=_figures("modes"),
+            check=check_drivetrain,
+        ),
+        Stage(
+            name="transient",
+            title="Transient",
+            solve=lambda case, _, context: solve_transient_run(case, progress=context.progress),
+            verdict=_transient_verdict,
+            describe=lambda results: describe_transient(results.transient),
+            figures=_figures("transient"),
+            check=check_drivetrain,
+        ),
+        Stage(
+            name="spectrum",
+            title="Spectrum",
+            solve=lambda case, results, _: solve_spectrum(case, results["transient"]),
+            verdict=lambda result: {
+                "lines": len(result.lines),
+                "segments": min(one.segments for one in result.spectra.values()),
+            },
+            describe=lambda results: describe_spectrum(results.spectrum),
+            figures=_figures("spectrum"),
+            unavailable=lambda case: "" if case.parallel or case.planetary else "the chain has no gears",
+            needs=lambda case: ("transient",),
+            check=lambda case: check_spectrum(case, case_model(case)),
+        ),
+    ),
+    describe=describe_drivetrain,
+    warnings=drivetrain_warnings,
+    result_warnings=lambda results: (
+        transient_warnings(results.transient) if "transient" in results.stages else ()
+    ),
+    remarks=remarks,
+)  # fmt: skip

@@ -12,15 +12,19 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import set_deviations
+from femgear.case.case import planetary_set, set_deviations
 from femgear.case.checks import check_floating
 from femgear.case.sections import Case
 from femgear.errors import CaseError
+from femgear.gears.kinematics import MEMBERS, torques
+from femgear.trains.elastic.model import MAX_DIAMETER
+from femgear.trains.static.description import set_warnings
 
 if TYPE_CHECKING:
     from femgear.fe.reduction import CyclicModes
@@ -43,6 +47,8 @@ CHECKED = 12
 """Speeds at which the level is computed again, at most."""
 NOTICEABLE = 1.0
 """Change of the level that is worth a warning [dB]."""
+MOST_WINDING = 1.0
+"""Angle between the ends of a coupling that is worth a warning [rad]."""
 
 
 @dataclass(frozen=True)
@@ -300,3 +306,40 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
             limit=f"below {critical[lowest] * rpm:.6g} rpm of the carrier",
             remedy="leave the highest speeds out, or stiffen the ring or its foundation",
         )
+
+
+def case_warnings(case: Case) -> tuple[str, ...]:
+    """What is allowed in a set with an elastic ring but deserves a look, in sentences."""
+    found = list(set_warnings(case))
+    if case.dynamics.damping_ratio == 0.0 and case.operation.fixed == "ring":
+        found.append(
+            "[W-DAMPING] dynamics.damping_ratio: without damping resonances have no limit, and levels depend "
+            "on how near a line lies to one; 0.02 to 0.05 is usual"
+        )
+    found += _wound_up(case)
+    if case.planet.bearing_clearance and case.operation.fixed == "ring":
+        found.append(
+            "[W-BEARING] planet.bearing_clearance: the dynamics have linear planet bearings; the clearance "
+            'acts in the static results alone, with static.members = "elastic"'
+        )
+    if case.housing.form == "linear" and case.housing.points <= 2 * MAX_DIAMETER:
+        found.append(
+            f"[W-POINTS] housing.points: {case.housing.points} points do not resolve the ring's "
+            f"{MAX_DIAMETER} nodal diameters; use more than {2 * MAX_DIAMETER}"
+        )
+    return tuple(found)
+
+
+def _wound_up(case: Case) -> Iterator[str]:
+    """Couplings that the torque turns further than any stands: a slip of units, as a rule."""
+    acting = torques(planetary_set(case), member=case.operation.input, torque=case.operation.torque)
+    output = next(name for name in MEMBERS if name not in (case.operation.input, case.operation.fixed))
+    for name, member in (("motor", case.operation.input), ("brake", output)):
+        section = getattr(case, name)
+        angle = 0.0 if section is None else abs(getattr(acting, member)) / section.coupling_stiffness
+        if angle > MOST_WINDING:
+            yield (
+                f"[W-COUPLING] {name}.coupling_stiffness: {section.coupling_stiffness:.4g} N m/rad lets the "
+                f"torque turn the coupling by {math.degrees(angle):.4g} deg; couplings stand a few degrees, "
+                "elastic ones twenty"
+            )

@@ -1,13 +1,12 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.dependencies import Entries
-from femgear.report.tables import Block
+from femgear.report.tables import Block, chosen
 from femgear.storage.dataset import FOURIER, RPM, _mesh_names, complex_entries, dataset, response_entries
 
 if TYPE_CHECKING:
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from femgear.gears.kinematics import Speeds
     from femgear.housing.sensor import HousingSignal, SensorLines
     from femgear.solvers.stability.floquet import Stability
+    from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
     from femgear.trains.elastic.model import ElasticSet, RingModel
 
@@ -280,81 +280,10 @@ def housing_dataset(result: HousingResult) -> xr.Dataset:
     )
 
 
-_MANY = 8
-
-
-def _modes(data: xr.Dataset) -> Block:
-    shown = min(data.sizes["mode"], 16)
-    rows = tuple(
-        (
-            str(i + 1),
-            f"{float(data.frequency[i]):.2f}",
-            str(data.kind.values[i]),
-            _diameter(int(data.nodal_diameter[i])),
-        )
-        for i in range(shown)
-    )
-    notes = (
-        f"{data.sizes['mode']} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown",
-    )
-    return Block("Modes", ("mode", "frequency [Hz]", "kind", "nodal diameters"), rows, notes)
-
-
-def _diameter(number: int) -> str:
-    return "-" if number < 0 else str(number)
-
-
-def _dynamics(data: xr.Dataset) -> Block:
-    dte = np.hypot(data.dte_real.values, data.dte_imag.values)  # speed, mesh, harmonic
-    rms = np.sqrt(0.5 * (dte[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
-    largest = np.abs(data.floquet_multiplier.values)
-    stable = data.stable.values.astype(bool) if "stable" in data else largest < 1.0
-    # helical cases are excited by a number of harmonics
-    reach = [()] * data.sizes["speed"]
-    if "excitation_limit" in data:
-        reach = [(f"{value / 1e3:.2f}",) for value in data.excitation_limit.values]
-    rows = tuple(
-        (
-            f"{float(data.speed[i]):.2f}",
-            f"{float(data.mesh_frequency[i]):.2f}",
-            *reach[i],
-            f"{rms[i] * 1e6:.4f}",
-            str(data.method.values[i]),
-            str(int(data.iterations[i])),
-            f"{float(data.spectral_radius[i]):.4f}",
-            f"{largest[i]:.4f}",
-            "yes" if bool(data.converged[i]) else "NO",
-        )
-        for i in _chosen(data.sizes["speed"])
-    )
-    header = (
-        "speed [rpm]",
-        "mesh [Hz]",
-        *(("excited up to [kHz]",) if reach[0] else ()),
-        "DTE rms [um]",
-        "method",
-        "iterations",
-        "radius",
-        "Floquet",
-        "converged",
-    )
-    notes = (
-        "DTE rms: the largest of all meshes, without its mean; iterations, radius: of the fixed point,",
-        "which contracts below 1; Floquet: largest multiplier, stable up to 1 (exactly 1 without damping)",
-        f"{int(data.converged.sum())} of {len(stable)} speeds converged, {int(stable.sum())} stable",
-    )
-    if "level_change" in data:
-        change = np.abs(data.level_change.values)
-        notes += (
-            f"level of the housing with excitation up to {data.attrs['compared_to'] / 1e3:.4g} kHz: "
-            f"{np.nanmax(change):.2g} dB away at most, at {int(np.isfinite(change).sum())} speeds looked at",
-        )
-    return Block("Dynamics", header, rows, notes)
-
-
-def _housing(data: xr.Dataset) -> Block:
+def describe_housing(data: xr.Dataset) -> Block:
+    """Level and largest lines at every speed of housing.nc."""
     rows = []
-    for i in _chosen(data.sizes["speed"]):
+    for i in chosen(data.sizes["speed"]):
         one = data.isel(speed=i)
         amplitude = one.order_amplitude.values
         largest = np.argsort(-amplitude, kind="stable")[:5]
@@ -372,6 +301,95 @@ def _housing(data: xr.Dataset) -> Block:
     return Block("Housing", header, tuple(rows), (note,))
 
 
-def _chosen(count: int) -> Iterator[int]:
-    """All indices of a short list, the first and last of a long one."""
-    return (i for i in range(count) if count <= _MANY or i < _MANY // 2 or i >= count - _MANY // 2)
+_FEW = 4
+_FIRST, _STRONGEST = 6, 4  # bands that are listed
+
+
+def mesh_bands(results: Results) -> Block:
+    """Dominant lines and lobes around every mesh harmonic of the excitation, at a few speeds."""
+    from femgear.housing.orders import analyse_band, order_spectrum
+
+    housing, case = results.housing, results.case
+    teeth = int(housing.attrs["ring_teeth"])
+    rows, threshold = [], 0.0
+    count = housing.sizes["speed"]
+    for s in sorted({round(i) for i in np.linspace(0, count - 1, min(count, _FEW))}):
+        spectrum = order_spectrum(housing["acceleration"].values[s])
+        windowed = _hanning_spectrum(results, s)
+        rpm = float(housing["speed"][s])
+        for h in _shown_harmonics(spectrum, teeth, case.dynamics.mesh_harmonics):
+            found = analyse_band(spectrum, teeth, h, count=3)
+            threshold = found.lobes.threshold
+            lines = [_line(line, h * teeth) for line in found.lines[:2]] + ["-", "-"]
+            third = f"{found.lines[2].level:.1f}" if len(found.lines) > 2 else "-"
+            hanning = "-" if windowed is None else str(len(analyse_band(windowed, teeth, h).lobes.position))
+            lobes = str(len(found.lobes.position))
+            published = _published(case, rpm, h)
+            rows.append((f"{rpm:.6g}", str(h), str(h * teeth), *lines[:2], third, lobes, hanning, published))
+    header = (
+        "speed [rpm]",
+        "harmonic",
+        "order",
+        "strongest line [m/s²]",
+        "second line [m/s²]",
+        "third [dB]",
+        "lobes",
+        "Hanning lobes",
+        "published",
+    )
+    notes = [
+        f"lobes of the envelope a carrier revolution that stand out by {threshold:.0%} of its largest value; "
+        "third: level of the third line below the strongest; Hanning lobes: of the classical model, in which "
+        "each planet is heard through a Hanning window while it passes the sensor",
+        *dict.fromkeys(f"published: {entry.source}" for entry in case.housing.published),
+    ]
+    if not case.housing.published:
+        header, rows = header[:-1], [row[:-1] for row in rows]
+    return Block("Around the mesh harmonics", header, tuple(rows), tuple(notes))
+
+
+def _shown_harmonics(spectrum, teeth: int, given: int | None) -> list[int]:
+    """All mesh harmonics of the excitation; of those up to a frequency the first and the strongest ones."""
+    highest = int((spectrum.order[-1] - teeth // 2) // teeth)
+    if given is not None:
+        return list(range(1, min(given, highest) + 1))
+    bands = np.abs(spectrum.order[None] / teeth - np.arange(1, highest + 1)[:, None]) <= 0.5
+    strongest = np.where(bands, spectrum.amplitude[None], 0.0).max(axis=1).argsort()[::-1][:_STRONGEST] + 1
+    return sorted({*range(1, min(_FIRST, highest) + 1), *strongest.tolist()})
+
+
+def _hanning_spectrum(results: Results, speed: int):
+    """Order spectrum of the Hanning-window model with the planet-ring forces of the dynamic solution."""
+    from femgear.case.case import planetary_set
+    from femgear.housing.orders import order_spectrum
+    from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, hanning_model
+
+    if "dynamics" not in results.stages:
+        return None
+    data = results.dynamics
+    ring = [str(name).endswith("ring") for name in data["mesh"].values]
+    force = (data["mesh_force_real"] + 1j * data["mesh_force_imag"]).values[speed][ring]
+    teeth = int(results.housing.attrs["ring_teeth"])
+    field = hanning_model(force, planetary_set(results.case).planet_angles)
+    lines = fixed_sensor_lines(
+        field,
+        teeth,
+        2 * np.pi * float(data["mesh_frequency"][speed]) / teeth,
+        float(results.housing.attrs["sensor_angle"]),
+    )
+    return order_spectrum(fixed_sensor_signal(lines).acceleration)
+
+
+def _published(case, rpm: float, harmonic: int) -> str:
+    """What the case file says was published for a speed and mesh harmonic."""
+    for entry in case.housing.published:
+        if entry.harmonic == harmonic and np.isclose(entry.speed * 30 / np.pi, rpm):
+            lobes = "" if entry.lobes is None else f"; {entry.lobes} lobes"
+            return f"{', '.join(map(str, entry.orders))}{lobes}"
+    return "-"
+
+
+def _line(line, centre: int) -> str:
+    order = round(line.order)
+    offset = f" = {centre} {'+' if order > centre else '−'} {abs(order - centre)}" if order != centre else ""
+    return f"{order}{offset}: {line.amplitude:.3g}"

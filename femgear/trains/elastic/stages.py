@@ -14,18 +14,35 @@ import numpy as np
 from femgear.case.case import planetary_set, set_deviations
 from femgear.case.dependencies import check_entries, dynamic_entries, modal_entries, static_entries
 from femgear.case.sections import Case
+from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.threads import one_blas_thread
 from femgear.trains.elastic.checks import (
+    case_warnings,
     check_dynamic_case,
     check_reach,
     check_rim_speed,
     fastest_mesh_frequency,
     max_nodal_diameter,
 )
-from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult
-from femgear.trains.protocol import Progress
+from femgear.trains.elastic.results import (
+    DynamicsResult,
+    HousingResult,
+    ModesResult,
+    describe_housing,
+    mesh_bands,
+)
+from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.static.description import describe_case
 from femgear.trains.static.results import StaticResult
-from femgear.trains.static.stages import _backlash, _ring_foundation, _supports_of
+from femgear.trains.static.stages import (
+    STATIC,
+    STRESS,
+    _backlash,
+    _ring_foundation,
+    _supports_of,
+    case_figures,
+    response_verdict,
+)
 
 if TYPE_CHECKING:
     from femgear.contact.loaded_period import LoadedPeriod
@@ -419,3 +436,66 @@ def _named(modes: Modes, model: ElasticSet) -> Modes:
         planet_angles=model.planet_angles,
     )
     return replace(modes, kind=kinds, nodal_diameter=diameters)
+
+
+def _figures(name: str):
+    """Figures of a stage, loaded when they are drawn."""
+
+    def load() -> Figures:
+        from femgear.trains.elastic.figures import FIGURES
+
+        return FIGURES[name]
+
+    return load
+
+
+ELASTIC = Train(
+    name="elastic",
+    words="a case with an elastic ring",
+    owns=lambda case: True,
+    stages=(
+        STATIC,
+        STRESS,
+        Stage(
+            name="modes",
+            title="Modes",
+            solve=lambda case, results, context: solve_modes(
+                case, results["static"], progress=context.progress
+            ),
+            verdict=lambda result: {
+                "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.model.system.M),
+            },
+            describe=lambda results: describe_modes(results.modes),
+            figures=_figures("modes"),
+            needs=lambda case: ("static", "stress") if case.static.stresses else ("static",),
+            check=lambda case: check_dynamic_case(case, planetary_set(case)),
+        ),
+        Stage(
+            name="dynamics",
+            title="Dynamics",
+            solve=lambda case, results, context: solve_dynamics(
+                case, results["static"], results["modes"], progress=context.progress
+            ),
+            verdict=response_verdict,
+            describe=lambda results: describe_response(results.dynamics),
+            figures=_figures("dynamics"),
+            needs=lambda case: ("modes",),
+        ),
+        Stage(
+            name="housing",
+            title="Housing",
+            solve=lambda case, results, _: solve_housing(case, results["dynamics"]),
+            verdict=lambda result: {"form": result.form},
+            describe=lambda results: describe_housing(results.housing),
+            figures=_figures("housing"),
+            needs=lambda case: ("dynamics",),
+            tables=lambda results: (mesh_bands(results),),
+        ),
+    ),
+    describe=lambda case: describe_case(case, warnings=case_warnings(case)),
+    warnings=case_warnings,
+    result_warnings=lambda results: (
+        response_warnings(results.dynamics) if "dynamics" in results.stages else ()
+    ),
+    figures=case_figures,
+)  # fmt: skip

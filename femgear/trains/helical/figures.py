@@ -11,7 +11,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.case import planetary_set
 from femgear.errors import CaseError
+from femgear.report.response import (
+    MANY_SPEEDS,
+    draw_static,
+    excited_harmonics,
+    fine_positions,
+    name_kinds,
+    speed_sweep,
+    transmission_error_spectrum,
+)
 from femgear.report.style import (
     BLACK,
     BLUE,
@@ -30,8 +40,9 @@ from femgear.report.style import (
 )
 from femgear.system.lumped import CENTRAL
 from femgear.system.mode_kinds import phasing
-from femgear.trains.elastic.figures import draw_static, excited_harmonics, fine_positions, name_kinds
 from femgear.trains.helical.model import helical_motions
+from femgear.trains.protocol import Drawn, Figures
+from femgear.trains.static.figures import STATIC
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -475,3 +486,71 @@ def _mark(ax, modes: xr.Dataset, top: float) -> None:
                 markerfacecolor="none", label=f"modes {name}", linestyle="none",
                 transform=ax.get_xaxis_transform(),
             )  # fmt: skip
+
+
+def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
+    dynamics, modes = drawn.data["dynamics"], drawn.data["modes"]
+    figures = {
+        "dynamic_spectrum": transmission_error_spectrum(dynamics),
+        "dynamic_transmission_error": transmission_errors(dynamics, modes),
+        "mesh_force_spectra": mesh_force_figure(dynamics, modes),
+    }
+    if dynamics.sizes["speed"] > MANY_SPEEDS:
+        figures["speed_sweep"] = speed_sweep(dynamics)
+    return figures
+
+
+FIGURES = {
+    # static.nc holds the spur gears of the transverse section: nobody makes them, their set is not drawn
+    "static": Figures(
+        STATIC.captions
+        | {
+            "helical_mesh_stiffness": (
+                "Stiffness and static transmission error of the meshes of planet 1 along the transverse "
+                "line of action, centres fixed: of the helical meshes (solid), and of the spur gears of the "
+                "transverse section (dotted) that the slices come from."
+            ),
+        },
+        draw=STATIC.draw,
+    ),
+    "modes": Figures(
+        {
+            "spatial_mode_shapes": (
+                "Mode shapes of the helical set with mean mesh stiffness, from the front and, below, from "
+                "the side, where bodies tilt and move along the axis. Motions of the side view are drawn at "
+                "the scale of the front view times the factor given. At rest in grey."
+            ),
+            "mesh_phasing": (
+                "Phases of sun and ring meshes at every planet for the first harmonics of the mesh "
+                "frequency, and what is left of equal mesh forces on sun and ring: what cancels excites no "
+                "mode of that kind."
+            ),
+        },
+        draw=lambda drawn: helical_modes_figures(
+            drawn.data["modes"], planetary_set(drawn.case), drawn.data.get("static")
+        ),
+    ),
+    "dynamics": Figures(
+        {
+            "dynamic_transmission_error": (
+                "Dynamic transmission error over one mesh period (thick) beside the static one of the set "
+                "on its supports, both without their mean. The thin static curve has the harmonics of the "
+                "excitation alone: what rings in both curves is the cut series, not vibration. Pale: the "
+                "whole static curve."
+            ),
+            "dynamic_spectrum": (
+                "Harmonics of the dynamic transmission error, down to five decades below the largest."
+            ),
+            "speed_sweep": (
+                "Fluctuation of the transmission error over the speed, and the verdicts on the solution: "
+                "the fixed point contracts below 1, the motion is stable up to 1."
+            ),
+            "mesh_force_spectra": (
+                "Mesh forces of planet 1 along the tooth normals over the frequency of each harmonic, h "
+                "times the mesh frequency. Marks along the axis are natural frequencies by the phasing of "
+                "the mode: a harmonic meets modes of its own phasing."
+            ),
+        },
+        draw=_dynamics_figures,
+    ),
+}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,10 +12,16 @@ import numpy as np
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
 from femgear.case.sections import Case
+from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
 from femgear.trains.helical.checks import check_helical_case
-from femgear.trains.helical.results import HelicalDynamicsResult, HelicalModesResult
+from femgear.trains.helical.results import (
+    HelicalDynamicsResult,
+    HelicalModesResult,
+    describe_helical,
+    describe_helical_static,
+)
 from femgear.trains.helical.virtual_gears import (
     SectionStiffness,
     base_helix_angle,
@@ -26,11 +33,13 @@ from femgear.trains.helical.virtual_gears import (
     shared_load,
     torque_of,
 )
-from femgear.trains.protocol import Progress
+from femgear.trains.protocol import Figures, Progress, Stage, Train
 from femgear.trains.static import stages as static_stages
+from femgear.trains.static.description import describe_case, set_warnings
 from femgear.trains.static.results import StaticResult
 
 if TYPE_CHECKING:
+    from femgear.storage.results import Results
     from femgear.system.system import MechanicalSystem, Response
     from femgear.trains.helical.model import HelicalSet
 
@@ -195,3 +204,92 @@ def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarr
         support[:, row] = (meshes - on_pins) * scale.ravel()[row]
     shape = (len(found), -1, 6, found.shape[-1])
     return {"pin": pin.reshape(shape), "support": support.reshape(shape)}
+
+
+_SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "tooth_loads")
+
+
+def _remarks(results: Results, stem: str) -> Iterator[str]:
+    if stem in _SPUR_TEETH:
+        yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
+
+
+def _figures(name: str) -> Callable[[], Figures]:
+    """Figures of a stage, loaded when they are drawn."""
+
+    def load() -> Figures:
+        from femgear.trains.helical.figures import FIGURES
+
+        return FIGURES[name]
+
+    return load
+
+
+def _given(case: Case) -> bool:
+    return case.helical.mesh_stiffness is not None
+
+
+HELICAL = Train(
+    name="helical",
+    words="a helical case",
+    owns=lambda case: getattr(case, "helical", None) is not None,
+    stages=(
+        Stage(
+            name="static",
+            title="Static",
+            solve=lambda case, _, context: solve_helical_static(
+                case, cache=context.cache, progress=context.progress
+            ),
+            verdict=static_stages.static_verdict,
+            describe=lambda results: describe_helical_static(
+                results.static, results.modes if "modes" in results.stages else None
+            ),
+            figures=_figures("static"),
+            unavailable=lambda case: (
+                "a given helical.mesh_stiffness takes the place of the static solution"
+                if _given(case)
+                else ""
+            ),
+            check=planetary_set,
+        ),
+        Stage(
+            name="modes",
+            title="Modes",
+            solve=lambda case, results, context: solve_helical_modes(
+                case, results.get("static"), cache=context.cache
+            ),
+            verdict=lambda result: {
+                "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
+            },
+            describe=lambda results: describe_modes(results.modes),
+            figures=_figures("modes"),
+            needs=lambda case: () if _given(case) else ("static",),
+            check=lambda case: check_helical_case(case, planetary_set(case)),
+        ),
+        Stage(
+            name="dynamics",
+            title="Dynamics",
+            solve=lambda case, results, context: solve_helical_dynamics(
+                case, results["modes"], progress=context.progress
+            ),
+            verdict=static_stages.response_verdict,
+            describe=lambda results: describe_response(results.dynamics),
+            figures=_figures("dynamics"),
+            unavailable=lambda case: (
+                "a given helical.mesh_stiffness does not vary: nothing excites the set"
+                if _given(case)
+                else ""
+            ),
+            needs=lambda case: ("modes",),
+        ),
+    ),
+    describe=lambda case: describe_case(
+        case, model=tuple(describe_helical(case, planetary_set(case))), warnings=set_warnings(case)
+    ),
+    warnings=set_warnings,
+    result_warnings=lambda results: (
+        response_warnings(results.dynamics) if "dynamics" in results.stages else ()
+    ),
+    figures=static_stages.case_figures,
+    remarks=_remarks,
+)  # fmt: skip

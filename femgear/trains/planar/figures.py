@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.case import planetary_set
+from femgear.report.response import mode_shapes, shown_speeds
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure
 from femgear.trains.planar.model import TAIL_LIMIT, merged_folds
+from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -472,3 +475,82 @@ def _carrier_turn(response: xr.Dataset, speed: int) -> tuple[np.ndarray, np.ndar
     turn = np.linspace(0.0, 1.0, count + 1)
     wave = np.exp(2j * np.pi * duration * turn[:, None] * response["frequency"].values[speed])
     return turn, wave
+
+
+def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
+    return {"mode_shapes": mode_shapes(drawn.data["modes"], planetary_set(drawn.case))}
+
+
+def _response_figures(drawn: Drawn) -> dict[str, Figure]:
+    response, figures = drawn.data["response"], {}
+    for s in shown_speeds(response):
+        name = f"{round(float(response['speed'][s]))}_rpm"
+        figures |= {f"{key}_{name}": figure for key, figure in response_figures(response, s).items()}
+    if response.sizes["speed"] > 1:
+        figures["contact_over_speed"] = contact_over_speed(response)
+    return figures
+
+
+FIGURES = {
+    "modes": Figures(
+        {
+            "mode_shapes": (
+                "Mode shapes with mean mesh stiffness: bodies with a mark of their rotation, and the outer "
+                "surface of the ring; at rest in grey."
+            ),
+        },
+        draw=_modes_figures,
+    ),
+    "branch": Figures(
+        {
+            "weight_response": (
+                "Displacement of carrier, ring and sun over the frequency of the weight in the carrier "
+                "frame, r.m.s. about the mean. Circles: limit points, those that corners of the tooth "
+                "contact split drawn as one."
+            ),
+            "carrier_orbit": (
+                "Path of the carrier's centre in the carrier frame during one turn of the weight against "
+                "it, at the responses that the legend names."
+            ),
+            "planet_bearing_forces": (
+                "Force between every planet and its pin during one turn of the weight against the carrier, "
+                "at the response that the title names."
+            ),
+            "wedged_teeth": (
+                "Forces of both flanks of the meshes of planet 1 during one turn of the weight, at the "
+                "response that the title names. Where both flanks of a mesh carry at once its teeth are "
+                "wedged."
+            ),
+            "tooth_contact": (
+                "State of both flanks of the meshes of planet 1 over the frequency of the weight: 1 in "
+                "contact all the time, 0 never."
+            ),
+        },
+        draw=lambda drawn: branch_figures(drawn.data["branch"]),
+    ),
+    "response": Figures(
+        {
+            "response_orbit": (
+                "Paths of the centres of carrier, ring and sun in the carrier frame during one turn of the "
+                "carrier ({})."
+            ),
+            "response_bearing_forces": (
+                "Force between every planet and its pin during one turn of the carrier ({})."
+            ),
+            "response_mesh_forces": (
+                "Mesh forces of planet 1 during one turn of the carrier ({}), and during six mesh periods "
+                "where the mesh stiffness varies. They are drawn from their lines."
+            ),
+            "response_spectrum": (
+                "Lines of a mesh force and of the carrier's displacement ({}): multiples of the weight's "
+                "frequency, and of the mesh frequency with their side bands where the mesh stiffness "
+                "varies."
+            ),
+            "contact_over_speed": (
+                "State of both flanks of the meshes of planet 1 over the speed: 1 in contact all the time, "
+                "0 never."
+            ),
+        },
+        draw=_response_figures,
+    ),
+}

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
     from femgear.solvers.continuation.branches import Branch
     from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
+    from femgear.storage.results import Results
     from femgear.system.lumped import PlanarSet
     from femgear.system.system import Modes
     from femgear.trains.planar.model import MotionLines, PlanarModel
@@ -576,3 +577,52 @@ def published_modes(case: Case, data: xr.Dataset) -> Block | None:
         )
     header = ("kind", "published [Hz]", "nearest here [Hz]", "difference [%]", "source")
     return Block("Published natural frequencies", header, tuple(rows))
+
+
+# Pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces.
+_BY_STABILITY = ("weight_response", "tooth_contact")
+_OF_RESPONSE = (
+    "response_orbit", "response_bearing_forces", "response_mesh_forces", "response_spectrum",
+    "contact_over_speed",
+)  # fmt: skip
+_OF_BRANCH = ("weight_response", "carrier_orbit", "planet_bearing_forces", "wedged_teeth", "tooth_contact")
+_OF_MOTION = ("weight_response", "carrier_orbit", "response_orbit")
+
+
+def remarks(results: Results, stem: str) -> Iterator[str]:
+    """What a case and its results add to the caption of a picture."""
+    yield from comparisons(results.case, stem)
+    yield from doubts(results, stem)
+
+
+def comparisons(case: Case, stem: str) -> Iterator[str]:
+    """How to read a picture of this case, and published ones beside it."""
+    planar = case.planar
+    if stem in _BY_STABILITY and planar.branch is not None:
+        yield (
+            "Drawn through: stable by Floquet's theory; dashed: not stable; dotted: not known."
+            if planar.branch.stability
+            else "Stability was not computed: everything is drawn through."
+        )
+    if planar.mesh_stiffness is not None and stem.startswith(_OF_RESPONSE):
+        yield "The mesh stiffness of this case is constant: the weight alone varies, at no mesh frequency."
+    for entry in planar.published:
+        if entry.figure is not None and (stem == entry.figure or stem.startswith(f"{entry.figure}_")):
+            yield f"Beside {entry.source}: {entry.comparison}"
+
+
+def doubts(results: Results, stem: str) -> Iterator[str]:
+    """What the results say against a picture."""
+    from femgear.trains.planar.model import TAIL_LIMIT
+
+    stage = "branch" if stem in _OF_BRANCH else "response" if stem.startswith(_OF_RESPONSE) else None
+    if stage is None or stage not in results.stages:
+        return
+    data = results.stage(stage)
+    motion, force = (float(data[name].max()) for name in ("tail", "force_tail"))
+    tail = motion if stem.startswith(_OF_MOTION) else max(motion, force)
+    if tail > TAIL_LIMIT:
+        yield (
+            f"Marked where more than {TAIL_LIMIT:.0%} of the amplitude lies in the upper half of the "
+            f"harmonics (up to {tail:.2g}): shapes and peaks there are not to be trusted (W-TAIL)."
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from femgear.case.case import planetary_set
 from femgear.case.checks import output_member
 from femgear.case.dependencies import check_entries, static_entries
 from femgear.case.sections import Case
+from femgear.report.tables import describe_modes
 from femgear.threads import one_blas_thread
 from femgear.trains.planar.checks import (
     bounded_branch,
@@ -21,12 +23,26 @@ from femgear.trains.planar.checks import (
     check_smoothing,
     end_of_branch,
 )
-from femgear.trains.planar.results import BranchResult, PlanarModesResult, PlanarResponseResult
-from femgear.trains.protocol import Progress
+from femgear.trains.planar.results import (
+    BranchResult,
+    PlanarModesResult,
+    PlanarResponseResult,
+    describe_branch,
+    describe_planar,
+    describe_response,
+    planar_verdicts,
+    published_modes,
+    remarks,
+)
+from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.static.description import describe_case, set_warnings
 from femgear.trains.static.results import StaticResult
+from femgear.trains.static.stages import STATIC, STRESS, case_figures
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
+    from femgear.report.tables import Block
+    from femgear.storage.results import Results
     from femgear.system.elements import GearMeshes
     from femgear.system.lumped import PlanarSet
     from femgear.trains.planar.model import PlanarModel
@@ -324,3 +340,118 @@ def _response_lines(case: Case, gears: PlanetarySet, static: StaticResult | None
     carrier, bands = (wanted.carrier_harmonics, wanted.side_bands) if turns else (0, 0)
     mesh = case.response_harmonics if case.planar.mesh_stiffness is None else 0
     return side_bands(carrier, mesh, bands)
+
+
+def _branch_verdict(result: BranchResult) -> dict:
+    branch = result.branch
+    return {
+        "converged": bool(np.all(branch.converged)),
+        "complete": bool(branch.complete),
+        "points": len(branch.parameter),
+        "folds": len(branch.folds),
+        "residual": float(np.max(branch.residual)),
+        "message": result.ending,
+        **_truncation(branch.solutions, result.lines),
+    }
+
+
+def _response_verdict(result: PlanarResponseResult) -> dict:
+    return {
+        "converged": all(one.converged for one in result.solutions),
+        "residual": max(one.residual for one in result.solutions),
+        **_truncation(result.solutions, result.lines),
+    }
+
+
+def _truncation(solutions, lines) -> dict:
+    """Largest shares of the amplitude in the upper half of the lines."""
+    return {
+        "tail": float(max(one.tail for one in solutions)),
+        "force_tail": float(max(one.force_tail for one in lines)),
+    }
+
+
+def _needs_static(case: Case) -> tuple[str, ...]:
+    return ("static",) if case.planar.mesh_stiffness is None else ()
+
+
+def _lacks(section: str) -> Callable[[Case], str]:
+    return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
+
+
+def _figures(name: str) -> Callable[[], Figures]:
+    """Figures of a stage, loaded when they are drawn."""
+
+    def load() -> Figures:
+        from femgear.trains.planar.figures import FIGURES
+
+        return FIGURES[name]
+
+    return load
+
+
+def _result_warnings(results: Results) -> Iterator[str]:
+    branch, response = (
+        results.stage(name) if name in results.stages else None for name in ("branch", "response")
+    )
+    return planar_verdicts(branch, response)
+
+
+def _published(results: Results) -> tuple[Block, ...]:
+    block = published_modes(results.case, results.modes)
+    return () if block is None else (block,)
+
+
+PLANAR = Train(
+    name="planar",
+    words="a planar case",
+    owns=lambda case: getattr(case, "planar", None) is not None,
+    stages=(
+        replace(STATIC, wanted=lambda case: bool(_needs_static(case))),
+        replace(STRESS, wanted=lambda case: bool(_needs_static(case)) and case.static.stresses),
+        Stage(
+            name="modes",
+            title="Modes",
+            solve=lambda case, results, _: solve_planar_modes(case, results.get("static")),
+            verdict=lambda result: {
+                "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
+            },
+            describe=lambda results: describe_modes(results.modes),
+            figures=_figures("modes"),
+            needs=_needs_static,
+            check=lambda case: check_planar_case(case, planetary_set(case)),
+            tables=_published,
+        ),
+        Stage(
+            name="branch",
+            title="Response to the weight",
+            solve=lambda case, results, context: solve_branch(
+                case, results.get("static"), progress=context.progress
+            ),
+            verdict=_branch_verdict,
+            describe=lambda results: describe_branch(results.branch),
+            figures=_figures("branch"),
+            unavailable=_lacks("branch"),
+            needs=lambda case: ("modes",),
+        ),
+        Stage(
+            name="response",
+            title="Weight and mesh frequency",
+            solve=lambda case, results, context: solve_planar_response(
+                case, results.get("static"), progress=context.progress
+            ),
+            verdict=_response_verdict,
+            describe=lambda results: describe_response(results.response),
+            figures=_figures("response"),
+            unavailable=_lacks("response"),
+            needs=lambda case: ("modes",),
+        ),
+    ),
+    describe=lambda case: describe_case(
+        case, model=(describe_planar(case, planetary_set(case)),), warnings=set_warnings(case)
+    ),
+    warnings=set_warnings,
+    result_warnings=_result_warnings,
+    figures=case_figures,
+    remarks=remarks,
+)  # fmt: skip

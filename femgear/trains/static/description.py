@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import shaft_lines
+from femgear.case.case import planetary_set, set_deviations, shaft_lines
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviation_checks import check_deviations
 from femgear.gears.gear import tooth_thickness
-from femgear.gears.kinematics import MEMBERS, speeds, torques
+from femgear.gears.kinematics import speeds, torques
 from femgear.gears.phasing import KINDS, ZERO, phasing_of_set, phasing_table
 from femgear.gears.teeth_numbers import ToothChoices, neighbouring_teeth
-from femgear.report.tables import Block
-from femgear.trains.elastic.model import MAX_DIAMETER
-from femgear.trains.elastic.results import _MANY
-from femgear.trains.helical.results import describe_helical
-from femgear.trains.planar.results import describe_planar
+from femgear.report.tables import MANY, Block
+from femgear.storage.dataset import RPM
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -107,45 +104,36 @@ def _row(found: ToothChoices, i: int) -> tuple[str, ...]:
     )
 
 
-RPM = math.pi / 30
-
-
-# Angle between the ends of a coupling that is worth a warning [rad].
-MOST_WINDING = 1.0
-
-
-def describe_case(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
-    """Geometry, operation and warnings of a case.
+def describe_case(case: Case, *, model: tuple[Block, ...] = (), warnings: Sequence[str]) -> tuple[Block, ...]:
+    """Geometry, operation and warnings of a planetary set.
 
     Parameters
     ----------
     case : Case
-    planetary : PlanetarySet
-        As `femgear.case.case.planetary_set` makes it.
+    model : tuple of Block
+        What a train adds about its model.
+    warnings : sequence of str
 
     Returns
     -------
     tuple of Block
     """
-    planar = () if case.planar is None else (describe_planar(case, planetary),)
-    helical = () if case.helical is None else describe_helical(case, planetary)
+    planetary = planetary_set(case)
     return (
         Block(case.title),
         _gears(planetary),
         _meshes(planetary),
         *describe_phasing(planetary),
         _operation(case, planetary),
-        *planar,
-        *helical,
-        Block("Warnings", notes=warnings_of(case, planetary) or ("none",)),
+        *model,
+        Block("Warnings", notes=tuple(warnings) or ("none",)),
     )
 
 
-def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
-    """What is allowed but deserves a look, in sentences."""
+def set_warnings(case: Case) -> tuple[str, ...]:
+    """What is allowed in any planetary set but deserves a look, in sentences."""
+    planetary = planetary_set(case)
     found = [str(warning) for warning in check_set(planetary)] + list(case.notices)
-    from femgear.case.case import set_deviations
-
     found += [str(warning) for warning in check_deviations(set_deviations(case), planetary)]
     if case.operation.torque == 0:
         found.append(
@@ -153,40 +141,7 @@ def warnings_of(case: Case, planetary: PlanetarySet) -> tuple[str, ...]:
         )
     if case.operation.torque < 0:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
-    elastic = case.planar is None and case.helical is None
-    if elastic and case.dynamics.damping_ratio == 0.0 and case.operation.fixed == "ring":
-        found.append(
-            "[W-DAMPING] dynamics.damping_ratio: without damping resonances have no limit, and levels depend "
-            "on how near a line lies to one; 0.02 to 0.05 is usual"
-        )
-    if elastic:
-        found += _wound_up(case, planetary)
-    if elastic and case.planet.bearing_clearance and case.operation.fixed == "ring":
-        found.append(
-            "[W-BEARING] planet.bearing_clearance: the dynamics have linear planet bearings; the clearance "
-            'acts in the static results alone, with static.members = "elastic"'
-        )
-    if elastic and case.housing.form == "linear" and case.housing.points <= 2 * MAX_DIAMETER:
-        found.append(
-            f"[W-POINTS] housing.points: {case.housing.points} points do not resolve the ring's "
-            f"{MAX_DIAMETER} nodal diameters; use more than {2 * MAX_DIAMETER}"
-        )
     return tuple(found)
-
-
-def _wound_up(case: Case, planetary: PlanetarySet) -> Iterator[str]:
-    """Couplings that the torque turns further than any stands: a slip of units, as a rule."""
-    acting = torques(planetary, member=case.operation.input, torque=case.operation.torque)
-    output = next(name for name in MEMBERS if name not in (case.operation.input, case.operation.fixed))
-    for name, member in (("motor", case.operation.input), ("brake", output)):
-        section = getattr(case, name)
-        angle = 0.0 if section is None else abs(getattr(acting, member)) / section.coupling_stiffness
-        if angle > MOST_WINDING:
-            yield (
-                f"[W-COUPLING] {name}.coupling_stiffness: {section.coupling_stiffness:.4g} N m/rad lets the "
-                f"torque turn the coupling by {math.degrees(angle):.4g} deg; couplings stand a few degrees, "
-                "elastic ones twenty"
-            )
 
 
 def _gears(s: PlanetarySet) -> Block:
@@ -252,8 +207,8 @@ def _meshes(s: PlanetarySet) -> Block:
 def _operation(case: Case, s: PlanetarySet) -> Block:
     operation = case.operation
     chosen = operation.speeds
-    if len(chosen) > _MANY:
-        chosen = (*chosen[: _MANY // 2], *chosen[-_MANY // 2 :])
+    if len(chosen) > MANY:
+        chosen = (*chosen[: MANY // 2], *chosen[-MANY // 2 :])
     rows = []
     for speed in chosen:
         v = speeds(s, input=operation.input, fixed=operation.fixed, speed=speed)
@@ -264,7 +219,7 @@ def _operation(case: Case, s: PlanetarySet) -> Block:
         f"input {operation.input}, fixed {operation.fixed}; torque on sun {load.sun:.6g} N m, "
         f"carrier {load.carrier:.6g} N m, ring {load.ring:.6g} N m"
     ]
-    if len(operation.speeds) > _MANY:
+    if len(operation.speeds) > MANY:
         notes.append(f"{len(operation.speeds)} speeds, of which the first and the last are shown")
     notes += shaft_lines(case)
     header = ("sun [rpm]", "carrier [rpm]", "ring [rpm]", "planet [rpm]", "mesh frequency [Hz]")

@@ -11,10 +11,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.case import planetary_set, set_deviations
 from femgear.gears.modifications import form_deviation
 from femgear.gears.phasing import MODES, MeshPhasing, PhasingTable, phase_factors, phasing_table
 from femgear.report.style import (
@@ -34,6 +37,7 @@ from femgear.report.style import (
     new_figure,
     periodic,
 )
+from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -719,3 +723,151 @@ def mesh_force_spectra(
 
 def _xy(points):
     return np.real(points), np.imag(points)
+
+
+# pictures need no converged stresses: a sector of some thousand nodes keeps the files small
+PICTURE_FLANK_ELEMENTS = 6
+PICTURE_REFINE = 0.35
+
+
+def _static_figures(drawn: Drawn) -> dict[str, Figure]:
+    static = drawn.data["static"]
+    return {
+        "static_transmission_error": static_transmission_error(static),
+        "mesh_stiffness": mesh_stiffness(static, face_width=planetary_set(drawn.case).sun.face_width),
+        "load_sharing": load_sharing(static),
+        "tooth_loads": tooth_loads(static),
+    }
+
+
+def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
+    """Charts of profiles and pitches; none of a kind that the set does not have."""
+    gears, deviations = planetary_set(drawn.case), set_deviations(drawn.case)
+    figures = {}
+    if has_profiles(deviations, gears):
+        figures["profile_deviations"] = profile_chart(deviations, gears)
+    if has_pitches(deviations):
+        figures["pitch_deviations"] = pitch_chart(deviations, gears)
+    return figures
+
+
+def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
+    """Figures of stress.nc; distributions and turns are not in records of several mesh periods."""
+    stress = drawn.data["stress"]
+    figures = {
+        "root_stress": root_stress_history(stress),
+        "root_profile": root_stress_profile(stress),
+        "load_spectrum": load_spectrum(stress),
+    }
+    if "pressure_distribution" in stress:
+        figures["contact_pressure"] = contact_pressure(stress)
+    if "planet_root_stress" in stress:
+        figures["planet_bending"] = planet_bending(stress)
+    return figures
+
+
+def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
+    """The whole set deformed by the static loads of position zero, as VTU and picture."""
+    from femgear.contact.bodies import deformed_set, make_sectors
+    from femgear.contact.cycle import walk_mesh_cycle
+    from femgear.contact.sides import mirrored_set
+    from femgear.fe.elasticity import Material
+    from femgear.fe.grid import copy_nodes, rotated_copies
+    from femgear.report.scene import assemble_set, deformed_picture, placed, write_vtu
+
+    static, case = drawn.results.get("static"), drawn.case
+    if static is None or not static.cycle.force.any():
+        return []
+
+    gears, cycle, side = static.planetary_set, static.cycle, 1.0
+    if static.sun_torque < 0:
+        gears, side = mirrored_set(gears)[0], -1.0
+        cycle = walk_mesh_cycle(
+            gears, static.bodies, sun_torque=-static.sun_torque, positions=1, contact=case.static.contact
+        )
+    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    sectors = make_sectors(
+        gears, material, flank_elements=PICTURE_FLANK_ELEMENTS, refine=PICTURE_REFINE, cache=drawn.cache
+    )
+    bodies = []
+    for body in deformed_set(gears, sectors, cycle):
+        sector = getattr(sectors, body.kind)
+        count = sector.gear.teeth
+        numbers, whole = copy_nodes(sector.grid, count), rotated_copies(sector.grid, count)
+        displacement = np.zeros((len(whole.points), 2))
+        for k in range(count):
+            angle = 2 * np.pi * k / count
+            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            displacement[numbers[k]] = body.displacement[k] @ turn.T
+        bodies.append(
+            placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=displacement)
+        )
+    if side < 0:
+        bodies = [_reflected(body) for body in bodies]
+    grid = assemble_set(bodies)
+    write_vtu(grid, folder / "deformed_set.vtu")
+    title = "static deflection, position 0"
+    deformed_picture(grid, folder / "deformed_set.png", title=title)
+    return ["deformed_set.vtu", "deformed_set.png"]
+
+
+def _reflected(body):
+    """A body seen from behind: y reversed, and the triangles turned round with it."""
+    flip = np.array([1.0, -1.0])
+    return replace(
+        body,
+        points=body.points * flip,
+        displacement=body.displacement * flip,
+        triangles=body.triangles[:, [0, 2, 1, 5, 4, 3]],
+    )
+
+
+STRESSES = Figures(
+    {
+        "contact_pressure": (
+            "Contact pressure of one tooth pair on its way through the mesh: largest value beside the "
+            "nominal stress of ISO 6336-2, and distribution along the common tangent. At the ends tip "
+            "corners touch."
+        ),
+        "load_spectrum": (
+            "Load spectrum of a tooth: share of the time under load in every load class, and the largest "
+            "loads of its load cycles."
+        ),
+        "root_stress": (
+            "Stress in the roots of one tooth on its way through the mesh, beside the nominal stress of ISO "
+            "6336-3."
+        ),
+        "root_profile": (
+            "Stress along the roots of the tooth when its tension is largest; dotted the section of ISO "
+            "6336-3, where the tangent stands at 30° (internal gears 60°) to the centreline of the tooth."
+        ),
+        "planet_bending": (
+            "Roots of a planet's tooth while the planet turns once against the carrier: the sun bends it "
+            "one way, the ring the other."
+        ),
+    },
+    draw=_stress_figures,
+)
+STATIC = Figures(
+    {
+        "static_transmission_error": (
+            "Static transmission error over one mesh period: every mesh along its line of action, and from "
+            "sun to ring. Sun and planets held at their bores, ring at its outer surface."
+        ),
+        "mesh_stiffness": (
+            "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (thick) and secant F/δ "
+            "(thin)."
+        ),
+        "load_sharing": "Share of every planet in the torque of the sun.",
+        "tooth_loads": "Load of one tooth pair from its first to its last contact.",
+        "profile_deviations": (
+            "Deviations of the loaded flanks from the involute over the roll angle, positive with more "
+            "material."
+        ),
+        "pitch_deviations": "Cumulative pitch deviations of the loaded flanks over the tooth number.",
+        "deformed_set": "Deformed set under the static load, magnified; at rest in grey.",
+    },
+    draw=_static_figures,
+    write=(_write_deformed_set,),
+)
+DEVIATIONS = Figures({}, draw=_deviation_figures)

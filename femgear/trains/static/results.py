@@ -515,7 +515,8 @@ def _compared(found: float, nominal: float) -> tuple[str, str, str]:
     return f"{found * 1e-6:.1f}", f"{nominal * 1e-6:.1f}" if known else "-", ratio
 
 
-def _static(data: xr.Dataset) -> Block:
+def describe_static(data: xr.Dataset) -> Block:
+    """Transmission errors, stiffnesses and load sharing of static.nc."""
     rows = []
     for mesh in data.mesh.values:
         one = data.sel(mesh=mesh)

@@ -15,9 +15,15 @@ from femgear.case.sections import Case
 from femgear.contact.load_spectrum import load_spectrum, loaded_teeth, root_ranges
 from femgear.errors import GeometryError
 from femgear.threads import one_blas_thread
-from femgear.trains.protocol import Progress
+from femgear.trains.protocol import Figures, Progress, Stage
 from femgear.trains.static.checks import check_motions
-from femgear.trains.static.results import NominalStresses, StaticResult, StressResult
+from femgear.trains.static.results import (
+    NominalStresses,
+    StaticResult,
+    StressResult,
+    describe_static,
+    describe_stress,
+)
 
 if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
@@ -254,3 +260,61 @@ def nominal_stresses(
             except GeometryError as error:
                 messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
     return NominalStresses(contact, root, "; ".join(dict.fromkeys(messages)))
+
+
+def static_verdict(result: StaticResult) -> dict:
+    """Residual, message and kind of contact of a static solution, for the manifest."""
+    cycle = result.cycle
+    return {"residual": float(cycle.residual.max()), "message": cycle.message, "contact": cycle.contact}
+
+
+def response_verdict(result) -> dict:
+    """Convergence and stability of a periodic response, for the manifest."""
+    return {
+        "converged": bool(np.all(result.response.converged)),
+        "stable": bool(np.all(result.stability.stable)),
+        "residual": float(np.max(result.response.residual)),
+        "message": result.response.message,
+    }
+
+
+def _static_figures() -> Figures:
+    from femgear.trains.static.figures import STATIC
+
+    return STATIC
+
+
+def _stress_figures() -> Figures:
+    from femgear.trains.static.figures import STRESSES
+
+    return STRESSES
+
+
+def case_figures() -> Figures:
+    """Charts of the deviations of a case."""
+    from femgear.trains.static.figures import DEVIATIONS
+
+    return DEVIATIONS
+
+
+STATIC = Stage(
+    name="static",
+    title="Static",
+    solve=lambda case, _, context: solve_static(case, cache=context.cache, progress=context.progress),
+    verdict=static_verdict,
+    describe=lambda results: describe_static(results.static),
+    figures=_static_figures,
+    check=planetary_set,
+)
+STRESS = Stage(
+    name="stress",
+    title="Stresses",
+    solve=lambda case, results, context: solve_stress(case, results["static"], progress=context.progress),
+    verdict=lambda result: {
+        "root_points": sum(len(root.arc) for root in result.roots), "iso": result.nominal.message,
+    },
+    describe=lambda results: describe_stress(results.stress),
+    figures=_stress_figures,
+    wanted=lambda case: case.static.stresses,
+    needs=lambda case: ("static",),
+)  # fmt: skip

@@ -1,0 +1,348 @@
+"""Figures that several trains draw: mode shapes, transmission errors over period and harmonics, sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.report.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREEN,
+    GREY,
+    MARKERS,
+    SIZE,
+    VERMILION,
+    distinct_lines,
+    excited_to,
+    label,
+    legend_below,
+    line_style,
+    new_figure,
+    periodic,
+    rpm,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from femgear.gears.planetary import PlanetarySet
+
+
+# spectra end so far below their largest line, and have bars up to so many
+MANY_SPEEDS = 3
+"""More speeds are drawn over the speed, too."""
+_DECADES, _MOST_BARS = 1e-5, 60
+
+
+def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
+    """Complex harmonics of a variable stored as real and imaginary part."""
+    return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
+
+
+def fine_positions(harmonics: int) -> np.ndarray:
+    """Positions of one mesh period, enough for a curve of so many harmonics."""
+    return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
+
+
+def name_kinds(ax, dynamics: xr.Dataset) -> None:
+    """Legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
+    known = "excitation" if "excitation_limit" in dynamics else "response"
+    for text, look in (
+        ("dynamic (thick)", {"linewidth": 2.0}),
+        (f"static, harmonics of the {known} (thin)", {"linewidth": 0.9}),
+        ("static, whole (pale)", {"linewidth": 2.5, "alpha": 0.3}),
+    ):
+        ax.plot([], [], color=BLACK, label=text, **look)
+
+
+def draw_static(ax, at, values, harmonics: int, position, style) -> None:
+    """Static transmission error [m] less its mean: the whole record pale, its first harmonics thin."""
+    at, whole, part = _fluctuation(at, values, harmonics, position)
+    ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
+    ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
+
+
+def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
+    """Highest harmonic of the mesh frequency that excites: by ``excitation_limit`` [Hz] where it is known."""
+    highest = int(dynamics["harmonic"].values.max())
+    if "excitation_limit" not in dynamics:
+        return highest
+    limit = float(dynamics["excitation_limit"].values[speed_index])
+    frequency = float(dynamics["mesh_frequency"].values[speed_index])
+    return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
+
+
+def _fluctuation(at, values, harmonics: int, position):
+    """A record of one period less its mean, closed, and the sum of its first harmonics at `position`.
+
+    The record is linear between its positions, which may be closer where it is steep. Harmonics of such a
+    curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
+    """
+    at, value = periodic(at, values)
+    mean = np.trapezoid(value, at) / (at[-1] - at[0])
+    slope = np.diff(value) / np.diff(at)
+    jump, h = slope - np.roll(slope, 1), np.arange(1, harmonics + 1)
+    line = -2.0 * np.exp(-2j * np.pi * np.outer(h, at[:-1])) @ jump / (2.0 * np.pi * h) ** 2
+    return at, value - mean, (line @ np.exp(2j * np.pi * np.outer(h, position))).real
+
+
+def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
+    """Amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
+
+    Parameters
+    ----------
+    dynamics : xarray.Dataset
+        With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m].
+
+    Returns
+    -------
+    Figure
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    speeds = some_speeds(dynamics.sizes["speed"])
+    figure, axes = panels(len(speeds))
+    h = dynamics["harmonic"].values
+    amplitude, h = np.abs(harmonics_of(dynamics, "dte"))[:, :, h > 0] * 1e6, h[h > 0]
+    names, largest = dynamics["mesh"].values, amplitude[speeds].max(initial=0.0)
+    # below are rounding and what the iteration leaves: no line is drawn there
+    floor = _DECADES * largest
+    for ax, s in zip(axes, speeds):
+        lines = distinct_lines(names, amplitude[s])
+        few = len(lines) * len(h) <= _MOST_BARS
+        for i, (text, row) in enumerate(lines):
+            shown = amplitude[s, row] > floor
+            if few:
+                _bars(ax, h[shown], amplitude[s, row][shown], i, len(lines), text)
+            else:
+                _dots(ax, h[shown], amplitude[s, row][shown], floor, i, text)
+        if largest > 0.0:
+            ax.set_yscale("log")
+            ax.set_ylim(floor, 2.0 * largest)
+        # speeds may reach different harmonics: axes end with the last line
+        last = h[(amplitude[s] > floor).any(axis=0)].max(initial=1)
+        ax.set_xlim(0.4, last + 0.6)
+        ax.xaxis.set_major_locator(MaxNLocator(nbins=12, integer=True))
+        title = rpm(dynamics["speed"].values[s]) + excited_to(dynamics, s)
+        label(ax, "harmonic of the mesh frequency [1]", title=title)
+    for ax in axes[::2]:
+        label(ax, y="amplitude of the transmission error [µm]")
+    legend_below(figure)
+    return figure
+
+
+def _bars(ax, h, amplitude, index: int, count: int, text: str) -> None:
+    """Bars of one mesh beside those of the others."""
+    width = 0.8 / count
+    ax.bar(
+        h + (index - (count - 1) / 2) * width,
+        amplitude,
+        width,
+        color=COLOURS[index % len(COLOURS)],
+        hatch=("", "///", "...", "xx")[index % 4],
+        edgecolor="white",
+        linewidth=0.5,
+        label=text,
+    )
+
+
+def _dots(ax, h, amplitude, floor, index: int, text: str) -> None:
+    """Lines of one mesh as markers on thin stems: many bars would merge."""
+    colour = COLOURS[index % len(COLOURS)]
+    ax.vlines(h, floor, amplitude, color=colour, linewidth=0.5, alpha=0.5)
+    ax.plot(h, amplitude, MARKERS[index % len(MARKERS)], color=colour, markersize=3.5, label=text)
+
+
+def speed_sweep(dynamics: xr.Dataset) -> Figure:
+    """RMS of the fluctuating transmission error over the speed, and what the solver says about each speed.
+
+    Parameters
+    ----------
+    dynamics : xarray.Dataset
+        With ``dte_real``, ``dte_imag``, ``spectral_radius``, ``floquet_multiplier`` and ``converged``.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (top, bottom) = new_figure(rows=2, height=7.0, sharex=True)
+    order = np.argsort(dynamics["speed"].values)
+    speed = dynamics["speed"].values[order]
+    h = dynamics["harmonic"].values
+    rms = np.sqrt(0.5 * (np.abs(harmonics_of(dynamics, "dte")[order][:, :, h > 0]) ** 2).sum(axis=2)) * 1e6
+    marker = {"marker": "o", "markersize": 4} if len(speed) < 40 else {}
+    lines = distinct_lines(dynamics["mesh"].values, rms.T)
+    for i, (text, row) in enumerate(lines):
+        top.plot(speed, rms[:, row], label=text, **marker, **line_style(i))
+    failed = ~dynamics["converged"].values[order].astype(bool)
+    if failed.any():
+        top.plot(
+            speed[failed], rms[failed].max(axis=1), "x", color=BLACK, markersize=8, label="not converged"
+        )
+    top.set_ylim(bottom=0)
+    label(top, y="RMS [µm]", title="fluctuation of the transmission error")
+    for name, text, colour, dash in (
+        ("spectral_radius", "spectral radius of the fixed point", BLACK, "-"),
+        ("floquet_multiplier", "largest Floquet multiplier", GREY, "--"),
+    ):
+        bottom.plot(speed, dynamics[name].values[order], dash, color=colour, label=text, **marker)
+    bottom.axhline(1.0, color=BLACK, linewidth=0.8, linestyle=":", label="limit")
+    bottom.set_ylim(bottom=0)
+    label(
+        bottom,
+        "input speed [rpm]",
+        "magnitude [1]",
+        "the iteration contracts and the motion is stable up to 1",
+    )
+    for ax, place in ((top, "outside upper center"), (bottom, "outside lower center")):
+        figure.legend(*ax.get_legend_handles_labels(), loc=place, ncols=3, fontsize=SIZE - 1, frameon=False)
+    return figure
+
+
+def panels(count: int):
+    """Figure with `count` axes of one vertical scale, two in a row."""
+    rows, columns = -(-count // 2), min(count, 2)
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=0.8 + 3.6 * rows, sharey=True
+    )
+    for ax in axes[count:]:
+        figure.delaxes(ax)
+    return figure, axes[:count]
+
+
+def some_speeds(count: int, limit: int = 4) -> list[int]:
+    """Numbers of at most `limit` speeds, spread evenly."""
+    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, limit))})
+
+
+_CIRCLE = np.linspace(0.0, 2 * np.pi, 241)
+
+
+def mode_shapes(
+    modes: xr.Dataset, planetary_set: PlanetarySet, *, shown: Sequence[int] | None = None, scale: float = 0.16
+) -> Figure:
+    """Bodies and outer ring surface in their undeformed (grey) and displaced positions.
+
+    Parameters
+    ----------
+    modes : xarray.Dataset
+        With ``shape`` (dof, mode), ``frequency`` [Hz], ``kind``, ``nodal_diameter`` and, where there is
+        an elastic ring, ``ring_shape_real`` and ``ring_shape_imag`` (mode, circumferential).
+    planetary_set : PlanetarySet
+        Radii, centre distance and planet angles.
+    shown : sequence of int, optional
+        Mode numbers from 0; the first twelve that are no rigid-body motions when omitted.
+    scale : float
+        Largest displacement as a share of the ring's outer radius.
+
+    Returns
+    -------
+    Figure
+    """
+    frequency = modes["frequency"].values
+    if shown is None:
+        elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))
+        shown = elastic[:12]
+    shown = [int(mode) for mode in shown]
+    columns = max(min(4, len(shown)), 1)
+    rows = max(-(-len(shown) // columns), 1)
+    figure, axes = new_figure(rows=rows, columns=columns, width=2.5 * columns, height=2.75 * rows + 0.5)
+    for ax in axes:
+        ax.set_axis_off()
+        ax.set_aspect("equal")
+    for ax, mode in zip(axes, shown):
+        _draw_mode(ax, modes, planetary_set, mode, scale)
+    legend_below(figure, columns=5)
+    return figure
+
+
+def _draw_mode(ax, modes, planetary_set, mode, scale):
+    shape = dict(zip((str(name) for name in modes["dof"].values), modes["shape"].values[:, mode]))
+    outer = planetary_set.ring.rim_radius
+    ring = _ring_radial(modes, mode)
+    bodies = _bodies(planetary_set)
+    largest = np.abs(ring).max()
+    for name, radius in (("ring", outer), *((name, body[1]) for name, body in bodies.items())):
+        x, y, turn = _motion(shape, name)
+        largest = max(largest, np.hypot(x, y), abs(turn) * radius)
+    factor = scale * outer / largest if largest > 0 else 0.0
+    circle = np.exp(1j * _CIRCLE)
+    ax.plot(*_xy(outer * circle), color="0.8", linewidth=1.0, label="at rest")
+    rigid = _motion(shape, "ring")
+    shift, turn = factor * (rigid[0] + 1j * rigid[1]), factor * rigid[2]
+    ax.plot(
+        *_xy((outer + factor * ring) * circle + shift),
+        color=BLACK,
+        linewidth=1.8,
+        label="ring, outer surface",
+    )
+    if "ring: rotation" in shape:
+        # a rigid ring shows its rotation by a mark in its rim
+        mark = np.array([0.9, 1.0]) * outer
+        ax.plot(*_xy(1j * mark), color="0.8", linewidth=1.0)
+        ax.plot(*_xy(shift + 1j * mark * np.exp(1j * turn)), color=BLACK, linewidth=1.8)
+    for name, (centre, radius, colour, text) in bodies.items():
+        x, y, turn = _motion(shape, name)
+        moved = centre + factor * (x + 1j * y)
+        spoke = np.exp(1j * (np.angle(centre) if centre else 0.0)) * radius
+        if name == "carrier":
+            _draw_carrier(ax, planetary_set, moved, factor * turn, colour)
+            continue
+        ax.plot(*_xy(centre + radius * circle), color="0.8", linewidth=1.0)
+        ax.plot(*_xy(np.array([centre, centre + spoke])), color="0.8", linewidth=1.0)
+        ax.plot(*_xy(moved + radius * circle), color=colour, linewidth=1.6, label=text)
+        ax.plot(
+            *_xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6
+        )
+    span = 1.24 * outer
+    ax.set_xlim(-span, span)
+    ax.set_ylim(-span, span)
+    diameter = int(modes["nodal_diameter"].values[mode])
+    text = f"mode {mode + 1}: {modes['frequency'].values[mode]:.5g} Hz\n{modes['kind'].values[mode]}"
+    ax.set_title(text + (f", n = {diameter}" if diameter >= 0 else ""), fontsize=SIZE - 1.5)
+
+
+def _draw_carrier(ax, planetary_set, moved, turn, colour):
+    pins = planetary_set.centre_distance * np.exp(1j * np.asarray(planetary_set.planet_angles, float))
+    pins = moved + pins * np.exp(1j * turn)
+    for pin in pins:
+        ax.plot(*_xy(np.array([moved, pin])), color=colour, linewidth=1.2, linestyle="--", label="carrier")
+    ax.plot(*_xy(pins), "o", color=colour, markersize=3)
+
+
+def _bodies(planetary_set):
+    """Centre, radius, colour and legend of every rigid body."""
+    bodies = {"carrier": (0j, planetary_set.centre_distance, GREEN, "carrier")}
+    bodies["sun"] = (0j, planetary_set.sun.reference_radius, VERMILION, "sun")
+    for n, angle in enumerate(planetary_set.planet_angles):
+        centre = planetary_set.centre_distance * np.exp(1j * float(angle))
+        bodies[f"planet {n + 1}"] = (centre, planetary_set.planet.reference_radius, BLUE, "planets")
+    return bodies
+
+
+def _motion(shape, name):
+    return tuple(float(shape.get(f"{name}: {axis}", 0.0)) for axis in ("x", "y", "rotation"))
+
+
+def _ring_radial(modes, mode):
+    """Radial displacement of the outer surface at the angles of `_CIRCLE`."""
+    if "ring_shape_real" not in modes:
+        return np.zeros_like(_CIRCLE)
+    n = modes["circumferential"].values
+    value = modes["ring_shape_real"].values[mode] + 1j * modes["ring_shape_imag"].values[mode]
+    return (np.exp(1j * np.outer(_CIRCLE, n)) @ value).real
+
+
+def _xy(points):
+    return points.real, points.imag
+
+
+def shown_speeds(data: xr.Dataset) -> list[int]:
+    """Indices of the speeds that get pictures of their own: all of a few, else first, middle and last."""
+    n = data.sizes["speed"]
+    return list(range(n)) if n <= MANY_SPEEDS else [0, n // 2, n - 1]
