@@ -210,7 +210,7 @@ def test_the_installed_program(tmp_path):
 
     run = started("--help")
     assert run.returncode == 0
-    for command in ("check", "run", "report", "validate"):
+    for command in ("check", "run", "report", "sweep", "schema"):
         assert command in run.stdout
     run = subprocess.run(
         [program, "check", "absent.toml"], capture_output=True, text=True, timeout=60, check=False

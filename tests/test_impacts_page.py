@@ -10,9 +10,9 @@ from femgear.solvers.chaos.lyapunov import LyapunovExponents
 
 PAGE, EXAMPLES, PRINTED = read_page("impacts.md")
 MODULES = (
-    "models.equivalent_damping", "models.transmission_errors", "models.impact_pair", "models.impact_borders",
-    "models.contact_states", "solvers.lyapunov", "solvers.summed_series", "solvers.nonlinear",
-    "solvers.branches", "solvers.sweep_response", "solvers.poincare", "plots.impacts",
+    "system.transmission_errors", "system.series", "trains.gear_pair.model",
+    "trains.gear_pair.figures", "solvers.linear.modal", "solvers.chaos.lyapunov", "solvers.chaos.poincare",
+    "solvers.continuation.branches", "solvers.continuation.sweep",
 )  # fmt: skip
 
 

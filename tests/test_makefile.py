@@ -87,7 +87,7 @@ def test_this_system_has_what_is_needed():
         ("demo", "femgear run cases/planetary_27_40_108.toml -o out/demo"),
         ("test", "-m pytest"),
         ("lint", "-m ruff check"),
-        ("validate", "femgear validate -o docs/validation.md"),
+        ("validate", "python tests/validation -o docs/validation.md"),
         ("bench", "-m pytest benchmarks"),
         ("clean", "rm -rf out"),
     ],

@@ -202,7 +202,7 @@ KILLED = """
     sys.path.insert(0, {tests!r})
     from test_optimisation import CASE, ROSENBROCK, X, Y
     from femgear import read_case
-    from femgear.optimisation import Problem, minimise
+    from femgear.study import Problem, minimise
 
     def progress(stage, done, total):
         if done == 9:

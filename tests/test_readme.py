@@ -4,6 +4,7 @@ import contextlib
 import io
 import re
 from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
@@ -56,23 +57,42 @@ def test_pictures_are_small():
 
 
 def test_module_table_names_every_module():
-    named = set(re.findall(r"`femgear\.(\w+)`", README))
-    modules = {
-        path.stem
-        for path in (ROOT / "femgear").iterdir()
-        if path.suffix == ".py" or (path / "__init__.py").exists()
-    }
-    # the exceptions and the types between stages are described where they are used
-    assert modules - {"__init__", "__pycache__", "errors", "system"} <= named
-    assert named <= modules
+    """One row a folder, every module once, in the row of its folder; ``__init__`` files go without saying."""
+    rows = re.findall(r"^\| `(femgear/[\w/]*)` \| ([^|]+) \|", README, flags=re.MULTILINE)
+    named = [folder + name for folder, names in rows for name in re.findall(r"`(\w+)`", names)]
+    paths = [path for path in (ROOT / "femgear").rglob("*.py") if path.stem != "__init__"]
+    modules = [path.relative_to(ROOT).with_suffix("").as_posix() for path in paths]
+    assert len(rows) == len({folder for folder, _ in rows}) == len({path.parent for path in paths})
+    assert sorted(named) == sorted(modules)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_pages_name_modules_and_files_that_exist(page):
+    text = page.read_text(encoding="utf-8")
+    for name in set(re.findall(r"(?<![\w/.])femgear(?:\.\w+)+", text)):
+        resolve_name(name)
+    named = set(re.findall(r"\b(?:femgear|scripts|tests|benchmarks|cases)/[\w/]+(?:\.\w+)?", text))
+    assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_pages_name_commands_that_exist(page):
+    from femgear.cli import app
+
+    text = page.read_text(encoding="utf-8")
+    fenced = re.findall(r"^```.*?^```", text, flags=re.MULTILINE | re.DOTALL)
+    named = re.findall(r"`femgear ([a-z]+)", text)
+    named += re.findall(r"^(?:\S+/)?femgear ([a-z]+)", "\n".join(fenced), flags=re.MULTILINE)
+    assert set(named) <= set(app)
 
 
 def test_command_table_names_every_command_and_script():
     from femgear.cli import app
 
     commands = {name for name in app if not name.startswith("-")}
-    assert commands >= {"check", "run", "report", "validate"}
+    assert commands >= {"check", "run", "report", "sweep", "schema"}
     assert commands <= set(re.findall(r"`femgear (\w+)", README))
+    assert "| `python tests/validation " in README
     helpers = {"script_tools.py", "drivetrain_figures.py"}
     scripts = {path.name for path in (ROOT / "scripts").glob("*.py")} - helpers
     assert scripts <= set(re.findall(r"scripts/(\w+\.py)", README))

@@ -1,15 +1,17 @@
-"""femgear validate: verdicts, the page, exit codes, and every row that does not take long."""
+"""python tests/validation: verdicts, the page, exit codes, and every row that does not take long."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from validation import themes as validation_themes
+from validation.__main__ import main
 from validation.page import markdown, summary, write_page
 from validation.rows import at_most, counted, information, printed, within
 from validation.run import Theme, run_validation
 
-from femgear.cli import main
 from femgear.errors import GridError, StorageError
 
 
@@ -100,7 +102,7 @@ def test_progress_counts_the_parts():
 def test_exit_code_and_page_of_the_command(tmp_path, monkeypatch, capsys, row, code):
     monkeypatch.setattr(validation_themes, "THEMES", (Theme("sample", "Sample", "", (lambda: (row,),)),))
     page = tmp_path / "new" / "validation.md"
-    assert main(["validate", "-o", str(page)]) == code
+    assert main(["-o", str(page)]) == code
     assert row.quantity in page.read_text(encoding="utf-8")
     out = capsys.readouterr().out
     assert ("FAILS A2: width [m]" in out) == (code == 3)
@@ -113,22 +115,69 @@ def test_one_theme_prints_its_rows_and_writes_no_page(tmp_path, monkeypatch, cap
         Theme(name, name, "", (lambda row=row: (row,),)) for name, row in (("a", GOOD), ("b", BAD))
     )
     monkeypatch.setattr(validation_themes, "THEMES", themes)
-    assert main(["validate", "--theme", "a"]) == 0
+    assert main(["--theme", "a"]) == 0
     out = capsys.readouterr().out
     assert f"passes {GOOD.case}: {GOOD.quantity}" in out and BAD.quantity not in out
-    assert main(["validate", "--theme", "b"]) == 3
+    assert main(["--theme", "b"]) == 3
     assert capsys.readouterr().out.count(f"FAILS {BAD.case}: {BAD.quantity}") == 1
-    assert main(["validate", "--theme", "c"]) == 2
+    assert main(["--theme", "c"]) == 2
     assert "allowed: a, b" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path):
+def test_without_options_the_page_of_the_repository_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    written = []
+    monkeypatch.setattr(
+        "validation.validate",
+        lambda output, *, theme, quick, progress: written.append((output, theme, quick)),
+    )
+    main([])
+    main(["--quick"])
+    page = Path(__file__).parents[1] / "docs" / "validation.md"
+    assert written == [(page, None, False), (page, None, True)]
+
+
+def test_quick_leaves_slow_parts_out_on_the_command_line(tmp_path, monkeypatch, capsys):
+    theme = Theme("sample", "Sample", "", (lambda: (GOOD,),), (lambda: (BAD,),))
+    monkeypatch.setattr(validation_themes, "THEMES", (theme,))
+    assert main(["--quick", "-o", str(tmp_path / "quick.md")]) == 0
+    assert main(["-o", str(tmp_path / "whole.md")]) == 3
+    assert "Quick validation" in (tmp_path / "quick.md").read_text(encoding="utf-8")
+
+
+def test_the_command_runs_from_any_folder(tmp_path):
+    folder = Path(__file__).parent / "validation"
+    done = subprocess.run(
+        [sys.executable, str(folder), "--theme", "none"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2 and "E-THEME" in done.stderr and "geometry" in done.stderr
+
+
+def test_an_interruption_is_no_traceback(monkeypatch, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(validation_themes, "THEMES", (Theme("a", "a", "", (interrupted,)),))
+    assert main(["--theme", "a"]) == 130
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("old")
     with pytest.raises(StorageError):
         write_page(validation(GOOD), blocked / "validation.md")
+    monkeypatch.setattr(validation_themes, "THEMES", (Theme("a", "a", "", (lambda: (GOOD,),)),))
+    assert main(["-o", str(blocked / "validation.md")]) == 4
     assert blocked.read_text() == "old"
+
+
+def test_the_head_of_the_page_is_that_of_the_command():
+    page = Path(__file__).parents[1] / "docs" / "validation.md"
+    head = markdown(validation(GOOD)).split("1 rows: ")[0]
+    assert page.read_text(encoding="utf-8").startswith(head)
 
 
 PARTS = [(theme, part) for theme in validation_themes.THEMES for part in theme.parts]

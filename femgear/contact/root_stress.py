@@ -251,7 +251,7 @@ def root_stress_cycle(
     cycle : MeshCycle
         Of that set. The load of a tooth pair acts at its point on the line of action.
     reverse : bool
-        Whether the cycle is that of a negative torque on the sun, `mirrored.walk_either_flank`; the stress
+        Whether the cycle is that of a negative torque on the sun, `cycle.walk_either_flank`; the stress
         field is then the mirror image of that on the other flanks.
 
     Returns

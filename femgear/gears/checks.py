@@ -37,7 +37,7 @@ _SEEN = 1e-9
 
 
 def check_interference(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
-    """Refuse involute, fillet and trochoid interference of a set; see `checks.check_set`."""
+    """Refuse involute, fillet and trochoid interference of a set; see `check_set`."""
     warnings = []
     for gear, partner, reach in active_limits(planetary):
         if reach < 0.0 and partner.internal:

@@ -4,8 +4,8 @@ All separations are in metres along the flank normal, positive where material is
 further apart; they add to the gap of the contact problem. Loaded flanks are those of a positive sun torque:
 left of the sun on left of the planet ("sun side"), right of the planet ("ring side") on left of the ring.
 
-Teeth are numbered counter-clockwise; tooth 0 of a gear is the one whose centre `motion.orientations` gives:
-of the sun and of every planet a tooth that touches at the pitch point of its mesh "sun-planet" at the
+Teeth are numbered counter-clockwise; tooth 0 of a gear is the one whose centre `kinematics.orientations`
+gives: of the sun and of every planet a tooth that touches at the pitch point of its mesh "sun-planet" at the
 position ``-phi``, of the ring one that touches at the pitch point of "planet 1-ring" there. A displacement
 ``u`` of a body changes the separation by its component along the line of action: involute flanks are parallel
 curves, so this is exact to first order (the next term is ``u^2`` over the centre distance).

@@ -135,7 +135,7 @@ class GeometryWarning:
 
 
 def check_gear(gear: Gear) -> None:
-    """Refuse a gear that cannot be made; see the errors of `gear.Gear`."""
+    """Refuse a gear that cannot be made; see the errors of `Gear`."""
     _check_numbers(gear)
     _check_rack(gear)
     _check_circles(gear)

@@ -1,4 +1,4 @@
-"""Figures of the design maps; functions take the results of `femgear.design`.
+"""Figures of the design maps; functions take the results of `femgear.study`.
 
 Figures of searches and sweeps; functions take arrays.
 """

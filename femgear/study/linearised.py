@@ -1,4 +1,4 @@
-"""The contact problem at every position with its linear answer to separations; see `derivatives`.
+"""The contact problem at every position with its linear answer to separations; see `sensitivity`.
 
 What all variants of a design share: the gears of a case, their compliance, supports and deviations.
 """

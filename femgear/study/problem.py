@@ -158,7 +158,7 @@ def open_designs(
     Raises
     ------
     StorageError
-        See `journal.open_journal`.
+        See `variants.open_journal`.
     """
     with open_journal(journal, case, tuple(" = ".join(names) for names in keys)) as records:
         yield Designs(case, tuple(keys), records, cache=cache, progress=progress)
@@ -365,7 +365,7 @@ def evaluations(
     max_designs: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Evaluations]:
-    """Evaluations of a problem; parameters as for `designs.open_designs`."""
+    """Evaluations of a problem; parameters as for `open_designs`."""
     keys = [variable.key for variable in problem.variables]
     with open_designs(problem.case, keys, journal=journal, cache=cache, progress=progress) as designs:
         yield Evaluations(problem, designs, max_designs=max_designs)

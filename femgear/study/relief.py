@@ -3,7 +3,7 @@
 S. L. Harris, "Dynamic loads on the teeth of spur gears", Proc. IMechE 172 (1958): a relief takes off the tips
 what the teeth bend under one torque, and the transmission error is then nearly constant under that torque.
 
-Parameters of the deviations: functions of one number that return deviations, for `derivatives`.
+Parameters of the deviations: functions of one number that return deviations, for `sensitivity`.
 
 The tip relief with the least transmission error at one torque, and whether it is a minimum.
 """
@@ -361,7 +361,7 @@ def tooth_pitch_error(
 
 
 def relief_amount(deviations, planetary_set: PlanetarySet, *, length: float, **options) -> Parameter:
-    """Amount [m] of the tip relief of `relief.with_tip_relief`; options are its ``power`` and ``back``."""
+    """Amount [m] of the tip relief of `with_tip_relief`; options are its ``power`` and ``back``."""
     base = no_deviations(planetary_set) if deviations is None else deviations
     return lambda value: with_tip_relief(base, planetary_set, amount=value, length=length, **options)
 

@@ -435,7 +435,7 @@ def pareto_front(
     points : int
         Weights, the two ends included.
     start, samples, max_designs, seed, journal, cache, progress
-        As for `search.minimise`; an optimum of the first objective is a good start.
+        As for `minimise`; an optimum of the first objective is a good start.
 
     Returns
     -------

@@ -143,7 +143,7 @@ def sensitivity(
     linear : LinearContact
         Of the set with the deviations ``variant(value)``.
     variant : callable
-        Deviations (of the set as it is, not mirrored) for a value of the parameter, see `parameters`.
+        Deviations (of the set as it is, not mirrored) for a value of the parameter, see `relief`.
     value : float
     step : float
         The separations are differentiated centrally over twice this; exact where they are linear in the

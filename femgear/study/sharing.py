@@ -8,7 +8,7 @@ compliance C between different planets through their common bodies and supports,
 
 with separations ``e`` from the pins, and the sun's rotation and free axis motions ``q``: the contact problem
 again with one unknown a planet. What is lost is the change of C with the loads, see
-`samples.SharingModel.coupling_change`; where all planets carry the same force nothing is lost.
+`SharingModel.coupling_change`; where all planets carry the same force nothing is lost.
 
 Load sharing of many samples at once from the load-deflection curves of the planets.
 """

@@ -254,7 +254,7 @@ def sweep_into(
     folder : path
         Created where it does not exist.
     over : sequence of str
-        As `sweep.parse_over` takes them.
+        As `parse_over` takes them.
     of : sequence of str
         Quantities, see `names.NAMES`.
     speeds : (str, str), optional

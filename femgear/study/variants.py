@@ -179,7 +179,7 @@ def at_speeds(case: Case, speeds: Range) -> Case:
 
 @one_blas_thread()
 def _static(case: Case, shared: Shared) -> StaticResult:
-    """As `analysis.solve_static`, with the compliances of an earlier variant where they are the same."""
+    """As `solve_static`, with the compliances of an earlier variant where they are the same."""
     from femgear.contact.cycle import walk_either_flank
     from femgear.contact.supports import RIGID
     from femgear.gears.deviations import common_period
@@ -217,7 +217,7 @@ def _static(case: Case, shared: Shared) -> StaticResult:
 
 @one_blas_thread()
 def _modal_basis(case: Case, static: StaticResult, shared: Shared) -> ModesResult:
-    """As `analysis.solve_modes`, with ring and bodies of an earlier variant."""
+    """As `solve_modes`, with ring and bodies of an earlier variant."""
     first, new = shared.take(model_key(case), lambda: elastic_stages.solve_modes(case, static))
     if new:
         return first
@@ -232,7 +232,7 @@ def _modal_basis(case: Case, static: StaticResult, shared: Shared) -> ModesResul
 
 @one_blas_thread()
 def _response(case: Case, modes: ModesResult) -> Response:
-    """As `analysis.solve_dynamics` without stability, fields and another look beyond the frequency limit."""
+    """As `solve_dynamics` without stability, fields and another look beyond the frequency limit."""
     found = elastic_stages.turning_speeds(case, planetary_set(case))
     check_rim_speed(modes.ring.modes, [s.carrier for s in found])
     frequency = np.array([s.mesh_frequency for s in found])

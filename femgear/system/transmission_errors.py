@@ -12,7 +12,7 @@ Viscous dampers of meshes and supports from damping ratios, spring by spring.
 ``c = 2 xi sqrt(k m_1 m_2 / (m_1 + m_2))`` for a mesh between two gears and ``c = 2 xi sqrt(k m)`` for a
 support: each spring with its own masses alone would be damped by xi (S. S. Rao, Mechanical Vibrations,
 section 2.6, critical damping, with the reduced mass of two bodies). In the whole set the ratio of a mode
-comes out of all dampers; `femgear.system.nonlinear.modal_damping` gives every mode a ratio instead.
+comes out of all dampers; `femgear.solvers.linear.modal.modal_damping` gives every mode a ratio instead.
 """
 
 from __future__ import annotations
@@ -208,7 +208,7 @@ def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
 def with_errors(
     problem: NonlinearSystem, errors: TransmissionErrors, *, dampers=None, mesh_frequency: float | None = None
 ) -> NonlinearSystem:
-    """A problem of `planar_problem` with the errors added to the deflections of its drive flanks.
+    """A lumped planetary problem with the errors added to the deflections of its drive flanks.
 
     Parameters
     ----------

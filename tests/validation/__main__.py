@@ -2,14 +2,26 @@
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "scripts")]
 
 
-def main() -> int:
-    """Run the themes that are asked for; 3 when a row fails its gate."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the themes that are asked for.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Without the program's name; those of the process when left out.
+
+    Returns
+    -------
+    int
+        Exit code: 0, 2 (bad input), 3 (a row fails its gate), 4 (storage), 130 (interrupted).
+    """
     from rich.console import Console
     from rich.progress import Progress
 
@@ -20,7 +32,7 @@ def main() -> int:
     parser.add_argument("-o", "--output", type=Path, help="Markdown file; docs/validation.md without --theme")
     parser.add_argument("--theme", help="compute this theme alone and print each of its rows")
     parser.add_argument("--quick", action="store_true", help="leave out what takes long")
-    given = parser.parse_args()
+    given = parser.parse_args(arguments)
     if given.output is None and given.theme is None:
         given.output = ROOT / "docs" / "validation.md"
     with Progress(console=Console(stderr=True), transient=True) as bar:
@@ -36,7 +48,10 @@ def main() -> int:
             )
         except FemgearError as error:
             print(error, file=sys.stderr)
-            return 2
+            return error.exit_code
+        except KeyboardInterrupt:
+            print("interrupted", file=sys.stderr)
+            return 130
 
 
 if __name__ == "__main__":

@@ -75,7 +75,7 @@ def direct_response(
     speed : float
         That multiplies the gyroscopic matrix [rad/s].
     damping_ratio : float or (n,) array, optional
-        Modal damping that is added to ``C``; see `femgear.system.nonlinear.modal_damping`.
+        Modal damping that is added to ``C``; see `femgear.solvers.linear.modal.modal_damping`.
 
     Returns
     -------

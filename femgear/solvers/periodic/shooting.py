@@ -96,8 +96,8 @@ def verdict_of_monodromy(
     """Verdict of a monodromy matrix in (q, v / rate).
 
     Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
-    rounding splits; they are left out (as `hill.floquet_verdicts` does). Of those that damping feels the
-    position has the multiplier one and is left out, the velocity counts.
+    rounding splits; they are left out (as `stability.floquet.floquet_verdicts` does). Of those that damping
+    feels the position has the multiplier one and is left out, the velocity counts.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def solve_shooting(
     samples : int
         Instants from which the lines are computed.
     events : bool
-        Stop at contact changes, see `adaptive`.
+        Stop at contact changes, see `time.adaptive`.
     integration : float
         Tolerance of the integrator.
     tolerance : float

@@ -26,7 +26,7 @@ class HarmonicProblem:
     receptance : (n, n, n_speeds, H + 1) complex array
         ``T_h`` [m/N].
     product : (n, 2 (H + 1), 2 (H + 1)) array
-        Multiplication by the stiffness fluctuation of each mesh, see ``harmonics.product_matrix`` [N/m].
+        Multiplication by the stiffness fluctuation of each mesh, see `system.series.product_matrix` [N/m].
     source : (n, n_speeds, H + 1) complex array
         ``S_h`` [m].
     """

@@ -534,7 +534,7 @@ def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.
 def motion_scale(motion: Flow, start) -> float | None:
     """Size of the motion [m] to which an integration tolerance refers; None leaves it to the integrator.
 
-    `adaptive.typical_deflection` solves with the stiffness at rest plus inertia, which is singular at an
+    `typical_deflection` solves with the stiffness at rest plus inertia, which is singular at an
     unstable rest such as the top between two wells. Inertia alone holds the loads then.
     """
     q, v = start

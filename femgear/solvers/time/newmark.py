@@ -134,7 +134,7 @@ def _predictor(rule: StepRule, h: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class RuleScheme:
-    """A step rule on all degrees of freedom; the state is (q, v, a), (3, n). See `marching.Scheme`."""
+    """A step rule on all degrees of freedom; the state is (q, v, a), (3, n). See `Scheme`."""
 
     rule: StepRule
     step: float

@@ -30,7 +30,7 @@ class Strobe:
         [s].
     scheme : Scheme
     law, loads
-        Of the instants of one period, see `marching`.
+        Of the instants of one period, see `newmark.march`.
     theta : (steps + 1, n_bases) array
         Phases of those instants.
     """
