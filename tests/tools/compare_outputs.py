@@ -33,6 +33,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field
 from difflib import SequenceMatcher
+from functools import cache
 from importlib import metadata
 from itertools import zip_longest
 from pathlib import Path
@@ -45,10 +46,15 @@ REFERENCE = "../tree/cases/planetary_27_40_108.toml"
 # arguments of every command of a script; a script that is not listed runs once, without arguments
 SCRIPTS = {
     "drivetrain.py": (("--balanced",), ("../tree/cases/own_chain.toml", "--duration", "0.2 s")),
-    "gravity_wedging.py": (("--sweep", "2", "--steps", "200", "--backlash", "482 um"),),
+    "gravity_wedging.py": (
+        (),
+        ("--backlash", "482 um", "--harmonics", "3", "--no-stability", "--sweep", "2", "--steps", "200"),
+    ),
     "housing_modulation.py": ((), ("--speed", "3100 rpm", "--harmonic", "5")),
     "multistage.py": (("--balance", "5"), ("--published",)),
-    "optimise.py": (("--positions", "12", "--max-designs", "20", "--second", "mesh force"),),
+    "optimise.py": (
+        ("--second", "mesh force", "--positions", "8", "--flank-elements", "8", "--max-designs", "6"),
+    ),
     "readme_images.py": (("results_0",),),
 }
 FIRST = {"readme_images.py": (*CLI, "run", REFERENCE, "--output", "results_0")}
@@ -252,8 +258,10 @@ def compare_file(base: Path, new: Path, name: str, paths: tuple[list[str], list[
         return
     if kind == ".nc":
         sizes = netcdf_sizes(base, new)
+    elif kind != ".csv" and equal:
+        sizes = [("all", None)]
     elif kind in DATA:
-        sizes = [("all", None)] if equal else grid_sizes(base, new)
+        sizes = grid_sizes(base, new)
     else:
         texts = masked(base, paths[0]), masked(new, paths[1])
         sizes = table_sizes(*texts) if kind == ".csv" else line_sizes(*texts)
@@ -305,6 +313,7 @@ def environment(side: Side, **more: str) -> dict[str, str]:
     return os.environ | one_thread | {"COLUMNS": "160", "PYTHONPATH": str(side.tree)} | more
 
 
+@cache
 def libraries() -> str:
     """Hash of the versions of Python and of everything that is installed."""
     installed = {f"{one.metadata['Name']} {one.version}" for one in metadata.distributions()}
@@ -379,6 +388,8 @@ def git(tree: Path, *arguments: str) -> str:
 @contextmanager
 def checkout(reference: str, folder: Path, repository: Path) -> Iterator[Path]:
     """A temporary work tree of a commit."""
+    if folder.exists():  # left by a comparison that was killed
+        git(repository, "worktree", "remove", "--force", str(folder))
     git(repository, "worktree", "add", "--force", "--detach", str(folder), reference)
     try:
         yield folder
