@@ -43,6 +43,7 @@ import numpy as np
 CLI = ("-m", "femgear.cli")
 # "tree" is a link to the checkout, beside the folder in which a case or script runs
 REFERENCE = "../tree/cases/planetary_27_40_108.toml"
+TIP = "planet.tip_diameter=62.2 mm..63.4 mm +- 0.1 mm"
 # arguments of every command of a script; a script that is not listed runs once, without arguments
 SCRIPTS = {
     "drivetrain.py": (("--balanced",), ("../tree/cases/own_chain.toml", "--duration", "0.2 s")),
@@ -53,7 +54,11 @@ SCRIPTS = {
     "housing_modulation.py": ((), ("--speed", "3100 rpm", "--harmonic", "5")),
     "multistage.py": (("--balance", "5"), ("--published",)),
     "optimise.py": (
-        ("--second", "mesh force", "--positions", "8", "--flank-elements", "8", "--max-designs", "6"),
+        (),
+        (
+            *("--vary", TIP, "--objective", "contact ratio sun-planet", "--second", "tip thickness planet"),
+            *("--of", "contact ratio planet-ring", "--no-check", "--max-designs", "60"),
+        ),
     ),
     "readme_images.py": (("results_0",),),
 }
