@@ -54,7 +54,7 @@ SCRIPTS = {
     "housing_modulation.py": ((), ("--speed", "3100 rpm", "--harmonic", "5")),
     "multistage.py": (("--balance", "5"), ("--published",)),
     "optimise.py": (
-        (),
+        ("--of", "ste overall", "--positions", "8", "--flank-elements", "8"),
         (
             *("--vary", TIP, "--objective", "contact ratio sun-planet", "--second", "tip thickness planet"),
             *("--of", "contact ratio planet-ring", "--no-check", "--max-designs", "60"),
@@ -367,14 +367,21 @@ def compute(side: Side, name: str, commands: list[list[str]], *, time_limit: flo
     return run
 
 
-def compute_all(pending: list[tuple[Side, str, list[list[str]]]], *, workers: int, time_limit: float) -> None:
+def compute_all(
+    pending: list[tuple[Side, str, list[list[str]]]],
+    sides: tuple[Side, Side],
+    *,
+    workers: int,
+    time_limit: float,
+) -> None:
     """Run jobs beside one another, the longest ones first as far as their times are known."""
-    known = {}
-    for side, name, _ in pending:
-        run = stored(side, name)
-        known[name] = max(known.get(name, 0.0), run.seconds if run else 0.0)
+
+    def known(job: tuple[Side, str, list[list[str]]]) -> float:
+        runs = [run for side in sides if (run := stored(side, job[1]))]
+        return max((run.seconds for run in runs), default=0.0)
+
     with ThreadPoolExecutor(workers) as pool:
-        ordered = sorted(pending, key=lambda job: -known[job[1]])
+        ordered = sorted(pending, key=known, reverse=True)
         try:
             futures = [pool.submit(compute, *job, time_limit=time_limit) for job in ordered]
             for future in as_completed(futures):
@@ -493,7 +500,7 @@ def main() -> int:
 
         if not given.stored:
             pending = invalid() + ([] if given.base_only else new)
-            compute_all(pending, workers=given.jobs, time_limit=given.time_limit)
+            compute_all(pending, sides, workers=given.jobs, time_limit=given.time_limit)
         if given.base_only:
             return 1 if invalid() else 0
         both = {name: [name in own for own in found] for name in names}
