@@ -6,16 +6,19 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from femgear import cli, run
+from femgear import cli
+from femgear import run as run_module
 from femgear.case.case import parse_case, with_value
 from femgear.errors import ConvergenceError
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, open_results
+from femgear.trains import registry
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -271,7 +274,7 @@ def fake_run(case, out, *, only=None, pictures=True, progress=None):
 @pytest.fixture
 def pipeline(monkeypatch):
     def use(function):
-        monkeypatch.setattr(run, "run_case", function, raising=False)
+        monkeypatch.setattr(run_module, "run_case", function, raising=False)
 
     use(fake_run)
     return use
@@ -356,16 +359,19 @@ def test_two_runs_on_one_folder(tmp_path, capsys, pipeline):
 def test_an_interrupted_run_says_how_far_it_came(tmp_path, capsys, monkeypatch):
     data = synthetic()
 
-    def compute(stage, *_):
-        if stage == "dynamics":
+    def solve(name):
+        if name == "dynamics":
             raise KeyboardInterrupt
-        dataset = getattr(data, stage)()
+        dataset = getattr(data, name)()
         for name in dataset.coords:
             dataset[name].attrs |= {"units": "1", "long_name": str(name)}
         return SimpleNamespace(dataset=lambda: dataset)
 
-    monkeypatch.setattr(run, "_compute", compute)
-    monkeypatch.setattr(run, "_convergence", lambda *_: {})
+    stages = tuple(
+        replace(one, solve=lambda *_, name=one.name: solve(name), verdict=lambda _: {})
+        for one in registry.ELASTIC.stages
+    )
+    monkeypatch.setattr(registry, "TRAINS", (replace(registry.ELASTIC, stages=stages),))
     out = tmp_path / "out"
     assert cli.main(["run", str(CASE), "-o", str(out)]) == 130
     assert cli.main(["report", str(out)]) == 4
