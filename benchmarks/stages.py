@@ -23,7 +23,7 @@ class Reference:
 
     @cached_property
     def case(self):
-        from femgear.case.case import read_case
+        from femgear.trains.reading import read_case
 
         return read_case(CASE)
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from femgear.case.case import planetary_set, read_case, with_value, with_values
+    from femgear.case.case import planetary_set
     from femgear.case.sections import Case
     from femgear.errors import FemgearError
-    from femgear.storage.results import open_results
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+    from femgear.trains.reading import open_results, read_case, with_value, with_values
     from femgear.trains.static.stages import solve_static, solve_stress
 
 __all__ = [
@@ -33,16 +33,16 @@ __all__ = [
 _HOME = {
     "Case": "case.sections",
     "FemgearError": "errors",
-    "open_results": "storage.results",
+    "open_results": "trains.reading",
     "planetary_set": "case.case",
-    "read_case": "case.case",
+    "read_case": "trains.reading",
     "solve_dynamics": "trains.elastic.stages",
     "solve_housing": "trains.elastic.stages",
     "solve_modes": "trains.elastic.stages",
     "solve_static": "trains.static.stages",
     "solve_stress": "trains.static.stages",
-    "with_value": "case.case",
-    "with_values": "case.case",
+    "with_value": "trains.reading",
+    "with_values": "trains.reading",
 }
 
 

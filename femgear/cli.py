@@ -126,7 +126,7 @@ def check(case: Path, /) -> int:
     case
         TOML case file.
     """
-    from femgear.case.case import read_case
+    from femgear.trains.reading import read_case
     from femgear.trains.registry import train_of
 
     data = read_case(case)
@@ -163,10 +163,10 @@ def run(
     force
         Replace the results that the folder holds, once the new ones are complete.
     """
-    from femgear.case.case import read_case
     from femgear.report.summary import case_warnings, describe_results, result_warnings
     from femgear.run import run_case
-    from femgear.storage.results import open_results, run_folder
+    from femgear.storage.results import run_folder
+    from femgear.trains.reading import open_results, read_case
     from femgear.trains.registry import check_case, train_of
 
     data = read_case(case)
@@ -225,13 +225,13 @@ def sweep(
     speeds
         First and last speed of the input, for mesh forces and the housing.
     """
-    from femgear.case.case import read_case
+    from femgear.case.case import need_set
     from femgear.run import grid_cache
     from femgear.study.sweep import sweep_into
-    from femgear.trains.drivetrain.section import refuse_drivetrain
+    from femgear.trains.reading import read_case
 
     data = read_case(case)
-    refuse_drivetrain(data)
+    need_set(data)
     with _Progress() as progress:
         options = {"speeds": speeds, "cache": grid_cache(), "progress": progress}
         found, names = sweep_into(data, output, over=over, of=of, **options)
@@ -242,7 +242,7 @@ def sweep(
 
 
 @app.command
-def schema(*, model: Literal["drivetrain"] | None = None) -> int:
+def schema(*, model: str | None = None) -> int:
     """Print the JSON schema of the case file, for editors.
 
     Parameters
@@ -252,7 +252,7 @@ def schema(*, model: Literal["drivetrain"] | None = None) -> int:
     """
     import json
 
-    from femgear.case.case import case_schema
+    from femgear.trains.reading import case_schema
 
     print(json.dumps(case_schema(model), indent=1))
     return 0

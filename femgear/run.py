@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, record
 from femgear.trains.protocol import Context, Drawn, Progress
+from femgear.trains.reading import open_results
 from femgear.trains.registry import check_case, stages_of, train_of
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def run_case(
     if pictures:
         from femgear.report.html import write_report
 
-        write_report(train_of(case), folder)
+        write_report(train_of(case), open_results(folder))
         finish(folder, [*names, "report.html"], timings=timings, convergence=convergence)
 
 
@@ -100,7 +101,7 @@ def report_again(folder: Path) -> None:
     """
     from femgear.report.draw import write_pictures
     from femgear.report.html import write_report
-    from femgear.storage.results import folder_lock, open_results
+    from femgear.storage.results import folder_lock
 
     with folder_lock(folder):
         results = open_results(folder, partial=False)
@@ -110,5 +111,5 @@ def report_again(folder: Path) -> None:
             data = {stage: results.stage(stage) for stage in results.stages}
             names += write_pictures(results.folder, train, Drawn(results.case, data))
             finish(folder, names, timings=manifest.timings, convergence=manifest.convergence)
-        write_report(train, folder)
+        write_report(train, open_results(folder))
         finish(folder, [*names, "report.html"], timings=manifest.timings, convergence=manifest.convergence)

@@ -51,12 +51,12 @@ def main(
     sensitivity
         Whether to vary the assumed inputs of the published set.
     """
-    from femgear.case.case import read_case, with_value
     from femgear.trains.drivetrain.figures import write_drivetrain_pictures
     from femgear.trains.drivetrain.results import describe_drivetrain, describe_spectrum, describe_transient
     from femgear.trains.drivetrain.section import need_drivetrain
     from femgear.trains.drivetrain.setup import case_model, check_spectrum
     from femgear.trains.drivetrain.stages import solve_drivetrain_modes, solve_spectrum, solve_transient_run
+    from femgear.trains.reading import read_case, with_value
 
     data, paper = need_drivetrain(read_case(case)), read_case(PAPER)
     if duration is not None:

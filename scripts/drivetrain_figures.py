@@ -12,7 +12,7 @@ SENSITIVE = 0.1
 
 def with_balance(case):
     """The case with the share of a torque that balances all others; as it is where it has no share."""
-    from femgear.case.case import with_value
+    from femgear.trains.reading import with_value
 
     for i, one in enumerate(case.operation.torque):
         if one.share is not None:

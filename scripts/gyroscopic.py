@@ -45,11 +45,12 @@ def main(
     below
         Frequency with its unit; modes that are lower at rest are followed.
     """
-    from femgear.case.case import planetary_set, read_case
+    from femgear.case.case import planetary_set
     from femgear.case.units import FREQUENCY, SPEED, to_si
     from femgear.report.style import save_figure
     from femgear.trains.elastic.checks import check_rim_speed
     from femgear.trains.elastic.stages import solve_modes
+    from femgear.trains.reading import read_case
     from femgear.trains.static.stages import solve_static
 
     top, limit = to_si(highest, SPEED), to_si(below, FREQUENCY)

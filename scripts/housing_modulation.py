@@ -48,7 +48,8 @@ def main(
     harmonic
         Harmonic of the mesh frequency, 1 upwards.
     """
-    from femgear.case.case import planetary_set, read_case, with_value
+    from femgear.case.case import planetary_set
+    from femgear.trains.reading import read_case, with_value
 
     data = with_value(read_case(case), "operation.speeds", [speed])
     # refuse before the folder is touched, and what only the response tells after it

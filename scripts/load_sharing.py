@@ -41,10 +41,11 @@ def main(
     planet
         Number of the planet that has the gap, 1 upwards.
     """
-    from femgear.case.case import planetary_set, read_case
+    from femgear.case.case import planetary_set
     from femgear.case.units import LENGTH, to_si
     from femgear.report.style import save_figure
     from femgear.study.linearised import sun_torque
+    from femgear.trains.reading import read_case
 
     data = read_case(case)
     gears = planetary_set(data)

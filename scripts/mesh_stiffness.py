@@ -46,9 +46,10 @@ def main(
     positions
         Positions over one mesh period. Default: as the case says.
     """
-    from femgear.case.case import planetary_set, read_case, with_value
+    from femgear.case.case import planetary_set
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
+    from femgear.trains.reading import read_case, with_value
     from femgear.trains.static.stages import solve_static
 
     data = read_case(case)

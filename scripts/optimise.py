@@ -82,11 +82,11 @@ def main(
     check
         Run case and optimum anew into the folders before and after.
     """
-    from femgear.case.case import read_case, with_value, with_values
     from femgear.run import grid_cache
     from femgear.study.names import named_quantity, parse_limit, parse_variable, tip_reliefs
     from femgear.study.problem import Problem
     from femgear.study.search import minimise
+    from femgear.trains.reading import read_case, with_value, with_values
 
     data = read_case(case)
     data = data if torque is None else with_value(data, "operation.torque", torque)
@@ -159,11 +159,11 @@ def _refined(rough, case, folder: Path, options, method: str):
 
 def _write(found, data, folder: Path, rough) -> list[str]:
     """Tables on the terminal, and the files of the search."""
-    from femgear.case.case import to_toml, with_values
     from femgear.report.style import save_figure
     from femgear.storage.files import write_text
     from femgear.study.figures import tolerance_bars
     from femgear.study.search import comparison_rows, tolerance_rows, verdict
+    from femgear.trains.reading import to_toml, with_values
 
     best, name, dimension = found.values, found.problem.objective.name, found.problem.objective.dimension
     write_text(to_toml(with_values(data, best)), folder / "optimum.toml")
@@ -214,9 +214,9 @@ def _front(problem, second, folder: Path, options) -> list[str]:
 
 def _check(found, data, folder: Path, speeds, rough) -> list[str]:
     """Case and optimum anew: a full run each on a finer grid, read back from its files."""
-    from femgear.case.case import with_values
     from femgear.report.style import save_figure
     from femgear.study.figures import before_and_after
+    from femgear.trains.reading import with_values
 
     fine = {"static.positions": 128, "static.flank_elements": 32} | QUIET
     if speeds is not None:
@@ -249,7 +249,8 @@ def _check(found, data, folder: Path, speeds, rough) -> list[str]:
 
 def _run(case, folder: Path, only: str):
     from femgear.run import run_case
-    from femgear.storage.results import open_results, run_folder
+    from femgear.storage.results import run_folder
+    from femgear.trains.reading import open_results
 
     with run_folder(folder, force=True) as place, Progress() as progress:
         run_case(case, place, only=only, pictures=False, progress=progress)

@@ -59,13 +59,14 @@ def main(
     position
         In mesh periods, 0 to 1, rounded to a sixteenth.
     """
-    from femgear.case.case import planetary_set, read_case
+    from femgear.case.case import planetary_set
     from femgear.case.units import LENGTH, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
     from femgear.study.figures import sharing_histogram
     from femgear.study.linearised import design_basis, sun_torque
     from femgear.study.sharing import pin_samples
+    from femgear.trains.reading import read_case
 
     data = read_case(case)
     gears = planetary_set(data)

@@ -34,7 +34,7 @@ def main(results: Path, /, *, output: Path = FOLDER) -> None:
 
     from femgear.errors import StorageError
     from femgear.storage.files import replace_file
-    from femgear.storage.results import open_results
+    from femgear.trains.reading import open_results
 
     folder = open_results(results).folder
     for name in ready_images(folder):

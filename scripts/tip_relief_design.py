@@ -58,7 +58,7 @@ def main(
     positions
         Positions over one mesh period.
     """
-    from femgear.case.case import planetary_set, read_case
+    from femgear.case.case import planetary_set
     from femgear.case.units import LENGTH, TORQUE, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
@@ -67,6 +67,7 @@ def main(
     from femgear.study.linearised import design_basis, relief_snippet, sun_torque
     from femgear.study.relief import loads_back
     from femgear.trains.drivetrain.section import refuse_drivetrain
+    from femgear.trains.reading import read_case
 
     data = read_case(case)
     refuse_drivetrain(data)

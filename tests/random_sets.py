@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.case.case import parse_case, planetary_set
+from femgear.case.case import planetary_set
 from femgear.case.sections import Case
 from femgear.errors import GeometryError
 from femgear.trains.elastic.checks import MOST_WINDING
+from femgear.trains.reading import parse_case
 
 KINDS = ("in phase", "out of phase", "unequal")
 PLANETS = (2, 3, 4, 5, 6, 7)

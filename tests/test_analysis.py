@@ -7,12 +7,12 @@ import pytest
 from validation.cases import reference_case
 
 from femgear.case import text as case_text
-from femgear.case.case import parse_case, read_case, with_value, with_values
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, symmetry_leakage
 from femgear.system.series import harmonics_of, sample
 from femgear.trains.elastic.checks import max_nodal_diameter
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.reading import parse_case, read_case, with_value, with_values
 from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).parents[1]

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import read_case, with_value
 from femgear.contact.flanks import LEFT, RIGHT
 from femgear.contact.load_spectrum import LOAD_BINS, LoadedTeeth, body_stress, load_spectrum, loaded_teeth
 from femgear.contact.root_stress import (
@@ -19,6 +18,7 @@ from femgear.contact.root_stress import (
     worst_history,
 )
 from femgear.gears.gear import half_thickness_angle
+from femgear.trains.reading import read_case, with_value
 from femgear.trains.static import stages as static_stages
 from femgear.trains.static.stages import nominal_stresses, solve_static, solve_stress
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set, read_case, set_deviations, with_value
+from femgear.case.case import planetary_set, set_deviations
 from femgear.cli import main
 from femgear.contact.flanks import flank_load_columns, flank_stations
 from femgear.contact.solve import solve_contact
@@ -19,6 +19,7 @@ from femgear.fe.meshing import mesh_outline
 from femgear.gears.checks import check_set
 from femgear.gears.deviation_checks import check_deviations
 from femgear.gears.tooth import half_sector
+from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.stages import solve_static
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"

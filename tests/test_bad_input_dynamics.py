@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from femgear.case.case import read_case, with_value
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.arclength import StepOptions
 from femgear.solvers.continuation.branches import frequency_response_curve
@@ -18,6 +17,7 @@ from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.system.series import FourierSeries
 from femgear.system.system import MechanicalSystem, MeshExcitation
 from femgear.trains.elastic.checks import check_rim_speed
+from femgear.trains.reading import read_case, with_value
 
 
 def oscillator(*elements, damping=0.0, load=0.0, forces=()):

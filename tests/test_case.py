@@ -12,16 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from femgear.case import text as case_text
-from femgear.case.case import (
-    case_schema,
-    parse_case,
-    planetary_set,
-    read_case,
-    to_toml,
-    with_value,
-    with_values,
-)
+from femgear.case.case import planetary_set
 from femgear.errors import CaseError, GeometryError
+from femgear.trains.reading import case_schema, parse_case, read_case, to_toml, with_value, with_values
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")

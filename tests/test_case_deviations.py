@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import parse_case, planetary_set, read_case, set_deviations, to_toml, with_value
+from femgear.case.case import planetary_set, set_deviations
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.gears.deviations import Ovality, Runout, body_separation, common_period
 from femgear.gears.modifications import ProfileCrowning, ProfileSlope, RootRelief, TipRelief, form_deviation
+from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 from femgear.trains.static.description import set_warnings
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case.case import parse_case, planetary_set, with_value
+from femgear.case.case import planetary_set
 from femgear.case.checks import check_floating
 from femgear.cli import main
 from femgear.errors import GeometryError
+from femgear.trains.reading import parse_case, with_value
 from femgear.trains.static.stages import solve_static
 
 TEXT = (Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")

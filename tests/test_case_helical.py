@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from validation.helical import kahraman_set
 
-from femgear.case.case import parse_case, planetary_set, read_case, to_toml, with_value
+from femgear.case.case import planetary_set
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.checks import check_set
 from femgear.trains.helical.checks import check_helical_case
 from femgear.trains.helical.model import HelicalSet
 from femgear.trains.helical.stages import HELICAL
 from femgear.trains.helical.virtual_gears import base_helix_angle, helical_data, overlap_ratio, rotation_sense
+from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 
 ROOT = Path(__file__).parents[1]
 GIVEN = {"sun_planet": "200e6 N/m", "planet_ring": "200 N/um"}

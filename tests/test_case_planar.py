@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from published.wind_turbine import gravity_problem_b, wind_turbine_a, wind_turbine_b
 
-from femgear.case.case import parse_case, planetary_set, read_case, to_toml, with_value
+from femgear.case.case import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.checks import check_set
 from femgear.system.lumped import PlanarSet
 from femgear.trains.planar.checks import check_planar_case, check_smoothing, mean_compression
 from femgear.trains.planar.stages import PLANAR, planar_data, planar_model
+from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 
 CASES = Path(__file__).parents[1] / "cases"
 PGA, PGB, PGB_STATIC = (CASES / f"nrel_{name}.toml" for name in ("pga", "pgb", "pgb_static"))
@@ -63,7 +64,7 @@ def test_the_two_files_of_set_b_differ_in_title_and_mesh_stiffness_alone(pgb):
 def test_a_planar_case_can_be_written_and_read_again(pgb):
     again = parse_case(to_toml(with_value(pgb, "planar.branch.from", "30 Hz")))
     assert again.planar.branch.start == 30.0 and again.planar.gravity.acceleration == 9.80665
-    assert read_case(CASES / "planetary_27_40_108.toml").planar is None
+    assert not hasattr(read_case(CASES / "planetary_27_40_108.toml"), "planar")
 
 
 def test_only_a_planar_case_may_leave_the_foundation_of_the_ring_out(pgb):

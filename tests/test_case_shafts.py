@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import read_case, shaft_lines, with_value
+from femgear.case.case import shaft_lines
 from femgear.errors import CaseError, GeometryError
+from femgear.trains.reading import read_case, with_value
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 PARTS = [
@@ -23,8 +24,8 @@ def on_shaft(parts, member="sun"):
         inside = line.startswith(f"[{member}]") or (inside and not line.startswith("["))
         if not (inside and line.startswith("support_stiffness")):
             lines.append(line)
-    from femgear.case.case import parse_case
     from femgear.case.text import parse, write
+    from femgear.trains.reading import parse_case
 
     data = parse("\n".join(lines), "case.toml")
     data[member]["support_shaft"] = parts

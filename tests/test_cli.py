@@ -14,11 +14,11 @@ import pytest
 
 from femgear import cli
 from femgear import run as run_module
-from femgear.case.case import parse_case, with_value
 from femgear.errors import ConvergenceError
 from femgear.storage.files import write_dataset, write_text
-from femgear.storage.results import finish, open_results
+from femgear.storage.results import finish
 from femgear.trains import registry
+from femgear.trains.reading import open_results, parse_case, with_value
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import read_case, with_value
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).parents[1]

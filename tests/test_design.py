@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set, read_case
+from femgear.case.case import planetary_set
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError, ContactError
 from femgear.gears.modifications import form_deviation
 from femgear.study.linearised import design_basis, relief_snippet, sun_torque
 from femgear.study.relief import harris_map, optimise_relief, relief_grid, relief_starts, with_tip_relief
 from femgear.study.sharing import SharingModel, pin_samples, sharing_model, sharing_of_samples, walked_shares
+from femgear.trains.reading import read_case
 
 CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
 TORQUE = 100.0
@@ -22,7 +23,7 @@ ALPHA = math.radians(24.6)
 
 @pytest.fixture(scope="module")
 def basis():
-    from femgear.case.case import with_value
+    from femgear.trains.reading import with_value
 
     return design_basis(with_value(read_case(CASE), "static.flank_elements", 12))
 
@@ -247,8 +248,8 @@ def test_the_tables_for_the_case_file_mean_the_same_relief(basis, tmp_path):
 
 
 def test_supports_are_those_of_the_static_stage():
-    from femgear.case.case import with_value
     from femgear.study.linearised import case_supports
+    from femgear.trains.reading import with_value
 
     case = with_value(read_case(CASE), "planet.bearing_clearance", "3 um")
     assert case_supports(case) == Supports(sun=5e7, carrier=2e8, planet=3e8, planet_clearance=3e-6)

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import read_case, with_value
 from femgear.contact.cycle import walk_either_flank
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
@@ -30,6 +29,7 @@ from femgear.study.sensitivity import (
     sharing_factor_slopes,
 )
 from femgear.study.sharing import pin_samples, sharing_model, sharing_of_samples
+from femgear.trains.reading import read_case, with_value
 
 CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
 TORQUE = 100.0

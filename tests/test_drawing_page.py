@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import parse_case, planetary_set, set_deviations
+from femgear.case.case import planetary_set, set_deviations
+from femgear.trains.reading import parse_case
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "drawing_to_ste.md").read_text(encoding="utf-8")

@@ -5,13 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set, read_case, with_value, with_values
+from femgear.case.case import planetary_set
 from femgear.errors import CaseError
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_lines
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.trains.elastic.checks import HARMONICS, MEMORY, highest_excitation, limited, missing_level
 from femgear.trains.elastic.stages import _outputs, solve_dynamics, solve_housing, solve_modes
+from femgear.trains.reading import read_case, with_value, with_values
 from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).parents[1]

@@ -23,14 +23,9 @@ LAYERS = (
     ("cli",),
 )
 RANK = {part: rank for rank, parts in enumerate(LAYERS) for part in parts}
-# Sections of trains that the case lists, and results of trains that tables and pages name.
-NAMED_TRAINS = {
-    "case/case.py",
-    "case/problems.py",
-    "case/sections.py",
-    "report/draw.py",
-    "report/html.py",
-} | {"report/summary.py"}
+# Who may know a train: the registry, which lists them, and `static`, which every set of gears begins with.
+COMMON = ("trains.protocol", "trains.static")
+STUDY = {"trains.elastic"}  # whose stages a study runs
 HEAVY = {"gmsh", "pyvista", "vtk", "matplotlib", "dask", "skfem", "pint"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
@@ -76,9 +71,20 @@ def test_imports_go_downwards_only(path):
     assert part in RANK, f"{part} has no layer"
     for other in {name.split(".")[0] for name in imported(path)} - {part}:
         assert other in RANK, f"{path} imports femgear.{other}, which has no layer"
-        if other == "trains" and place(path) in NAMED_TRAINS:
-            continue
         assert RANK[other] < RANK[part], f"{part} may not import {other}"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=place)
+def test_only_the_registry_knows_a_train(path):
+    """And a train none of the others, but for the static solution that they start from."""
+    if place(path) in ("__init__.py", "trains/registry.py"):
+        return
+    own = ".".join(path.relative_to(PACKAGE).parts[:2]) if path.parent.parent.name == "trains" else None
+    allowed = STUDY if path.relative_to(PACKAGE).parts[0] == "study" else set()
+    for name in imported(path, typed=True):
+        train = ".".join(name.split(".")[:2])
+        if name.startswith("trains.") and name.count(".") == 2:
+            assert train == own or train in allowed or name.startswith(COMMON), f"{path} knows {train}"
 
 
 def test_no_circle_of_imports_not_even_of_types():

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set, read_case, with_value, with_values
+from femgear.case.case import planetary_set
 from femgear.errors import CaseError, ConvergenceError, StorageError
 from femgear.study.minimax import _linear_program
 from femgear.study.objectives import NUMBER, Quantity, contact_ratio, tip_thickness, transmission_error
@@ -20,6 +20,7 @@ from femgear.study.search import minimise, non_dominated, pareto_front
 from femgear.study.sweep import parse_over, sweep, sweep_into
 from femgear.study.variables import Variable
 from femgear.study.variants import Journal
+from femgear.trains.reading import read_case, with_value, with_values
 
 CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
 # entries without consequences for the gears: numbers from 0 to 1 and masses

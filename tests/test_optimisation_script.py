@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case.case import read_case
+from femgear.trains.reading import read_case
 
 ROOT = Path(__file__).resolve().parents[1]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set, read_case, with_values
+from femgear.case.case import planetary_set
 from femgear.case.units import SPEED
 from femgear.errors import CaseError
 from femgear.study.names import named_quantity, parse_limit, parse_variable, tip_reliefs
@@ -21,6 +21,7 @@ from femgear.study.objectives import (
 )
 from femgear.study.variants import Shared, Variant, at_speeds
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.reading import read_case, with_values
 from femgear.trains.static.stages import solve_static
 
 CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from femgear.case.case import read_case, with_value
 from femgear.report.style import png_bytes
 from femgear.trains.drivetrain.figures import (
     backlash_forces,
@@ -22,6 +21,7 @@ from femgear.trains.drivetrain.figures import (
     transient_figures,
 )
 from femgear.trains.drivetrain.stages import remarks
+from femgear.trains.reading import read_case, with_value
 
 CASE = Path(__file__).parents[1] / "cases" / "own_chain.toml"
 

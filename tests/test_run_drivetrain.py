@@ -12,10 +12,9 @@ from pydantic import BaseModel
 from scipy.linalg import eigh
 
 from femgear import cli
-from femgear.case.case import parse_case, read_case, with_value
 from femgear.errors import CaseError, ConvergenceError
 from femgear.run import report_again, run_case
-from femgear.storage.results import open_results, run_folder
+from femgear.storage.results import run_folder
 from femgear.trains.drivetrain.figures import spectrum_figures
 from femgear.trains.drivetrain.model import balanced_torque
 from femgear.trains.drivetrain.multitone import settled_motion
@@ -31,6 +30,7 @@ from femgear.trains.drivetrain.stages import (
     solve_transient_run,
 )
 from femgear.trains.drivetrain.time import Decimator
+from femgear.trains.reading import open_results, parse_case, read_case, with_value
 from femgear.trains.registry import stages_of as stages_of_case
 
 ROOT = Path(__file__).parents[1]

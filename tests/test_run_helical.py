@@ -10,17 +10,18 @@ from validation.helical import PHASINGS, TABLE_4
 
 from femgear import cli
 from femgear.case import text as case_text
-from femgear.case.case import parse_case, planetary_set, read_case, to_toml, with_value
+from femgear.case.case import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.run import grid_cache, run_case
-from femgear.storage.results import open_results, run_folder
+from femgear.storage.results import run_folder
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.figures import alike_lines, transmission_errors
 from femgear.trains.helical.results import describe_helical_static
 from femgear.trains.helical.stages import solve_helical_dynamics, solve_helical_modes, solve_helical_static
 from femgear.trains.helical.virtual_gears import normal_record, section_stiffness, shared_load
 from femgear.trains.planar.stages import solve_planar_modes
+from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
 
 ROOT = Path(__file__).parents[1]

@@ -10,13 +10,13 @@ from published.wind_turbine import bearing_problem_a, gravity_problem_b
 from published.wind_turbine_response import member_rms, resonance, weight_branch
 
 from femgear import cli
-from femgear.case.case import planetary_set, read_case, to_toml, with_value
+from femgear.case.case import planetary_set
 from femgear.errors import CaseError, ConvergenceError
 from femgear.run import run_case
 from femgear.solvers.periodic.solution import open_verdict
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.solvers.time.transient import solve_transient
-from femgear.storage.results import open_results, run_folder
+from femgear.storage.results import run_folder
 from femgear.system.assembler import planar_system
 from femgear.system.lumped import PlanarTorque
 from femgear.trains import registry
@@ -29,6 +29,7 @@ from femgear.trains.planar.figures import (
 from femgear.trains.planar.model import TAIL_LIMIT, judged_branch, merged_folds, motion_lines
 from femgear.trains.planar.results import comparisons, describe_branch, doubts, planar_verdicts, tail_warnings
 from femgear.trains.planar.stages import planar_model, solve_branch, solve_planar_modes, solve_planar_response
+from femgear.trains.reading import open_results, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
 from femgear.trains.static.stages import solve_static
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from femgear.case.case import read_case, with_value
 from femgear.report.draw import write_figures
 from femgear.report.html import page
 from femgear.report.summary import describe_results
 from femgear.run import run_case
-from femgear.storage.results import open_results, run_folder
+from femgear.storage.results import run_folder
 from femgear.trains.elastic.stages import ELASTIC
 from femgear.trains.protocol import Drawn
+from femgear.trains.reading import open_results, read_case, with_value
 from femgear.trains.registry import stages_of
 from femgear.trains.static.stages import solve_static, solve_stress
 

@@ -194,8 +194,8 @@ def test_load_sharing_under_negative_torque_keeps_the_planet_numbers(quick_case,
 
 def _largest_line(path):
     """Largest acceleration of any order at the first speed of a case."""
-    from femgear.case.case import read_case
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+    from femgear.trains.reading import read_case
     from femgear.trains.static.stages import solve_static
 
     case = read_case(path)
@@ -285,7 +285,7 @@ def test_tip_relief_design(quick_case, tmp_path):
     assert len(data["relief [m]"]) == 2 * 4 * 4
     pasted = tmp_path / "relieved.toml"
     pasted.write_text(quick_case.read_text() + "\n" + (tmp_path / "o" / "relief.toml").read_text())
-    from femgear.case.case import read_case
+    from femgear.trains.reading import read_case
     from femgear.trains.static.stages import solve_static
 
     peaks = [np.ptp(solve_static(read_case(path)).cycle.deflection[0]) for path in (pasted, quick_case)]

@@ -20,7 +20,6 @@ from femgear.storage.results import (
     Manifest,
     finish,
     folder_lock,
-    open_results,
     prepare_output,
     read_manifest,
     record,
@@ -28,6 +27,7 @@ from femgear.storage.results import (
     verify,
     write_manifest,
 )
+from femgear.trains.reading import open_results
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 NAMED = {"units": "1", "long_name": "something"}

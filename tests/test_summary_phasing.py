@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case.case import planetary_set, read_case, with_value
+from femgear.case.case import planetary_set
+from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.description import describe_phasing
 
 CASES = Path(__file__).resolve().parents[1] / "cases"

@@ -7,10 +7,9 @@ import pytest
 import xarray as xr
 
 from femgear import cli
-from femgear.case.case import read_case, with_value
 from femgear.report.summary import case_warnings, result_warnings
-from femgear.storage.results import open_results
 from femgear.trains.drivetrain.results import describe_transient, transient_warnings
+from femgear.trains.reading import open_results, read_case, with_value
 from femgear.trains.registry import train_of
 
 CASES = Path(__file__).parents[1] / "cases"

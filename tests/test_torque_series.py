@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case.case import parse_case, read_case
 from femgear.errors import CaseError
 from femgear.trains.drivetrain.section import read_torques
+from femgear.trains.reading import parse_case, read_case
 
 OWN = Path(__file__).parents[1] / "cases" / "own_chain.toml"
 

@@ -8,23 +8,16 @@ Support stiffness of the members that a case gives a shaft: K = F/X of the shaft
 from __future__ import annotations
 
 import math
-import os
-import re
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import ValidationError
 
-from femgear.case import text as case_text
-from femgear.case.checks import check_floating, cross_check
+from femgear.case.checks import check_floating
 from femgear.case.deviations import CarrierErrors, GearErrors
-from femgear.case.problems import added_material, combine, in_terms_of_the_case, notices, rack_at, translate
-from femgear.case.sections import FORMAT, Case, PlanetSection, RingSection, SunSection, without_uncomputed
-from femgear.case.tables import embed_profiles
-from femgear.case.text import text_with_points
+from femgear.case.problems import in_terms_of_the_case, rack_at
+from femgear.case.sections import Case, PlanetSection, RingSection, SunSection
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.gears.checks import check_set
 from femgear.gears.deviation_checks import check_deviations
@@ -44,12 +37,6 @@ from femgear.gears.modifications import (
     roll_at,
 )
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
-from femgear.trains.drivetrain.section import (
-    DrivetrainCase,
-    build_drivetrain,
-    is_drivetrain,
-    refuse_drivetrain,
-)
 
 if TYPE_CHECKING:
     from femgear.case.deviations import ModificationSection
@@ -207,150 +194,17 @@ def _stiffness(parts: tuple, youngs_modulus: float, poisson_ratio: float, densit
     return shaft_support_stiffness(steps, Material(youngs_modulus, poisson_ratio, density))
 
 
-def read_case(path: str | os.PathLike) -> Case | DrivetrainCase:
-    """Case of a TOML file: a planetary set, or with ``model = "drivetrain"`` a chain of bodies.
-
-    Parameters
-    ----------
-    path : path-like
-        A regular UTF-8 file of at most 1 MB.
-
-    Returns
-    -------
-    Case or DrivetrainCase
-        Checked, frozen, in SI units and radians.
-
-    Raises
-    ------
-    CaseError
-        Everything that is wrong with the file, at once; ``problems`` holds one `CaseError` for each.
-    """
-    return parse_case(case_text.read_text(path), name=case_text.printable(os.fsdecode(path)))
-
-
-def parse_case(text: str, *, name: str = "") -> Case:
-    """Case of a TOML text; see `read_case`.
-
-    Parameters
-    ----------
-    text : str
-    name : str
-        File name for messages.
-    """
-    return _build(case_text.parse(text, name), text, name)
-
-
-def with_value(case: Case, key: str, value: object) -> Case:
-    """The case with one entry changed, checked again as a whole; see `with_values` for several at once.
-
-    Parameters
-    ----------
-    case : Case
-    key : str
-        Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
-        ``"sun.modifications[0].amount"``.
-    value : object
-        As the file would hold it: ``"50 N m"``, 0.3, 27, a list or table of such; None leaves the entry out.
-
-    Returns
-    -------
-    Case
-
-    Raises
-    ------
-    CaseError
-        As `read_case`; unknown keys are refused with the nearest valid one.
-    """
-    return with_values(case, {key: value})
-
-
-def with_values(case: Case, values: Mapping[str, object]) -> Case:
-    """The case with several entries changed at once, checked as a whole after all changes.
-
-    Published lines whose speed or harmonic is not computed any more are left out; ``notices`` says so.
-
-    Parameters
-    ----------
-    case : Case
-    values : mapping
-        Keys and values as of `with_value`, as in
-        ``{"operation.input": "carrier", "operation.fixed": "ring"}``.
-
-    Returns
-    -------
-    Case
-
-    Raises
-    ------
-    CaseError
-        As `with_value`.
-    """
-    data = case_text.parse(case.source, case.name)
-    for key, value in values.items():
-        _change(data, key, value, case.name)
-    try:
-        text = case_text.write(data)
-    except CaseError as error:
-        error.key, error.file = ", ".join(values), case.name or None
-        raise
-    said: tuple[str, ...] = ()
-    try:
-        changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
-    except CaseError as error:
-        published = any(key.startswith("housing") for key in values)
-        if published or not (notice := without_uncomputed(data, error)):
-            raise
-        said, text = (notice,), case_text.write(data)
-        changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
-    changed._notices += said
-    changed._profile_files = {
-        k: file
-        for k, file in case.profile_files.items()
-        if not any(k.startswith(key) or key.startswith(k) for key in values)
-    }
-    return changed
-
-
-def _change(data: dict, key: str, value: object, name: str) -> None:
-    """Change one entry of the tables of a case file; None takes it out."""
-    parts = re.findall(r"\[\d{1,9}\]|[^.\[\]]+", key) or [key]
-    *tables, last = parts
-    table = data
-    for part, following in zip(tables, parts[1:], strict=True):
-        table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
-    if last.startswith("["):
-        raise CaseError("a list is changed as a whole", code="E-KEY", key=key, file=name or None)
-    if value is None:
-        table.pop(last, None)
-    else:
-        table[last] = value.tolist() if hasattr(value, "tolist") else value
-
-
-def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type) -> dict | list:
-    """Table or list under a part of a key; tables that are not there yet are made."""
-    if isinstance(table, list):
-        number = int(part[1:-1])
-        found = table[number] if number < len(table) else None
-    else:
-        found = table.setdefault(part, {}) if wanted is dict else table.get(part)
-    if not isinstance(found, wanted):
-        kind = "table" if wanted is dict else "list"
-        raise CaseError(f"{part} is not a {kind}", code="E-KEY", key=key, file=name or None)
-    return found
-
-
-def to_toml(case: Case) -> str:
-    """TOML text that gives this case when read.
-
-    The text of its file as long as nothing was changed and it names no measured profile; the points of such
-    profiles are in the text, so that it needs no other file.
-    """
-    return case.source
-
-
-def case_schema(model: str | None = None) -> dict[str, Any]:
-    """JSON schema of the case file, for editors; with ``"drivetrain"`` that of these cases."""
-    return (DrivetrainCase if model else Case).model_json_schema()
+def need_set(case: object) -> None:
+    """Refuse a case without a planetary set of its own (E-MODEL)."""
+    if not isinstance(case, Case):
+        raise CaseError(
+            f"a {case.model} has no planetary set of its own",
+            code="E-MODEL",
+            key="model",
+            value=case.model,
+            remedy="use femgear check and femgear run, or a case without model",
+            file=case.location("model"),
+        )
 
 
 def planetary_set(case: Case) -> PlanetarySet:
@@ -371,7 +225,7 @@ def planetary_set(case: Case) -> PlanetarySet:
         What cannot be made, assembled or run (see `femgear.gears.checks.check_set`), and members that float
         without being held (E-MECHANISM), with file and line.
     """
-    refuse_drivetrain(case)
+    need_set(case)
     try:
         closed = _closed_set(case)
         check_set(closed)
@@ -451,10 +305,9 @@ def _gear(
 ) -> Gear:
     given, module, pressure_angle = section.rack or case.rack, case.sun.module, case.sun.pressure_angle
     rack = BasicRack(addendum=given.addendum, dedendum=given.dedendum, root_radius=given.root_radius)
-    if case.helical is not None:
-        helix = case.helical.helix_angle
-        module, pressure_angle = transverse_tool(module, pressure_angle, helix)
-        rack = transverse_rack(rack, helix)
+    if case.helix_angle is not None:
+        module, pressure_angle = transverse_tool(module, pressure_angle, case.helix_angle)
+        rack = transverse_rack(rack, case.helix_angle)
     return Gear(
         teeth=section.teeth,
         module=module,
@@ -474,7 +327,7 @@ def _gear(
 
 def _normal_modules(case: Case) -> float:
     """Normal modules in the module of the gears' section: cos(beta) of helical teeth, 1 of spur teeth."""
-    return 1.0 if case.helical is None else math.cos(case.helical.helix_angle)
+    return 1.0 if case.helix_angle is None else math.cos(case.helix_angle)
 
 
 def set_deviations(case: Case) -> SetDeviations:
@@ -563,33 +416,3 @@ def _ovality(case: Case) -> Ovality:
     if given is None:
         return Ovality()
     return Ovality(given.nodal_diameter, given.amplitude, given.phase, given.inextensional)
-
-
-def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
-    version = data.get("format", FORMAT)
-    if type(version) is int and version > FORMAT:
-        raise CaseError(
-            "the file is written for a newer femgear",
-            code="E-FORMAT",
-            key="format",
-            value=case_text.found(version),
-            limit=f"up to {FORMAT}",
-            remedy="update femgear",
-            file=name,
-        )
-    if is_drivetrain(data):
-        return build_drivetrain(data, text, name, numbered=numbered)
-    lines = text if numbered else ""
-    files = embed_profiles(data, name)
-    if files:
-        text = text_with_points(data, name, points="measured profiles", remedy="measure at fewer points")
-    try:
-        case = Case.model_validate(data)
-    except ValidationError as error:
-        raise combine(translate(error, Case), lines, name) from None
-    problems = cross_check(case)
-    if problems:
-        raise combine(problems, lines, name)
-    case._source, case._lines, case._name, case._profile_files = text, lines, name, files
-    case._notices = (*notices(data), *added_material(case))
-    return with_shafts(case)

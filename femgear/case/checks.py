@@ -6,13 +6,12 @@ Members of a case that float though nothing holds them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from femgear.case.deviations import LARGEST_DEVIATION, ROUNDING, CarrierErrors, GearErrors
 from femgear.case.sections import Case, check_published
-from femgear.case.units import FREQUENCY
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.checks import unheld_members
 
@@ -132,166 +131,12 @@ def _largest(value: float | tuple[float, ...] | None) -> float:
     return max(values, key=abs, default=0.0)
 
 
-def check_helical(case: Case) -> Iterator[CaseError]:
-    """Refusals of what a helical section does not go with."""
-    helical = case.helical
-    if helical is None:
-        return
-    if case.planar is not None:
-        yield CaseError(
-            "a set is planar or helical: the planar model has no motion out of its plane",
-            code="E-CHOICE",
-            key="helical",
-            value="planar and helical",
-            limit="one of the two sections",
-            remedy="leave one of them out",
-        )
-    if helical.helix_angle == 0.0:
-        yield CaseError(
-            "without a helix the teeth are spur teeth",
-            code="E-RANGE",
-            key="helical.helix_angle",
-            value="0 deg",
-            limit="above 0 deg up to 45 deg",
-            remedy="leave the section helical out",
-        )
-    if case.static.members == "elastic":
-        yield CaseError(
-            "the supports belong to the helical model: the static solution is that of the gears alone",
-            code="E-CHOICE",
-            key="static.members",
-            value="elastic",
-            limit='"fixed" in a helical case',
-            remedy="leave static.members out",
-        )
-    if case.operation.torque == 0.0:
-        yield CaseError(
-            "without torque no tooth carries load, so there is no mesh stiffness",
-            code="E-NO-LOAD",
-            key="operation.torque",
-            limit="not zero in a helical case",
-        )
-    fixed = case.operation.fixed
-    if getattr(helical, fixed).torsional_stiffness == 0.0:
-        yield CaseError(
-            f"the {fixed} is the fixed member but nothing keeps it from turning",
-            code="E-MECHANISM",
-            key=f"helical.{fixed}.torsional_stiffness",
-            value="0 N m/rad",
-            limit="above 0 N m/rad",
-            remedy="leave the entry out to hold the member, or hold another one",
-        )
-
-
-def check_planar(case: Case) -> Iterator[CaseError]:
-    """Refusals of what a planar section does not go with."""
-    planar = case.planar
-    if planar is None:
-        return
-    if case.static.members == "elastic":
-        yield CaseError(
-            "the supports belong to the planar model: the static solution is that of the gears alone",
-            code="E-CHOICE",
-            key="static.members",
-            value="elastic",
-            limit='"fixed" in a planar case',
-            remedy="leave static.members out",
-        )
-    if case.operation.torque == 0.0:
-        yield CaseError(
-            "without torque no tooth carries load: the planar set would rattle in its play",
-            code="E-NO-LOAD",
-            key="operation.torque",
-            limit="not zero in a planar case",
-        )
-    if planar.back_flanks and planar.line_backlash == 0.0:
-        yield CaseError(
-            "back flanks need play",
-            code="E-BACKLASH",
-            key="planar.line_backlash",
-            value="0 mm",
-            limit="above 0 mm",
-            remedy="give the play, or write planar.back_flanks = false",
-        )
-    yield from _check_torsion(case)
-    yield from _check_branch(case)
-
-
-def _check_torsion(case: Case) -> Iterator[CaseError]:
-    """The torque must find a way into the housing."""
-    planar, operation = case.planar, case.operation
-    output = output_member(case)
-    if getattr(planar.torsion, operation.fixed) == 0.0:
-        yield CaseError(
-            f"the {operation.fixed} is the fixed member but nothing keeps it from turning",
-            code="E-MECHANISM",
-            key=f"planar.torsion.{operation.fixed}",
-            value="0 N m/rad",
-            limit="above 0 N m/rad",
-            remedy="leave it out: the fixed member is then held",
-        )
-    if planar.reaction == "supports" and not getattr(planar.torsion, output):
-        yield CaseError(
-            f"the torque is to be carried by supports, but the {output}, which is the output, turns freely",
-            code="E-MECHANISM",
-            key=f"planar.torsion.{output}" if getattr(planar.torsion, output) == 0.0 else "planar.reaction",
-            value="supports",
-            limit=f"planar.torsion.{output} above 0 N m/rad",
-            remedy=f'give planar.torsion.{output}, or write reaction = "output"',
-        )
-
-
-def _check_branch(case: Case) -> Iterator[CaseError]:
-    planar, branch = case.planar, case.planar.branch
-    if branch is None:
-        return
-    if not branch.start < branch.to:
-        yield CaseError(
-            "the range of frequencies ends before it begins",
-            code="E-RANGE",
-            key="planar.branch.to",
-            value=FREQUENCY.show(branch.to),
-            limit=f"above {FREQUENCY.show(branch.start)}, where it begins",
-        )
-    if planar.gravity is None:
-        yield CaseError(
-            "the branch follows the response to the weight, and there is none",
-            code="E-KEY-MISSING",
-            key="planar.gravity",
-            remedy="add the section planar.gravity, or leave planar.branch out",
-        )
-    if case.operation.fixed == "carrier":
-        yield CaseError(
-            "the weight does not turn against a carrier that stands",
-            code="E-MECHANISM",
-            key="planar.branch",
-            value="operation.fixed = carrier",
-            limit="a carrier that turns",
-            remedy="leave planar.branch out",
-        )
-    if planar.gyroscopic:
-        yield CaseError(
-            "the gyroscopic terms would change along the branch, which is not computed",
-            code="E-CHOICE",
-            key="planar.gyroscopic",
-            value="true",
-            limit="false with planar.branch",
-            remedy="leave one of them out",
-        )
-
-
-def output_member(case: Case) -> str:
-    """The member that is neither driven nor held."""
-    others = {case.operation.input, case.operation.fixed}
-    return next((name for name in ("carrier", "sun", "ring") if name not in others), "carrier")
-
-
 LEAST_TORQUE = 1e-6
 
 
-def cross_check(case: Case) -> list[CaseError]:
-    """What no entry shows alone."""
-    problems = [problem for check in _CHECKS for problem in check(case)]
+def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
+    """What no entry shows alone; `more` is what its train adds."""
+    problems = [problem for check in _CHECKS for problem in check(case)] + list(more)
     return problems or list(check_published(case))
 
 
@@ -316,8 +161,7 @@ def _check_operation(case: Case):
             value=f"{operation.torque:g} N m",
             limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
         )
-    elastic = case.planar is None and case.helical is None
-    if elastic and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
+    if not case.rigid and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
         yield CaseError(
             "the ring is the fixed member but nothing keeps it from turning",
             code="E-MECHANISM",
@@ -369,7 +213,7 @@ def _check_supports(case: Case):
 
 def _check_numbers(case: Case):
     dynamics, harmonics = case.dynamics, case.mesh_harmonics
-    rigid = case.planar is not None or case.helical is not None
+    rigid = case.rigid
     # the record of rigid bodies is that of the static positions
     if rigid and case.static.positions <= 2 * harmonics:
         yield CaseError(
@@ -426,8 +270,6 @@ _CHECKS = (
     _check_supports,
     _check_numbers,
     check_deviation_sections,
-    check_planar,
-    check_helical,
 )
 
 

@@ -16,8 +16,6 @@ from femgear.case.fields import described
 from femgear.case.sections import Case, RackSection
 from femgear.case.units import ANGLE, LENGTH
 from femgear.errors import CaseError, GeometryError
-from femgear.trains.helical.section import helical_notices
-from femgear.trains.planar.section import planar_notices
 
 
 def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") -> list[CaseError]:
@@ -222,10 +220,10 @@ def rack_at(case: Case, key: str) -> RackSection:
 
 def _in_transverse_section(error: GeometryError, case: Case) -> None:
     """Gears of a helical case are refused in their transverse section, the file gives the normal one."""
-    if case.helical is None:
+    if case.helix_angle is None:
         return
     error.message += " (in the transverse section of the helical gears"
-    factor = math.cos(case.helical.helix_angle)
+    factor = math.cos(case.helix_angle)
     if factor < 0.999 and ((error.key or "").endswith("profile_shift") or "rack." in (error.key or "")):
         error.message += f", whose coefficients are {factor:.6g} times those of the file"
     error.message += ")"
@@ -291,14 +289,5 @@ def notices(data: dict) -> tuple[str, ...]:
         found.append(
             f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
             "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
-        )
-    if "planar" in data:
-        return (*found, *planar_notices(data))
-    if "helical" in data:
-        return (*found, *helical_notices(data))
-    if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
-        found.append(
-            'planet.bearing_clearance has no effect while static.members is "fixed": write '
-            'static.members = "elastic"'
         )
     return tuple(found)

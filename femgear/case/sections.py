@@ -37,8 +37,6 @@ from femgear.case.units import (
     TORSION,
 )
 from femgear.errors import CaseError
-from femgear.trains.helical.section import HelicalSection
-from femgear.trains.planar.section import PlanarSection
 
 FORMAT = 1
 RPM = SPEED.scale
@@ -278,30 +276,56 @@ class Case(_Section, ReadCase):
     static: StaticSection = StaticSection()
     dynamics: DynamicsSection = DynamicsSection()
     housing: HousingSection = HousingSection()
-    planar: PlanarSection | None = None
-    helical: HelicalSection | None = None
 
-    @model_validator(mode="before")
-    @classmethod
-    def _rigid_ring(cls, data: object) -> object:
-        """The ring of a planar or helical case is rigid and needs no foundation."""
-        rigid = isinstance(data, dict) and ("planar" in data or "helical" in data)
-        if rigid and isinstance(data.get("ring"), dict):
-            loose = {"foundation_radial": "0 N/m^3", "foundation_tangential": "0 N/m^3"}
-            return data | {"ring": loose | data["ring"]}
-        return data
+    @property
+    def rigid(self) -> bool:
+        """Whether the ring moves as a rigid body."""
+        return False
+
+    @property
+    def helix_angle(self) -> float | None:
+        """Helix angle at the reference circle [rad], None of spur gears."""
+        return None
 
     @property
     def mesh_harmonics(self) -> int | None:
         """Harmonics of the excitation: as given, 6 of rigid bodies, None where a frequency limits them."""
-        rigid = self.helical is not None or self.planar is not None
-        return self.dynamics.mesh_harmonics or (6 if rigid else None)
+        return self.dynamics.mesh_harmonics or (6 if self.rigid else None)
 
     @property
     def response_harmonics(self) -> int | None:
         """Harmonics of the response: as given, or three times those of the mesh; None as there."""
         found = self.mesh_harmonics
         return self.dynamics.response_harmonics or (None if found is None else 3 * found)
+
+
+class RigidCase(Case):
+    """A planetary gear set of rigid bodies: the ring needs no foundation."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_foundation(cls, data: object) -> object:
+        if isinstance(data, dict) and isinstance(data.get("ring"), dict):
+            loose = {"foundation_radial": "0 N/m^3", "foundation_tangential": "0 N/m^3"}
+            return data | {"ring": loose | data["ring"]}
+        return data
+
+    @property
+    def rigid(self) -> bool:
+        return True
+
+
+class MeshStiffnessSection(_Section):
+    """Constant stiffness of every mesh, in place of the static solution's."""
+
+    sun_planet: Quantity(STIFFNESS, 1e3, 1e13)
+    planet_ring: Quantity(STIFFNESS, 1e3, 1e13)
+
+
+def output_member(case: Case) -> str:
+    """The member that is neither driven nor held."""
+    others = {case.operation.input, case.operation.fixed}
+    return next((name for name in ("carrier", "sun", "ring") if name not in others), "carrier")
 
 
 CODE = "E-PUBLISHED"

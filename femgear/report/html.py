@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import os
 import re
 from dataclasses import dataclass
 from html import escape
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING
 from femgear.report.summary import case_warnings, describe_results, result_warnings
 from femgear.report.tables import Block
 from femgear.storage.files import checksum, storage_errors, write_text
-from femgear.storage.results import Results, open_results
+from femgear.storage.results import Results
 
 if TYPE_CHECKING:
     from femgear.trains.protocol import Train
@@ -57,15 +56,15 @@ class Picture:
     data: bytes
 
 
-def write_report(train: Train, folder: str | os.PathLike) -> Path:
+def write_report(train: Train, results: Results) -> Path:
     """Write ``report.html`` from what a results folder holds.
 
     Parameters
     ----------
     train : Train
         Of the case.
-    folder : path-like
-        Folder that a run wrote; the pictures that its manifest names are embedded.
+    results : Results
+        Of a run; the pictures that its manifest names are embedded.
 
     Returns
     -------
@@ -75,10 +74,9 @@ def write_report(train: Train, folder: str | os.PathLike) -> Path:
     Raises
     ------
     StorageError
-        When the folder holds no results, files were changed since the run, or the page cannot be written.
+        When files were changed since the run, or the page cannot be written.
     """
-    results = open_results(folder)
-    path = Path(folder) / "report.html"
+    path = results.folder / "report.html"
     write_text(page(train, results), path)
     return path
 

@@ -10,17 +10,15 @@ import math
 import os
 import shutil
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from femgear import __version__
-from femgear.case.case import read_case
-from femgear.case.sections import Case
 from femgear.errors import StorageError
 from femgear.storage.files import (
     checked_name,
@@ -157,67 +155,40 @@ def versions() -> dict[str, str]:
     return {"femgear": __version__, "python": platform.python_version(), **{n: version(n) for n in libraries}}
 
 
-STAGES = ("static", "stress", "modes", "dynamics", "housing", "branch", "response", "transient", "spectrum")
 CASE, LOCK = "case.toml", ".lock"
 RUNNING, FINISHED = ".running", ".finished"
 
 
 @dataclass(frozen=True)
 class Results:
-    """A results folder; every file is read, and its checksum tested, when it is first asked for."""
+    """A results folder; every file is read, and its checksum tested, when it is first asked for.
+
+    Parameters
+    ----------
+    folder : Path
+    manifest : Manifest
+    read_case : callable
+        ``(path) -> case``.
+    """
 
     folder: Path
     manifest: Manifest
+    read_case: Callable[[Path], Any]
 
     @cached_property
-    def case(self) -> Case:
+    def case(self) -> Any:
         """The case as run."""
-        return read_case(self._checked(CASE))
+        return self.read_case(self._checked(CASE))
 
-    @cached_property
-    def static(self) -> xr.Dataset:
-        """Static transmission error, mesh stiffness, load sharing."""
-        return self.stage("static")
+    def __getattr__(self, name: str) -> xr.Dataset:
+        """Contents of the file of a stage: ``results.modes``, as ``results["modes"]``."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        found = self.__dict__[name] = self.stage(name)
+        return found
 
-    @cached_property
-    def stress(self) -> xr.Dataset:
-        """Root stresses, contact pressures, load spectra."""
-        return self.stage("stress")
-
-    @cached_property
-    def modes(self) -> xr.Dataset:
-        """Natural frequencies and mode shapes."""
-        return self.stage("modes")
-
-    @cached_property
-    def dynamics(self) -> xr.Dataset:
-        """Periodic response at every speed."""
-        return self.stage("dynamics")
-
-    @cached_property
-    def housing(self) -> xr.Dataset:
-        """Signal and orders of the fixed sensor."""
-        return self.stage("housing")
-
-    @cached_property
-    def branch(self) -> xr.Dataset:
-        """Periodic responses of a planar set to its weight, over the weight's frequency."""
-        return self.stage("branch")
-
-    @cached_property
-    def response(self) -> xr.Dataset:
-        """Responses of a planar set to weight and mesh frequency at every speed."""
-        return self.stage("response")
-
-    @cached_property
-    def transient(self) -> xr.Dataset:
-        """Motion of a drivetrain in time."""
-        return self.stage("transient")
-
-    @cached_property
-    def spectrum(self) -> xr.Dataset:
-        """Spectra and lines of the mesh forces of a drivetrain."""
-        return self.stage("spectrum")
+    def __getitem__(self, name: str) -> xr.Dataset:
+        return getattr(self, name)
 
     def stage(self, name: str) -> xr.Dataset:
         """Contents of the file of one stage."""
@@ -225,8 +196,8 @@ class Results:
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """Stages that the folder holds."""
-        return tuple(stage for stage in STAGES if f"{stage}.nc" in self.manifest.files)
+        """Stages that the folder holds, in the order of the run."""
+        return tuple(name.removesuffix(".nc") for name in self.manifest.files if name.endswith(".nc"))
 
     def _checked(self, name: str) -> Path:
         path = self.folder / name
@@ -248,12 +219,16 @@ class Results:
         return path
 
 
-def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
+def results_of(
+    folder: str | os.PathLike, read_case: Callable[[Path], Any], *, partial: bool = True
+) -> Results:
     """Results of a run; of an interrupted one those stages that are complete, with a warning.
 
     Parameters
     ----------
     folder : path-like
+    read_case : callable
+        ``(path) -> case``; `femgear.open_results` reads those of every train.
     partial : bool
         Accept the results of an interrupted run.
 
@@ -269,7 +244,7 @@ def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
     """
     folder = Path(folder)
     _refuse_missing(folder)
-    results = Results(folder, read_manifest(folder))
+    results = Results(folder, read_manifest(folder), read_case)
     if not partial:
         _refuse_incomplete(results)
     elif not results.manifest.complete:

@@ -2,7 +2,6 @@
 
 Optimisation over entries of the case file: objectives, limits, searches, Pareto fronts, sweeps."""
 
-from femgear.case.case import with_values
 from femgear.study.linearised import LinearContact
 from femgear.study.names import NAMES, named_quantity, parse_limit, parse_variable
 from femgear.study.objectives import (
@@ -51,6 +50,7 @@ from femgear.study.sharing import (
 )
 from femgear.study.sweep import Sweep, parse_over, sweep, sweep_into
 from femgear.study.variables import Variable
+from femgear.trains.reading import with_values
 
 __all__ = [
     "METHODS",

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import with_values
 from femgear.errors import ContactError, FemgearError, StorageError
 from femgear.study.variables import Variable
+from femgear.trains.reading import with_values
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from femgear.case.case import planetary_set, with_values
+from femgear.case.case import planetary_set
 from femgear.case.sections import Case
 from femgear.case.units import LENGTH, to_si
 from femgear.errors import CaseError
@@ -16,6 +16,7 @@ from femgear.study import objectives
 from femgear.study.objectives import NUMBER, Quantity
 from femgear.study.problem import Limit
 from femgear.study.variables import Variable
+from femgear.trains.reading import with_values
 
 Speeds = tuple[str, str]
 

@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from femgear.case.case import with_values
 from femgear.case.sections import Case
 from femgear.errors import CaseError, ContactError, FemgearError, StorageError
 from femgear.study.objectives import STAGES, Quantity
 from femgear.study.variables import Variable, check_variables
 from femgear.study.variants import Journal, Shared, Variant, open_journal
+from femgear.trains.reading import with_values
 
 Progress = Callable[[str, float, float], None]
 Point = tuple[object, ...]

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 
-from femgear.case.case import with_value
 from femgear.case.sections import Case
 from femgear.errors import CaseError
 from femgear.storage.files import storage_errors, write_text
@@ -26,6 +25,7 @@ from femgear.study.objectives import Quantity
 from femgear.study.problem import Failure, Progress, open_designs
 from femgear.study.variables import Variable, split
 from femgear.threads import one_blas_thread
+from femgear.trains.reading import with_value
 
 LARGEST = 100_000
 """Combinations at most."""

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.case import text
-from femgear.case.case import with_values
 from femgear.case.sections import Case
 from femgear.case.units import Dimension, to_si
 from femgear.errors import CaseError
+from femgear.trains.reading import with_values
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 _DIGITS = 9

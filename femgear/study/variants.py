@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear import __version__
-from femgear.case.case import planetary_set, set_deviations, to_toml, with_value
+from femgear.case.case import planetary_set, set_deviations
 from femgear.case.dependencies import static_entries
 from femgear.case.sections import Case
 from femgear.case.units import SPEED
@@ -28,6 +28,7 @@ from femgear.storage.files import exclusive_lock, storage_errors
 from femgear.threads import one_blas_thread
 from femgear.trains.elastic import stages as elastic_stages
 from femgear.trains.elastic.checks import check_dynamic_case, check_rim_speed
+from femgear.trains.reading import to_toml, with_value
 from femgear.trains.static import stages as static_stages
 from femgear.trains.static.checks import check_motions
 

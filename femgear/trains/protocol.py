@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from femgear.errors import CaseError
     from femgear.report.tables import Block
     from femgear.storage.results import Results
 
@@ -108,6 +109,25 @@ class Stage:
 
 
 @dataclass(frozen=True)
+class OwnFile:
+    """Case file of a train that is no planetary set.
+
+    Parameters
+    ----------
+    claims : callable
+        ``(tables) -> bool``: whether a file is of this kind.
+    build : callable
+        ``(tables, text, name, *, numbered) -> case``; see `femgear.trains.reading`.
+    schema : callable
+        ``() -> dict``: JSON schema.
+    """
+
+    claims: Callable[[dict], bool]
+    build: Callable[..., Any]
+    schema: Callable[[], dict]
+
+
+@dataclass(frozen=True)
 class Train:
     """A kind of case and what is computed of it.
 
@@ -115,8 +135,16 @@ class Train:
     ----------
     name, words : str
         ``"planar"``, ``"a planar case"``.
-    owns : callable
-        ``(case) -> bool``: whether a case is one of this train.
+    model : type
+        Of its cases; a case is one of the train with the most special model.
+    section : str
+        Table that makes a planetary set one of this train, and the field of the model; ``""`` for none.
+    own_file : OwnFile, optional
+        Where the case file is not that of a planetary set.
+    cross_check : callable
+        ``(case) -> problems``: what no entry shows alone.
+    notices : callable
+        ``(tables) -> sentences``: what was read in a way that deserves to be said.
     stages : tuple of Stage
         In order.
     describe : callable
@@ -133,13 +161,17 @@ class Train:
 
     name: str
     words: str
-    owns: Callable[[Any], bool]
+    model: type
     stages: tuple[Stage, ...]
     describe: Callable[[Any], tuple[Block, ...]]
     warnings: Callable[[Any], Iterable[str]]
     result_warnings: Callable[[Results], Iterable[str]] = lambda results: ()
     figures: Callable[[], Figures] = lambda: Figures({})
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
+    section: str = ""
+    own_file: OwnFile | None = None
+    cross_check: Callable[[Any], Iterable[CaseError]] = lambda case: ()
+    notices: Callable[[dict], Iterable[str]] = lambda data: ()
 
     def stage(self, name: str) -> Stage | None:
         """The stage of a name, None where the train has none of it."""

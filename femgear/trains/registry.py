@@ -14,7 +14,7 @@ TRAINS: tuple[Train, ...] = (DRIVETRAIN, HELICAL, PLANAR, ELASTIC)
 
 def train_of(case) -> Train:
     """Train that a case is one of."""
-    return next(train for train in TRAINS if train.owns(case))
+    return next(train for train in TRAINS if isinstance(case, train.model))
 
 
 def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:

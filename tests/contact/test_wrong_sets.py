@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.case.case import read_case, with_value
+from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.stages import solve_static
 
 TANGENTIAL = [{"planet": 1, "tangential": "0.12 mm"}]

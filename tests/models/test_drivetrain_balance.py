@@ -9,7 +9,6 @@ from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbi
 from scipy.optimize import brentq
 from scipy.special import mathieu_a
 
-from femgear.case.case import read_case
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.trains.drivetrain.data import ChainBody, Drivetrain, MeshWave, ParallelStage, constant_torques
@@ -24,6 +23,7 @@ from femgear.trains.drivetrain.multitone import (
 )
 from femgear.trains.drivetrain.setup import case_model
 from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.reading import read_case
 
 TRAIN = wind_turbine_drivetrain()
 

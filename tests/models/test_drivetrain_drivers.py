@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivetrain
 
-from femgear.case.case import read_case, with_value
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.trains.drivetrain.checks import mean_torque, speed_ratios, with_drivers
@@ -30,6 +29,7 @@ from femgear.trains.drivetrain.model import (
 )
 from femgear.trains.drivetrain.setup import BENDING, TORSIONAL, case_model, drivetrain_of
 from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.reading import read_case, with_value
 
 TRAIN = wind_turbine_drivetrain()
 ALPHA = math.radians(20.0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from femgear.case.case import read_case
 from femgear.trains.drivetrain.data import (
     ChainBearing,
     ChainBody,
@@ -27,6 +26,7 @@ from femgear.trains.drivetrain.time import (
     shift_rate,
     speed_range,
 )
+from femgear.trains.reading import read_case
 
 CASES = Path(__file__).parents[2] / "cases"
 

@@ -352,8 +352,8 @@ def test_motor_and_brake_follow_the_driven_member():
     """With the carrier driven the motor hangs on the carrier and the brake on the sun."""
     from validation.cases import reference_case
 
-    from femgear.case.case import with_value
     from femgear.trains.elastic.stages import solve_modes
+    from femgear.trains.reading import with_value
     from femgear.trains.static.stages import solve_static
 
     case = with_value(reference_case(), "operation.input", "carrier")

@@ -22,10 +22,10 @@ from femgear.solvers.linear.tracking import (
     strain_shares,
     track_modes,
 )
-from femgear.system.assembler import planar_system
+from femgear.system.assembler import planar_springs, planar_system
 from femgear.system.mode_kinds import motion_planes
 from femgear.system.system import MechanicalSystem
-from femgear.trains.planar.model import planar_kinds, planar_modes, planar_springs
+from femgear.trains.planar.model import planar_kinds, planar_modes
 
 # two masses 1 on springs 1 + p and 2 - p, joined by kc: eigenvalues 1.5 + kc -+ sqrt((p - 1/2)^2 + kc^2)
 SPLIT = np.diag([1.0, -1.0])

@@ -63,7 +63,7 @@ speeds = ["250 rpm", "3100 rpm"]
 @cache
 def reference_case() -> Case:
     """The case of the reference set."""
-    from femgear.case.case import parse_case
+    from femgear.trains.reading import parse_case
 
     return parse_case(CASE, name="reference set")
 

@@ -20,7 +20,7 @@ SHOOTING = "DOP853 over one period, periodic by linear shooting"
 
 def _changed(**entries):
     """The reference case with dotted entries changed; ``__`` stands for the point."""
-    from femgear.case.case import with_value
+    from femgear.trains.reading import with_value
 
     case = reference_case()
     for key, value in entries.items():

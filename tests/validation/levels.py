@@ -60,7 +60,7 @@ SMALL = {
 
 def _small(**changes) -> Case:
     """Set 21/19/59, in sequence with four or five planets, with other entries."""
-    from femgear.case.case import parse_case
+    from femgear.trains.reading import parse_case
 
     return parse_case(OTHER.format(**SMALL | changes), name="other set")
 
@@ -68,7 +68,7 @@ def _small(**changes) -> Case:
 @cache
 def _sets() -> dict[str, Case]:
     """The reference set, one out of phase, and one with two opposite pairs of planets."""
-    from femgear.case.case import parse_case, with_value
+    from femgear.trains.reading import parse_case, with_value
 
     reference = parse_case(CASE, name="reference set")
     for key in ("dynamics", "housing"):
@@ -91,7 +91,7 @@ def _sets() -> dict[str, Case]:
 
 
 def _changed(case: Case, key: str, value) -> Case:
-    from femgear.case.case import with_value
+    from femgear.trains.reading import with_value
 
     return with_value(case, key, value)
 

@@ -905,19 +905,6 @@ def _unknown_model(value: object) -> CaseError:
     )
 
 
-def refuse_drivetrain(case: object) -> None:
-    """Refuse a drivetrain where one planetary set is wanted (E-MODEL)."""
-    if isinstance(case, DrivetrainCase):
-        raise CaseError(
-            "a drivetrain has no planetary set of its own",
-            code="E-MODEL",
-            key="model",
-            value=case.model,
-            remedy="use femgear check and femgear run, or a case without model",
-            file=case.location("model"),
-        )
-
-
 def need_drivetrain(case: object) -> DrivetrainCase:
     """The case, refused where it is no drivetrain (E-MODEL)."""
     if not isinstance(case, DrivetrainCase):

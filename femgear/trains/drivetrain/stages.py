@@ -21,7 +21,12 @@ from femgear.trains.drivetrain.results import (
     drivetrain_warnings,
     transient_warnings,
 )
-from femgear.trains.drivetrain.section import DrivetrainCase, settle_time
+from femgear.trains.drivetrain.section import (
+    DrivetrainCase,
+    build_drivetrain,
+    is_drivetrain,
+    settle_time,
+)
 from femgear.trains.drivetrain.setup import (
     BENDING,
     TORSIONAL,
@@ -33,7 +38,7 @@ from femgear.trains.drivetrain.setup import (
     record_rate,
     torque_histories,
 )
-from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -213,7 +218,8 @@ def remarks(results: Results, stem: str) -> Iterator[str]:
 DRIVETRAIN = Train(
     name="drivetrain",
     words="a drivetrain",
-    owns=lambda case: isinstance(case, DrivetrainCase),
+    model=DrivetrainCase,
+    own_file=OwnFile(is_drivetrain, build_drivetrain, DrivetrainCase.model_json_schema),
     stages=(
         Stage(
             name="modes",

@@ -6,6 +6,7 @@ goes to disk.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -449,10 +450,18 @@ def _figures(name: str):
     return load
 
 
+def _notices(data: dict) -> Iterator[str]:
+    if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
+        yield (
+            'planet.bearing_clearance has no effect while static.members is "fixed": write '
+            'static.members = "elastic"'
+        )
+
+
 ELASTIC = Train(
     name="elastic",
     words="a case with an elastic ring",
-    owns=lambda case: True,
+    model=Case,
     stages=(
         STATIC,
         STRESS,
@@ -498,4 +507,5 @@ ELASTIC = Train(
         response_warnings(results.dynamics) if "dynamics" in results.stages else ()
     ),
     figures=case_figures,
+    notices=_notices,
 )  # fmt: skip

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import set_deviations
-from femgear.case.sections import Case
 from femgear.errors import CaseError, ConvergenceError
+from femgear.trains.helical.section import HelicalCase
 from femgear.trains.helical.virtual_gears import helical_data, line_load, torque_of, virtual_gears
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _AXES = {"axial_stiffness": "axial", "tilt_stiffness": "tilt"}
 _TOOTH, _STEEL, _MOST = 14e9, 206e9, 0.25
 
 
-def check_helical_case(case: Case, gears: PlanetarySet) -> None:
+def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
     """Refuse what the helical model cannot represent, before anything is computed.
 
     Raises
@@ -54,7 +54,7 @@ def check_helical_case(case: Case, gears: PlanetarySet) -> None:
         virtual_gears(case, gears)
 
 
-def _check_torque(case: Case, gears: PlanetarySet) -> None:
+def _check_torque(case: HelicalCase, gears: PlanetarySet) -> None:
     """A load under which teeth would give way by a large part of their height has no static solution."""
     stiffness = _TOOTH * case.material.youngs_modulus / _STEEL
     share = line_load(case, gears) / (stiffness * gears.sun.module)
@@ -70,7 +70,7 @@ def _check_torque(case: Case, gears: PlanetarySet) -> None:
         )
 
 
-def _check_supports(case: Case, gears: PlanetarySet) -> None:
+def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
     """The thrust of helical teeth needs axial supports and its moments tilt supports."""
     data = helical_data(case, gears, np.full(2 * gears.n_planets, _TRIAL))
     try:
@@ -90,7 +90,7 @@ def _check_supports(case: Case, gears: PlanetarySet) -> None:
         _refuse_loose(case, data)
 
 
-def _balanced(case: Case, data: HelicalSet) -> bool:
+def _balanced(case: HelicalCase, data: HelicalSet) -> bool:
     """Whether supports take up what the torque asks of them."""
     from femgear.solvers.linear.modal import solve_modes
     from femgear.trains.helical.model import helical_system
@@ -104,7 +104,7 @@ def _balanced(case: Case, data: HelicalSet) -> bool:
     return True
 
 
-def _refuse_loose(case: Case, data: HelicalSet) -> None:
+def _refuse_loose(case: HelicalCase, data: HelicalSet) -> None:
     """Name the supports of zero stiffness that would each take up what nothing takes up."""
     free = [
         (body, entry)

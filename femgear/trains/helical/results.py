@@ -31,12 +31,12 @@ from femgear.trains.helical.virtual_gears import SectionStiffness
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.case.sections import Case
     from femgear.gears.kinematics import Speeds
     from femgear.gears.planetary import PlanetarySet
     from femgear.solvers.stability.floquet import Stability
     from femgear.system.system import MechanicalSystem, Modes, Response
     from femgear.trains.helical.model import HelicalSet
+    from femgear.trains.helical.section import HelicalCase
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,7 @@ def _attributes(result: HelicalModesResult) -> dict:
     return given
 
 
-def describe_helical(case: Case, planetary: PlanetarySet) -> tuple[Block, ...]:
+def describe_helical(case: HelicalCase, planetary: PlanetarySet) -> tuple[Block, ...]:
     """Helix, contact ratios, bodies and supports of a helical case.
 
     Parameters
@@ -230,7 +230,7 @@ _BODIES = (
 )  # fmt: skip
 
 
-def _teeth(case: Case, s: PlanetarySet) -> Block:
+def _teeth(case: HelicalCase, s: PlanetarySet) -> Block:
     helical, normal = case.helical, case.sun
     beta = helical.helix_angle
     base = involute.base_helix_angle(normal.pressure_angle, beta)
@@ -255,7 +255,7 @@ def _teeth(case: Case, s: PlanetarySet) -> Block:
     return Block("Helix", ("", "sun-planet", "planet-ring"), tuple(rows), notes)
 
 
-def _bodies(case: Case) -> Iterator[tuple[str, ...]]:
+def _bodies(case: HelicalCase) -> Iterator[tuple[str, ...]]:
     helical, planet = case.helical, case.planet
     for name, one, radial in (
         ("sun", case.sun, case.sun.support_stiffness),
@@ -275,7 +275,7 @@ def _bodies(case: Case) -> Iterator[tuple[str, ...]]:
         )
 
 
-def _model(case: Case, s: PlanetarySet) -> tuple[str, ...]:
+def _model(case: HelicalCase, s: PlanetarySet) -> tuple[str, ...]:
     helical, given = case.helical, case.helical.mesh_stiffness
     if given is not None:
         text = (

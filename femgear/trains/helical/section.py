@@ -9,8 +9,9 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from femgear.case.fields import Count, Quantity
+from femgear.case.sections import MeshStiffnessSection, RigidCase
 from femgear.case.units import ANGLE, INERTIA, MASS, STIFFNESS, TORSION
-from femgear.trains.planar.section import MeshStiffnessSection
+from femgear.errors import CaseError
 
 LARGEST_HELIX = math.radians(45.0)
 # stiffer supports are lost in the rounding of those that mesh springs feel
@@ -137,3 +138,53 @@ def _duration(seconds: float) -> str:
 
 def _listed(names: list[str]) -> str:
     return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
+
+
+class HelicalCase(RigidCase):
+    """A planetary gear set of rigid bodies with helical gears, which move in space."""
+
+    helical: HelicalSection
+
+    @property
+    def helix_angle(self) -> float:
+        return self.helical.helix_angle
+
+
+def check_helical(case: HelicalCase) -> Iterator[CaseError]:
+    """Refusals of what a helical section does not go with."""
+    helical = case.helical
+    if helical.helix_angle == 0.0:
+        yield CaseError(
+            "without a helix the teeth are spur teeth",
+            code="E-RANGE",
+            key="helical.helix_angle",
+            value="0 deg",
+            limit="above 0 deg up to 45 deg",
+            remedy="leave the section helical out",
+        )
+    if case.static.members == "elastic":
+        yield CaseError(
+            "the supports belong to the helical model: the static solution is that of the gears alone",
+            code="E-CHOICE",
+            key="static.members",
+            value="elastic",
+            limit='"fixed" in a helical case',
+            remedy="leave static.members out",
+        )
+    if case.operation.torque == 0.0:
+        yield CaseError(
+            "without torque no tooth carries load, so there is no mesh stiffness",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero in a helical case",
+        )
+    fixed = case.operation.fixed
+    if getattr(helical, fixed).torsional_stiffness == 0.0:
+        yield CaseError(
+            f"the {fixed} is the fixed member but nothing keeps it from turning",
+            code="E-MECHANISM",
+            key=f"helical.{fixed}.torsional_stiffness",
+            value="0 N m/rad",
+            limit="above 0 N m/rad",
+            remedy="leave the entry out to hold the member, or hold another one",
+        )

@@ -11,7 +11,6 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
-from femgear.case.sections import Case
 from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
@@ -22,6 +21,7 @@ from femgear.trains.helical.results import (
     describe_helical,
     describe_helical_static,
 )
+from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
 from femgear.trains.helical.virtual_gears import (
     SectionStiffness,
     base_helix_angle,
@@ -45,13 +45,13 @@ if TYPE_CHECKING:
 
 
 def solve_helical_static(
-    case: Case, *, cache: Path | None = None, progress: Progress | None = None
+    case: HelicalCase, *, cache: Path | None = None, progress: Progress | None = None
 ) -> StaticResult:
     """Static solution of the spur gears of the transverse section, the whole face width loaded at once."""
     return static_stages.solve_static(_drive_flanks(case), cache=cache, progress=progress)
 
 
-def _drive_flanks(case: Case) -> Case:
+def _drive_flanks(case: HelicalCase) -> HelicalCase:
     """The case whose static solution has drive flanks alone."""
     plain = case.static.model_copy(update={"stresses": False, "back_flanks": False})
     return case.model_copy(update={"static": plain})
@@ -59,7 +59,7 @@ def _drive_flanks(case: Case) -> Case:
 
 @one_blas_thread()
 def solve_helical_modes(
-    case: Case,
+    case: HelicalCase,
     static: StaticResult | None = None,
     *,
     section: SectionStiffness | None = None,
@@ -113,7 +113,7 @@ def solve_helical_modes(
 
 @one_blas_thread()
 def solve_helical_dynamics(
-    case: Case, modes: HelicalModesResult, *, progress: Progress | None = None
+    case: HelicalCase, modes: HelicalModesResult, *, progress: Progress | None = None
 ) -> HelicalDynamicsResult:
     """Periodic response at the case's speeds by the spectral method, with a Floquet verdict at each.
 
@@ -225,14 +225,15 @@ def _figures(name: str) -> Callable[[], Figures]:
     return load
 
 
-def _given(case: Case) -> bool:
+def _given(case: HelicalCase) -> bool:
     return case.helical.mesh_stiffness is not None
 
 
 HELICAL = Train(
     name="helical",
     words="a helical case",
-    owns=lambda case: getattr(case, "helical", None) is not None,
+    model=HelicalCase,
+    section="helical",
     stages=(
         Stage(
             name="static",
@@ -292,4 +293,6 @@ HELICAL = Train(
     ),
     figures=static_stages.case_figures,
     remarks=_remarks,
+    cross_check=check_helical,
+    notices=helical_notices,
 )  # fmt: skip

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.checks import output_member
-from femgear.case.sections import Case
+from femgear.case.sections import output_member
 from femgear.errors import CaseError, GeometryError
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
+from femgear.trains.helical.section import HelicalCase
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from femgear.trains.helical.model import HelicalSet
 
 
-def helical_data(case: Case, gears: PlanetarySet, mesh_stiffness=None) -> HelicalSet:
+def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) -> HelicalSet:
     """Helical set of a case: bodies and supports of its entries, radii and angles of its gears.
 
     Parameters
@@ -69,12 +69,12 @@ def helical_data(case: Case, gears: PlanetarySet, mesh_stiffness=None) -> Helica
     )
 
 
-def base_helix_angle(case: Case, gears: PlanetarySet) -> float:
+def base_helix_angle(case: HelicalCase, gears: PlanetarySet) -> float:
     """beta_b [rad] without sign: ``tan beta_b = tan beta cos alpha_t`` (ISO 21771, section 4.2.6)."""
     return math.atan(math.tan(case.helical.helix_angle) * math.cos(gears.sun.pressure_angle))
 
 
-def overlap_ratio(case: Case, gears: PlanetarySet) -> float:
+def overlap_ratio(case: HelicalCase, gears: PlanetarySet) -> float:
     """eps_beta of both meshes."""
     from femgear.trains.helical.model import contact_ratios
 
@@ -82,7 +82,7 @@ def overlap_ratio(case: Case, gears: PlanetarySet) -> float:
     return float(found[0, 1])
 
 
-def rotation_sense(case: Case, gears: PlanetarySet) -> int:
+def rotation_sense(case: HelicalCase, gears: PlanetarySet) -> int:
     """1 where the sun turns counter-clockwise against the carrier, else -1."""
     from femgear.gears.kinematics import speeds
 
@@ -90,7 +90,7 @@ def rotation_sense(case: Case, gears: PlanetarySet) -> int:
     return 1 if found.sun > found.carrier else -1
 
 
-def torque_of(case: Case) -> PlanarTorque:
+def torque_of(case: HelicalCase) -> PlanarTorque:
     """The driving torque, which the member that is neither driven nor held takes up."""
     from femgear.system.lumped import PlanarTorque
 
@@ -135,7 +135,9 @@ class SectionStiffness:
 
 
 @one_blas_thread()
-def section_stiffness(case: Case, gears: PlanetarySet, *, cache: Path | None = None) -> SectionStiffness:
+def section_stiffness(
+    case: HelicalCase, gears: PlanetarySet, *, cache: Path | None = None
+) -> SectionStiffness:
     """Stiffness of the teeth of both sections, from one planet each under the same load a length.
 
     The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse.
@@ -164,7 +166,7 @@ def section_stiffness(case: Case, gears: PlanetarySet, *, cache: Path | None = N
     return SectionStiffness(teeth, transverse, normal, beta_b)
 
 
-def virtual_gears(case: Case, gears: PlanetarySet) -> PlanetarySet:
+def virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
     """`femgear.gears.helix.virtual_set` of a case.
 
     Raises
@@ -246,7 +248,7 @@ def shared_load(record: MeshExcitation) -> MeshExcitation:
     )
 
 
-def line_load(case: Case, gears: PlanetarySet) -> float:
+def line_load(case: HelicalCase, gears: PlanetarySet) -> float:
     """Load a width of each sun mesh in the transverse section, which is that a length of contact line [N/m].
 
     ``F_n / (b / cos beta_b)`` with ``F_n = F_t / cos beta_b``.
@@ -257,7 +259,7 @@ def line_load(case: Case, gears: PlanetarySet) -> float:
     return abs(sun) / (gears.n_planets * gears.sun.base_radius * gears.sun.face_width)
 
 
-def _pair_stiffness(case: Case, gears: PlanetarySet, load: float, cache: Path | None) -> np.ndarray:
+def _pair_stiffness(case: HelicalCase, gears: PlanetarySet, load: float, cache: Path | None) -> np.ndarray:
     """Mean stiffness of a tooth pair per width (2,) of the meshes of one planet [N/m^2]."""
     from femgear.contact.bodies import make_bodies, make_sectors
     from femgear.contact.cycle import walk_mesh_cycle

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.assembler import free_motions, mesh_directions, planar_dofs, planar_system
+from femgear.system.assembler import free_motions, mesh_directions, planar_dofs, planar_springs, planar_system
 from femgear.system.entries import checked_count, checked_numbers
 from femgear.system.lumped import (
     CENTRAL,
@@ -42,7 +42,6 @@ from femgear.system.lumped import (
 )
 from femgear.system.series import FourierSeries
 from femgear.system.system import MechanicalSystem
-from femgear.trains.planar.model import planar_springs
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import set_deviations
-from femgear.case.sections import Case
 from femgear.errors import CaseError, ConvergenceError
+from femgear.trains.planar.section import PlanarCase
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -27,7 +27,7 @@ _MODULES = {"motion": 2.0, "approach": 0.5}
 _ON_RESONANCE = 1e-3
 
 
-def check_planar_case(case: Case, gears: PlanetarySet) -> None:
+def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
     """Refuse what the planar model cannot represent, before anything is computed.
 
     Raises
@@ -63,7 +63,7 @@ def check_planar_case(case: Case, gears: PlanetarySet) -> None:
         )
 
 
-def check_smoothing(case: Case, gears: PlanetarySet, model: PlanarModel) -> None:
+def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -> None:
     """Refuse contact that sets in over a length which is none of contact.
 
     The smoothed law carries ``k s^2 / 4 b`` through a gap b, and its force at a compression d is wrong by
@@ -105,7 +105,7 @@ def mean_compression(model: PlanarModel) -> float:
     return float(np.abs(system.W[:, :count].T @ moved).min())
 
 
-def check_branch_damping(case: Case, model: PlanarModel) -> None:
+def check_branch_damping(case: PlanarCase, model: PlanarModel) -> None:
     """Refuse a range of frequencies over a natural frequency without damping.
 
     Raises
@@ -120,7 +120,9 @@ def check_branch_damping(case: Case, model: PlanarModel) -> None:
         raise _resonance(case, bare[0], "planar.branch crosses it")
 
 
-def check_response_damping(case: Case, model: PlanarModel, frequency: np.ndarray, orders: np.ndarray) -> None:
+def check_response_damping(
+    case: PlanarCase, model: PlanarModel, frequency: np.ndarray, orders: np.ndarray
+) -> None:
     """Refuse a speed at which the weight or a mesh harmonic meets a natural frequency without damping.
 
     Parameters
@@ -146,7 +148,7 @@ def check_response_damping(case: Case, model: PlanarModel, frequency: np.ndarray
         )
 
 
-def _undamped(case: Case, model: PlanarModel) -> np.ndarray:
+def _undamped(case: PlanarCase, model: PlanarModel) -> np.ndarray:
     """Natural frequencies [Hz] above zero of the modes without damping."""
     from femgear.solvers.linear.modal import solve_modes
     from femgear.trains.planar.model import mode_ratios
@@ -160,7 +162,7 @@ def _undamped(case: Case, model: PlanarModel) -> np.ndarray:
     return hertz[(hertz > 0.0) & (mode_ratios(hertz, ratios) == 0.0)]
 
 
-def _resonance(case: Case, hertz: float, words: str) -> CaseError:
+def _resonance(case: PlanarCase, hertz: float, words: str) -> CaseError:
     key = "planar.damping_ratios" if case.planar.damping_ratios else "dynamics.damping_ratio"
     return CaseError(
         f"the natural frequency {hertz:.6g} Hz has no damping and {words}: the response has no bound there",

@@ -33,7 +33,7 @@ from femgear.system.assembler import (
     planar_system,
 )
 from femgear.system.elements import GearMeshes, RadialBearings
-from femgear.system.lumped import CENTRAL, PlanarSet, PlanarTorque, flank_sign, member_radius
+from femgear.system.lumped import CENTRAL, PlanarSet, PlanarTorque, flank_sign
 from femgear.system.mode_kinds import energy_shares, named_kinds, planar_motions
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces
 from femgear.system.series import FourierSeries, StepSeries, line_tail, series_of
@@ -469,41 +469,6 @@ def class_shares(data: PlanarSet, shape) -> np.ndarray:
     See `femgear.system.mode_kinds.class_energies`, also for unequal spacing.
     """
     return energy_shares(planar_motions(data, shape))
-
-
-def planar_springs(data: PlanarSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the set by name, for `femgear.solvers.linear.tracking.strain_shares`.
-
-    Parameters
-    ----------
-    data : PlanarSet
-    mesh_stiffness : (2N,) array, optional
-        [N/m]; that of the set when not given.
-
-    Returns
-    -------
-    dict of str to (columns (n, g), stiffness (g,))
-        Meshes one by one, planet bearings one by one, supports and torsional supports of the central members;
-        what is held or free has no spring.
-    """
-    T, N = free_motions(data), data.n_planets
-    k = np.asarray(data.mesh_stiffness if mesh_stiffness is None else mesh_stiffness, float)
-    meshes, pins = T.T @ mesh_directions(data), pin_directions(data)
-    names = [f"sun-planet {n + 1}" for n in range(N)] + [f"planet {n + 1}-ring" for n in range(N)]
-    springs = {name: (meshes[:, [j]], k[[j]]) for j, name in enumerate(names)}
-    for n, bearing in enumerate(data.planet_bearing):
-        if np.isfinite(bearing):
-            springs[f"bearing of planet {n + 1}"] = (T.T @ pins[:, n], np.full(2, bearing))
-    for row, name in enumerate(CENTRAL):
-        body = getattr(data, name)
-        torsion = body.torsional_support / member_radius(data, name) ** 2
-        for text, first, stiffness in (
-            (f"support of the {name}", 3 * row, np.full(2, body.support)),
-            (f"torsional support of the {name}", 3 * row + 2, np.array([torsion])),
-        ):
-            if np.all(np.isfinite(stiffness)) and np.any(stiffness):
-                springs[text] = (T[first : first + len(stiffness)].T, stiffness)
-    return springs
 
 
 TAIL_LIMIT = 0.05

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.checks import output_member
+from femgear.case.sections import output_member
 from femgear.report.tables import Block
 from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset, in_space
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.case.sections import Case
     from femgear.gears.kinematics import Speeds
     from femgear.gears.planetary import PlanetarySet
     from femgear.solvers.continuation.branches import Branch
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from femgear.system.lumped import PlanarSet
     from femgear.system.system import Modes
     from femgear.trains.planar.model import MotionLines, PlanarModel
+    from femgear.trains.planar.section import PlanarCase
 
 
 @dataclass(frozen=True)
@@ -314,7 +314,7 @@ _SMOOTH = 0.05
 _STABLE = {1: "yes", 0: "no", -1: "not known"}
 
 
-def describe_planar(case: Case, planetary: PlanetarySet) -> Block:
+def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
     """Mesh stiffness, supports, weight and ranges of a planar case."""
     planar = case.planar
     notes = [_stiffness(case), _play(case, planetary)]
@@ -335,7 +335,7 @@ def describe_planar(case: Case, planetary: PlanetarySet) -> Block:
 _BODIES = ("", "mass [kg]", "inertia [kg m^2]", "support [N/m]", "torsional support [N m/rad]")
 
 
-def _bodies(case: Case) -> Iterator[tuple[str, ...]]:
+def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
     planar = case.planar
     for name, one in (("sun", case.sun), ("ring", planar.ring), ("carrier", case.carrier)):
         given = getattr(planar.torsion, name)
@@ -347,7 +347,7 @@ def _bodies(case: Case) -> Iterator[tuple[str, ...]]:
     yield "planet", f"{planet.mass:.6g}", f"{planet.inertia:.6g}", bearing, "0"
 
 
-def _stiffness(case: Case) -> str:
+def _stiffness(case: PlanarCase) -> str:
     given = case.planar.mesh_stiffness
     if given is None:
         return "mesh stiffness: of the static solution"
@@ -355,7 +355,7 @@ def _stiffness(case: Case) -> str:
     return f"mesh stiffness: {values}, as given"
 
 
-def _play(case: Case, planetary: PlanetarySet) -> str:
+def _play(case: PlanarCase, planetary: PlanetarySet) -> str:
     play = case.planar.line_backlash
     values = (planetary.backlash_sun_planet, planetary.backlash_planet_ring) if play is None else (play,)
     text = " and ".join(dict.fromkeys(f"{max(value, 0.0) * 1e6:.6g}" for value in values))
@@ -363,7 +363,7 @@ def _play(case: Case, planetary: PlanetarySet) -> str:
     return f"play along the line of action {text} um, back flanks {own}"
 
 
-def _smoothing(case: Case, planetary: PlanetarySet) -> str:
+def _smoothing(case: PlanarCase, planetary: PlanetarySet) -> str:
     """Length over which contact sets in, beside the mean compression where the stiffness is given."""
     from femgear.gears.kinematics import torques
 
@@ -380,7 +380,7 @@ def _smoothing(case: Case, planetary: PlanetarySet) -> str:
     return f"[W-SMOOTHING] {text}: lower planar.smoothing where teeth part or wedge"
 
 
-def _sense(case: Case) -> str:
+def _sense(case: PlanarCase) -> str:
     """How torque and turning of the carrier belong together."""
     operation = case.operation
     if operation.fixed == "carrier":
@@ -560,7 +560,7 @@ def _kind_of_lines(data: xr.Dataset) -> str:
     return "lines of the weight alone: a constant mesh stiffness leaves none of the mesh frequency"
 
 
-def published_modes(case: Case, data: xr.Dataset) -> Block | None:
+def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
     """Natural frequencies that the case calls published, beside the nearest mode of the kind."""
     planar = case.planar
     entries = [one for one in planar.published if one.frequency is not None] if planar else []
@@ -595,7 +595,7 @@ def remarks(results: Results, stem: str) -> Iterator[str]:
     yield from doubts(results, stem)
 
 
-def comparisons(case: Case, stem: str) -> Iterator[str]:
+def comparisons(case: PlanarCase, stem: str) -> Iterator[str]:
     """How to read a picture of this case, and published ones beside it."""
     planar = case.planar
     if stem in _BY_STABILITY and planar.branch is not None:

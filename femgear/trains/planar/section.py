@@ -17,7 +17,9 @@ from pydantic import (
 )
 
 from femgear.case.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
 from femgear.case.units import ACCELERATION, ANGLE, FREQUENCY, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
+from femgear.errors import CaseError
 
 SMOOTHING = 0.3e-6
 """Length over which tooth contact sets in [m], of the examples of NREL/CP-5000-55355."""
@@ -63,13 +65,6 @@ def _some(values: tuple) -> tuple:
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class MeshStiffnessSection(_Section):
-    """Constant stiffness of every mesh, in place of the static solution's."""
-
-    sun_planet: Quantity(STIFFNESS, 1e3, 1e13)
-    planet_ring: Quantity(STIFFNESS, 1e3, 1e13)
 
 
 class PlanarRingSection(_Section):
@@ -215,3 +210,104 @@ def _without_static(data: dict) -> list[str]:
         keys = ("modifications", "errors", "individual")
         unused += [f"{name}.{key}" for key in keys if data.get(name, {}).get(key)]
     return unused
+
+
+class PlanarCase(RigidCase):
+    """A planetary gear set of rigid bodies that move in their plane."""
+
+    planar: PlanarSection
+
+
+def check_planar(case: PlanarCase) -> Iterator[CaseError]:
+    """Refusals of what a planar section does not go with."""
+    planar = case.planar
+    if case.static.members == "elastic":
+        yield CaseError(
+            "the supports belong to the planar model: the static solution is that of the gears alone",
+            code="E-CHOICE",
+            key="static.members",
+            value="elastic",
+            limit='"fixed" in a planar case',
+            remedy="leave static.members out",
+        )
+    if case.operation.torque == 0.0:
+        yield CaseError(
+            "without torque no tooth carries load: the planar set would rattle in its play",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero in a planar case",
+        )
+    if planar.back_flanks and planar.line_backlash == 0.0:
+        yield CaseError(
+            "back flanks need play",
+            code="E-BACKLASH",
+            key="planar.line_backlash",
+            value="0 mm",
+            limit="above 0 mm",
+            remedy="give the play, or write planar.back_flanks = false",
+        )
+    yield from _check_torsion(case)
+    yield from _check_branch(case)
+
+
+def _check_torsion(case: PlanarCase) -> Iterator[CaseError]:
+    """The torque must find a way into the housing."""
+    planar, operation = case.planar, case.operation
+    output = output_member(case)
+    if getattr(planar.torsion, operation.fixed) == 0.0:
+        yield CaseError(
+            f"the {operation.fixed} is the fixed member but nothing keeps it from turning",
+            code="E-MECHANISM",
+            key=f"planar.torsion.{operation.fixed}",
+            value="0 N m/rad",
+            limit="above 0 N m/rad",
+            remedy="leave it out: the fixed member is then held",
+        )
+    if planar.reaction == "supports" and not getattr(planar.torsion, output):
+        yield CaseError(
+            f"the torque is to be carried by supports, but the {output}, which is the output, turns freely",
+            code="E-MECHANISM",
+            key=f"planar.torsion.{output}" if getattr(planar.torsion, output) == 0.0 else "planar.reaction",
+            value="supports",
+            limit=f"planar.torsion.{output} above 0 N m/rad",
+            remedy=f'give planar.torsion.{output}, or write reaction = "output"',
+        )
+
+
+def _check_branch(case: PlanarCase) -> Iterator[CaseError]:
+    planar, branch = case.planar, case.planar.branch
+    if branch is None:
+        return
+    if not branch.start < branch.to:
+        yield CaseError(
+            "the range of frequencies ends before it begins",
+            code="E-RANGE",
+            key="planar.branch.to",
+            value=FREQUENCY.show(branch.to),
+            limit=f"above {FREQUENCY.show(branch.start)}, where it begins",
+        )
+    if planar.gravity is None:
+        yield CaseError(
+            "the branch follows the response to the weight, and there is none",
+            code="E-KEY-MISSING",
+            key="planar.gravity",
+            remedy="add the section planar.gravity, or leave planar.branch out",
+        )
+    if case.operation.fixed == "carrier":
+        yield CaseError(
+            "the weight does not turn against a carrier that stands",
+            code="E-MECHANISM",
+            key="planar.branch",
+            value="operation.fixed = carrier",
+            limit="a carrier that turns",
+            remedy="leave planar.branch out",
+        )
+    if planar.gyroscopic:
+        yield CaseError(
+            "the gyroscopic terms would change along the branch, which is not computed",
+            code="E-CHOICE",
+            key="planar.gyroscopic",
+            value="true",
+            limit="false with planar.branch",
+            remedy="leave one of them out",
+        )

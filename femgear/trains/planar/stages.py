@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import planetary_set
-from femgear.case.checks import output_member
 from femgear.case.dependencies import check_entries, static_entries
-from femgear.case.sections import Case
+from femgear.case.sections import output_member
 from femgear.report.tables import describe_modes
 from femgear.threads import one_blas_thread
 from femgear.trains.planar.checks import (
@@ -34,6 +33,7 @@ from femgear.trains.planar.results import (
     published_modes,
     remarks,
 )
+from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
 from femgear.trains.protocol import Figures, Progress, Stage, Train
 from femgear.trains.static.description import describe_case, set_warnings
 from femgear.trains.static.results import StaticResult
@@ -51,7 +51,7 @@ BODIES = ("carrier", "ring", "sun")
 
 
 @one_blas_thread()
-def solve_planar_modes(case: Case, static: StaticResult | None = None) -> PlanarModesResult:
+def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> PlanarModesResult:
     """Natural frequencies, modes and their kinds.
 
     Parameters
@@ -81,7 +81,7 @@ def solve_planar_modes(case: Case, static: StaticResult | None = None) -> Planar
 
 @one_blas_thread()
 def solve_branch(
-    case: Case, static: StaticResult | None = None, *, progress: Progress | None = None
+    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress | None = None
 ) -> BranchResult:
     """Periodic responses to the weight, past limit points, with a Floquet verdict at each.
 
@@ -124,7 +124,7 @@ def solve_branch(
 
 @one_blas_thread()
 def solve_planar_response(
-    case: Case, static: StaticResult | None = None, *, progress: Progress | None = None
+    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress | None = None
 ) -> PlanarResponseResult:
     """Responses to weight and mesh frequency together at the speeds of the operation.
 
@@ -167,7 +167,7 @@ def solve_planar_response(
     return PlanarResponseResult(gears, np.array(operation.speeds), turning, tuple(solutions), tuple(lines))
 
 
-def planar_data(case: Case, gears: PlanetarySet, static: StaticResult | None = None) -> PlanarSet:
+def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | None = None) -> PlanarSet:
     """Lumped set of a case: bodies and supports of its entries, radii and angles of its gears.
 
     Parameters
@@ -204,7 +204,7 @@ def planar_data(case: Case, gears: PlanetarySet, static: StaticResult | None = N
 
 
 def planar_model(
-    case: Case,
+    case: PlanarCase,
     gears: PlanetarySet,
     static: StaticResult | None = None,
     *,
@@ -263,7 +263,7 @@ def planar_model(
     return PlanarModel(data, problem, planar.back_flanks, clearance is not None, bearing)
 
 
-def carrier_sense(case: Case, gears: PlanetarySet) -> int:
+def carrier_sense(case: PlanarCase, gears: PlanetarySet) -> int:
     """1 where the carrier turns counter-clockwise, -1 where clockwise, 0 where it stands."""
     from femgear.gears.kinematics import speeds
 
@@ -271,7 +271,7 @@ def carrier_sense(case: Case, gears: PlanetarySet) -> int:
     return int(np.sign(found.carrier))
 
 
-def _ratios(case: Case):
+def _ratios(case: PlanarCase):
     return case.planar.damping_ratios or case.dynamics.damping_ratio
 
 
@@ -313,7 +313,7 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
     )
 
 
-def _gravity(case: Case, gears: PlanetarySet, mesh_frequency: bool):
+def _gravity(case: PlanarCase, gears: PlanetarySet, mesh_frequency: bool):
     from femgear.trains.planar.model import Gravity
 
     given, sense = case.planar.gravity, carrier_sense(case, gears)
@@ -323,14 +323,14 @@ def _gravity(case: Case, gears: PlanetarySet, mesh_frequency: bool):
     return Gravity(given.acceleration, given.direction, orders)
 
 
-def _pin_errors(case: Case, n_planets: int) -> np.ndarray:
+def _pin_errors(case: PlanarCase, n_planets: int) -> np.ndarray:
     pins = np.zeros((n_planets, 2))
     for pin in case.set.pin_errors:
         pins[pin.planet - 1] = pin.radial, pin.tangential
     return pins
 
 
-def _response_lines(case: Case, gears: PlanetarySet, static: StaticResult | None) -> np.ndarray:
+def _response_lines(case: PlanarCase, gears: PlanetarySet, static: StaticResult | None) -> np.ndarray:
     """Lines of weight and mesh frequency; none of the weight where it does not turn, none of the mesh
     frequency where the mesh stiffness is constant."""
     from femgear.system.series import side_bands
@@ -371,11 +371,11 @@ def _truncation(solutions, lines) -> dict:
     }
 
 
-def _needs_static(case: Case) -> tuple[str, ...]:
+def _needs_static(case: PlanarCase) -> tuple[str, ...]:
     return ("static",) if case.planar.mesh_stiffness is None else ()
 
 
-def _lacks(section: str) -> Callable[[Case], str]:
+def _lacks(section: str) -> Callable[[PlanarCase], str]:
     return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
 
 
@@ -405,7 +405,8 @@ def _published(results: Results) -> tuple[Block, ...]:
 PLANAR = Train(
     name="planar",
     words="a planar case",
-    owns=lambda case: getattr(case, "planar", None) is not None,
+    model=PlanarCase,
+    section="planar",
     stages=(
         replace(STATIC, wanted=lambda case: bool(_needs_static(case))),
         replace(STRESS, wanted=lambda case: bool(_needs_static(case)) and case.static.stresses),
@@ -454,4 +455,6 @@ PLANAR = Train(
     result_warnings=_result_warnings,
     figures=case_figures,
     remarks=remarks,
+    cross_check=check_planar,
+    notices=planar_notices,
 )  # fmt: skip

@@ -1,0 +1,264 @@
+"""Case files of every train: reading, changing one entry, the schema."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from pydantic import ValidationError, create_model
+
+from femgear.case import text as case_text
+from femgear.case.case import with_shafts
+from femgear.case.checks import cross_check
+from femgear.case.problems import added_material, combine, notices, translate
+from femgear.case.sections import FORMAT, Case, without_uncomputed
+from femgear.case.tables import embed_profiles
+from femgear.case.text import text_with_points
+from femgear.errors import CaseError
+from femgear.storage.results import Results, results_of
+from femgear.trains.protocol import Train
+from femgear.trains.registry import TRAINS
+
+
+def read_case(path: str | os.PathLike) -> Any:
+    """Case of a TOML file: a planetary set, or what its ``model`` names, as ``"drivetrain"``.
+
+    Parameters
+    ----------
+    path : path-like
+        A regular UTF-8 file of at most 1 MB.
+
+    Returns
+    -------
+    Case
+        Of its train: checked, frozen, in SI units and radians.
+
+    Raises
+    ------
+    CaseError
+        Everything that is wrong with the file, at once; ``problems`` holds one `CaseError` for each.
+    """
+    return parse_case(case_text.read_text(path), name=case_text.printable(os.fsdecode(path)))
+
+
+def parse_case(text: str, *, name: str = "") -> Case:
+    """Case of a TOML text; see `read_case`.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        File name for messages.
+    """
+    return _build(case_text.parse(text, name), text, name)
+
+
+def with_value(case: Case, key: str, value: object) -> Case:
+    """The case with one entry changed, checked again as a whole; see `with_values` for several at once.
+
+    Parameters
+    ----------
+    case : Case
+    key : str
+        Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
+        ``"sun.modifications[0].amount"``.
+    value : object
+        As the file would hold it: ``"50 N m"``, 0.3, 27, a list or table of such; None leaves the entry out.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    CaseError
+        As `read_case`; unknown keys are refused with the nearest valid one.
+    """
+    return with_values(case, {key: value})
+
+
+def with_values(case: Case, values: Mapping[str, object]) -> Case:
+    """The case with several entries changed at once, checked as a whole after all changes.
+
+    Published lines whose speed or harmonic is not computed any more are left out; ``notices`` says so.
+
+    Parameters
+    ----------
+    case : Case
+    values : mapping
+        Keys and values as of `with_value`, as in
+        ``{"operation.input": "carrier", "operation.fixed": "ring"}``.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    CaseError
+        As `with_value`.
+    """
+    data = case_text.parse(case.source, case.name)
+    for key, value in values.items():
+        _change(data, key, value, case.name)
+    try:
+        text = case_text.write(data)
+    except CaseError as error:
+        error.key, error.file = ", ".join(values), case.name or None
+        raise
+    said: tuple[str, ...] = ()
+    try:
+        changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
+    except CaseError as error:
+        published = any(key.startswith("housing") for key in values)
+        if published or not (notice := without_uncomputed(data, error)):
+            raise
+        said, text = (notice,), case_text.write(data)
+        changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
+    changed._notices += said
+    changed._profile_files = {
+        k: file
+        for k, file in case.profile_files.items()
+        if not any(k.startswith(key) or key.startswith(k) for key in values)
+    }
+    return changed
+
+
+def _change(data: dict, key: str, value: object, name: str) -> None:
+    """Change one entry of the tables of a case file; None takes it out."""
+    parts = re.findall(r"\[\d{1,9}\]|[^.\[\]]+", key) or [key]
+    *tables, last = parts
+    table = data
+    for part, following in zip(tables, parts[1:], strict=True):
+        table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
+    if last.startswith("["):
+        raise CaseError("a list is changed as a whole", code="E-KEY", key=key, file=name or None)
+    if value is None:
+        table.pop(last, None)
+    else:
+        table[last] = value.tolist() if hasattr(value, "tolist") else value
+
+
+def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type) -> dict | list:
+    """Table or list under a part of a key; tables that are not there yet are made."""
+    if isinstance(table, list):
+        number = int(part[1:-1])
+        found = table[number] if number < len(table) else None
+    else:
+        found = table.setdefault(part, {}) if wanted is dict else table.get(part)
+    if not isinstance(found, wanted):
+        kind = "table" if wanted is dict else "list"
+        raise CaseError(f"{part} is not a {kind}", code="E-KEY", key=key, file=name or None)
+    return found
+
+
+def to_toml(case: Case) -> str:
+    """TOML text that gives this case when read.
+
+    The text of its file as long as nothing was changed and it names no measured profile; the points of such
+    profiles are in the text, so that it needs no other file.
+    """
+    return case.source
+
+
+def case_schema(model: str | None = None) -> dict[str, Any]:
+    """JSON schema of the case file, for editors; of a planetary set, or of files that name a model.
+
+    Raises
+    ------
+    CaseError
+        E-MODEL: no train reads files of this model.
+    """
+    own = {train.name: train.own_file for train in TRAINS if train.own_file is not None}
+    if model is None:
+        return every_section().model_json_schema()
+    if model not in own:
+        raise CaseError(
+            "there is no such model", code="E-MODEL", key="--model", value=model, limit=", ".join(own)
+        )
+    return own[model].schema()
+
+
+@cache
+def every_section() -> type[Case]:
+    """Model of a planetary set with the sections of all trains, for its keys and their descriptions."""
+    fields = {
+        train.section: (train.model.model_fields[train.section].annotation | None, None)
+        for train in reversed(TRAINS)
+        if train.section
+    }
+    return create_model("Case", __base__=Case, __doc__=Case.__doc__, **fields)
+
+
+def _train_of_set(data: dict, lines: str, name: str) -> Train:
+    """Train whose section the tables of a planetary set hold; that without one where they hold none."""
+    given = [train for train in reversed(TRAINS) if train.section and train.section in data]
+    if len(given) > 1:
+        sections = [train.section for train in given]
+        problem = CaseError(
+            f"a set is {' or '.join(sections)}",
+            code="E-CHOICE",
+            key=sections[-1],
+            value=" and ".join(sections),
+            limit="one of the sections",
+            remedy="leave one of them out",
+        )
+        raise combine([problem], lines, name)
+    return given[0] if given else next(t for t in TRAINS if not t.section and t.own_file is None)
+
+
+def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
+    version = data.get("format", FORMAT)
+    if type(version) is int and version > FORMAT:
+        raise CaseError(
+            "the file is written for a newer femgear",
+            code="E-FORMAT",
+            key="format",
+            value=case_text.found(version),
+            limit=f"up to {FORMAT}",
+            remedy="update femgear",
+            file=name,
+        )
+    for train in TRAINS:
+        if train.own_file is not None and train.own_file.claims(data):
+            return train.own_file.build(data, text, name, numbered=numbered)
+    lines = text if numbered else ""
+    train = _train_of_set(data, lines, name)
+    files = embed_profiles(data, name)
+    if files:
+        text = text_with_points(data, name, points="measured profiles", remedy="measure at fewer points")
+    try:
+        case = train.model.model_validate(data)
+    except ValidationError as error:
+        raise combine(translate(error, every_section()), lines, name) from None
+    if problems := cross_check(case, train.cross_check(case)):
+        raise combine(problems, lines, name)
+    case._source, case._lines, case._name, case._profile_files = text, lines, name, files
+    case._notices = (*notices(data), *train.notices(data), *added_material(case))
+    return with_shafts(case)
+
+
+def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
+    """Results of a run; of an interrupted one those stages that are complete, with a warning.
+
+    Parameters
+    ----------
+    folder : path-like
+    partial : bool
+        Accept the results of an interrupted run.
+
+    Returns
+    -------
+    Results
+        ``results.modes`` or ``results["modes"]`` is the dataset of a stage.
+
+    Raises
+    ------
+    StorageError
+        No folder, no manifest, a broken one or one of a newer femgear. ``E-RESULTS-INCOMPLETE``: an
+        interrupted run and not ``partial``.
+    """
+    return results_of(folder, read_case, partial=partial)
