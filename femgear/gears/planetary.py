@@ -1,4 +1,4 @@
-"""A planetary set: closure at one centre distance, its meshes and their phases, and data that make no set.
+"""A planetary set: closure at one centre distance, meshes and phases, usual angles, data that make no set.
 
 Frame: the carrier's, planets at angles psi_n counter-clockwise from the x axis. Positive torque on the sun
 turns it counter-clockwise; relative to the carrier the planets and the ring then turn clockwise. Loaded
