@@ -1,8 +1,8 @@
 """Steps in modal coordinates that are exact for the linear part: only the column forces are interpolated.
 
-Between two instants the forces are linear in time (see `duhamel`), so a linear system has no period error and
-no damping of the step; the column forces beyond the reference stiffness are of second order. Modes that are
-left out count as static flexibility.
+Between two instants the forces are linear in time (see `convolution`), so a linear system has no period error
+and no damping of the step; the column forces beyond the reference stiffness are of second order. Modes that
+are left out count as static flexibility.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from femgear.system.system import Modes
 
 @dataclass(frozen=True)
 class ModalScheme:
-    """Exact modal steps; the state is (y, v) of the modes, (2, m). See `marching.Scheme`."""
+    """Exact modal steps; the state is (y, v) of the modes, (2, m). See `newmark.Scheme`."""
 
     step: float
     modes: Modes
