@@ -379,10 +379,21 @@ def checked_solve(grid: Grid, K, f, *, fixed, values=0.0, springs=None) -> np.nd
     u = np.zeros(f.shape)
     u[np.asarray(fixed, dtype=int)] = np.reshape(values, np.shape(values) + (1,) * (f.ndim - 1))
     K = K.tocsc()
-    factor = _factor(K[free][:, free].tocsc())
+    try:
+        factor = symmetric_lu(K[free][:, free])
+    except RuntimeError as error:
+        raise FemgearError(f"the stiffness matrix is singular: {error}", code="E-SOLVE-SINGULAR") from error
     u[free] = factor.solve((f - K @ u)[free])
     check_solution(K, u, f, fixed=fixed)
     return u
+
+
+def symmetric_lu(matrix):
+    """Sparse LU of a symmetric matrix in SuperLU's symmetric mode; RuntimeError where it is singular."""
+    from scipy.sparse.linalg import splu
+
+    options = {"SymmetricMode": True}
+    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
 def rank_check(grid: Grid, fixed, *, springs=None) -> None:
@@ -489,13 +500,3 @@ def _motion(vector, centre, size):
         return f"move along ({x:.3f}, {y:.3f})"
     pivot = size * np.round((centre + np.array([-y, x]) / turn) / size, 9) + 0.0
     return f"turn about ({pivot[0]:.6g}, {pivot[1]:.6g}) m"
-
-
-def _factor(K):
-    from scipy.sparse.linalg import splu
-
-    options = {"SymmetricMode": True}
-    try:
-        return splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    except RuntimeError as error:
-        raise FemgearError(f"the stiffness matrix is singular: {error}", code="E-SOLVE-SINGULAR") from error
