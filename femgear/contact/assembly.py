@@ -153,6 +153,14 @@ def mesh_pairs(planetary_set: PlanetarySet) -> tuple[FlankPair, FlankPair]:
     )
 
 
+def acting_flanks(n_planets: int) -> tuple[list, list, list]:
+    """Drive flanks (mesh, gear of the pair, side) of the sun, of every planet and of the ring."""
+    N = n_planets
+    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
+    planets = [[(n, 1, LEFT), (N + n, 0, RIGHT)] for n in range(N)]
+    return [(j, 0, LEFT) for j in range(N)], planets, [(N + j, 1, LEFT) for j in range(N)]
+
+
 def contact_half_width(pair: FlankPair, line_load: float, material: Material) -> float:
     """Largest Hertzian half width on the path of contact [m] of one tooth pair under `line_load` [N/m]."""
     begin, end = pair.path
@@ -236,79 +244,6 @@ def cycle_positions(positions, *, periods: int = 1) -> np.ndarray:
     return np.arange(positions * periods) / positions
 
 
-def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells, nearest, contact):
-    """Windows of both kinds of mesh on one side of the teeth."""
-    N = planetary_set.n_planets
-    found = []
-    for kind, pair in enumerate(pairs):
-        half_width = contact_half_width(pair, share / bodies.face_width, bodies.material)
-        rows = slice(kind * N, (kind + 1) * N)
-        found.append(
-            windows(
-                pair,
-                zeta[rows],
-                width=3.2 * half_width,
-                cells=cells,
-                nearest=nearest,
-                line_of_action=contact == "line_of_action",
-                form=form[kind],
-                shift=shift[rows],
-            )
-        )
-    return found
-
-
-def local_compliance(width: float, cells: int, bodies: Bodies) -> np.ndarray:
-    """Half-plane compliance of both flanks between the cells of a window, shape (4, cells, cells) [m/N]."""
-    material, centre = bodies.material, width * cell_centres(cells)
-    half = 0.5 * width * np.diff(cell_edges(cells))
-    distance = centre[:, :, None] - centre[:, None, :]
-    # reciprocal between cells of different widths
-    return (
-        sum(
-            surface_displacement(distance, h, material.shear_modulus, material.poisson_ratio)
-            for h in (half[:, :, None], half[:, None, :])
-        )
-        / bodies.face_width
-    )
-
-
-def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows:
-    """Join all meshes and drop the leading and trailing pairs that never come near."""
-    used = np.concatenate([w.near.any(axis=1) for w in found])
-    # every mesh keeps the same number of pairs, starting at its own first candidate
-    first = used.argmax(axis=1)
-    count = int((used.shape[1] - used[:, ::-1].argmax(axis=1) - first).max())
-    first = np.minimum(first, used.shape[1] - count)
-    take = first[:, None] + np.arange(count)
-    row = np.arange(len(used))[:, None]
-
-    def join(name):
-        joined = np.concatenate([getattr(w, name) for w in found])
-        return np.moveaxis(np.moveaxis(joined, 2, 1)[row, take], 1, 2)
-
-    gap = join("gap")
-    shares = np.diff(cell_edges(cells))
-    return MeshWindows(
-        n_planets=N,
-        positions=len(turns),
-        pairs=count,
-        zeta=join("zeta"),
-        near=join("near"),
-        smallest_gap=gap.min(axis=-1),
-        gap=gap,
-        roll=(join("roll_1"), join("roll_2")),
-        edge=(join("at_low_edge"), join("at_high_edge")),
-        tooth=(tooth[0][row, take], tooth[1][row, take]),
-        turns=turns,
-        layout=join("layout"),
-        local=np.stack([local_compliance(w.cell * cells, cells, bodies) for w in found[:2]]),
-        cell=np.repeat([w.cell for w in found], N),
-        cell_area=np.repeat([w.cell * cells * bodies.face_width * shares for w in found], N, axis=0),
-        centre=join("centre"),
-    )
-
-
 def assemble_contact(
     setup: MeshWindows, bodies: Bodies, position: int, members: MovingMembers | None = None
 ) -> ContactProblem:
@@ -361,19 +296,77 @@ def rotation_approach(n_planets: int) -> np.ndarray:
     return approach
 
 
-def _corner_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair, polynomials) -> np.ndarray:
-    """What tip corners of both flanks add within each window, shape (windows, cells, cells) [m/N]."""
-    total = np.zeros((len(mesh), polynomials.shape[1], polynomials.shape[1]))
-    sun_side = mesh // setup.n_planets % 2 == 0
-    of_gear = ((bodies.sun, bodies.planet), (bodies.planet, bodies.ring))
-    for rows, flanks in zip((sun_side, ~sun_side), of_gear, strict=True):
-        for roll, flank in zip(setup.roll, flanks, strict=True):
-            arc = roll[mesh[rows], position, pair[rows]] ** 2 / (2 * flank.base_radius)
-            away = np.einsum("wcn,wn->wc", polynomials[rows], np.abs(arc - flank.corner.arc))
-            # cells beyond the end of a flank are no candidates
-            away = np.maximum(away, 1e-12)
-            total[rows] += flank.corner.surface(away[:, :, None], away[:, None, :])
-    return total / bodies.face_width
+def local_compliance(width: float, cells: int, bodies: Bodies) -> np.ndarray:
+    """Half-plane compliance of both flanks between the cells of a window, shape (4, cells, cells) [m/N]."""
+    material, centre = bodies.material, width * cell_centres(cells)
+    half = 0.5 * width * np.diff(cell_edges(cells))
+    distance = centre[:, :, None] - centre[:, None, :]
+    # reciprocal between cells of different widths
+    return (
+        sum(
+            surface_displacement(distance, h, material.shear_modulus, material.poisson_ratio)
+            for h in (half[:, :, None], half[:, None, :])
+        )
+        / bodies.face_width
+    )
+
+
+def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells, nearest, contact):
+    """Windows of both kinds of mesh on one side of the teeth."""
+    N = planetary_set.n_planets
+    found = []
+    for kind, pair in enumerate(pairs):
+        half_width = contact_half_width(pair, share / bodies.face_width, bodies.material)
+        rows = slice(kind * N, (kind + 1) * N)
+        found.append(
+            windows(
+                pair,
+                zeta[rows],
+                width=3.2 * half_width,
+                cells=cells,
+                nearest=nearest,
+                line_of_action=contact == "line_of_action",
+                form=form[kind],
+                shift=shift[rows],
+            )
+        )
+    return found
+
+
+def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows:
+    """Join all meshes and drop the leading and trailing pairs that never come near."""
+    used = np.concatenate([w.near.any(axis=1) for w in found])
+    # every mesh keeps the same number of pairs, starting at its own first candidate
+    first = used.argmax(axis=1)
+    count = int((used.shape[1] - used[:, ::-1].argmax(axis=1) - first).max())
+    first = np.minimum(first, used.shape[1] - count)
+    take = first[:, None] + np.arange(count)
+    row = np.arange(len(used))[:, None]
+
+    def join(name):
+        joined = np.concatenate([getattr(w, name) for w in found])
+        return np.moveaxis(np.moveaxis(joined, 2, 1)[row, take], 1, 2)
+
+    gap = join("gap")
+    shares = np.diff(cell_edges(cells))
+    return MeshWindows(
+        n_planets=N,
+        positions=len(turns),
+        pairs=count,
+        zeta=join("zeta"),
+        near=join("near"),
+        smallest_gap=gap.min(axis=-1),
+        gap=gap,
+        roll=(join("roll_1"), join("roll_2")),
+        edge=(join("at_low_edge"), join("at_high_edge")),
+        tooth=(tooth[0][row, take], tooth[1][row, take]),
+        turns=turns,
+        layout=join("layout"),
+        local=np.stack([local_compliance(w.cell * cells, cells, bodies) for w in found[:2]]),
+        cell=np.repeat([w.cell for w in found], N),
+        cell_area=np.repeat([w.cell * cells * bodies.face_width * shares for w in found], N, axis=0),
+        centre=join("centre"),
+    )
 
 
 def _regular_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair) -> np.ndarray:
@@ -416,3 +409,18 @@ def _add_body(S, body: FlankCompliance, setup, position, mesh, pair, members, ge
     ]
     block = np.einsum("wapvbq,wap,vbq->wavb", values, weight, weight, optimize=True)
     S[np.ix_(members, range(3), members, range(3))] += block
+
+
+def _corner_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair, polynomials) -> np.ndarray:
+    """What tip corners of both flanks add within each window, shape (windows, cells, cells) [m/N]."""
+    total = np.zeros((len(mesh), polynomials.shape[1], polynomials.shape[1]))
+    sun_side = mesh // setup.n_planets % 2 == 0
+    of_gear = ((bodies.sun, bodies.planet), (bodies.planet, bodies.ring))
+    for rows, flanks in zip((sun_side, ~sun_side), of_gear, strict=True):
+        for roll, flank in zip(setup.roll, flanks, strict=True):
+            arc = roll[mesh[rows], position, pair[rows]] ** 2 / (2 * flank.base_radius)
+            away = np.einsum("wcn,wn->wc", polynomials[rows], np.abs(arc - flank.corner.arc))
+            # cells beyond the end of a flank are no candidates
+            away = np.maximum(away, 1e-12)
+            total[rows] += flank.corner.surface(away[:, :, None], away[:, None, :])
+    return total / bodies.face_width

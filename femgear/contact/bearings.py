@@ -116,21 +116,26 @@ def solve_position(
     return replace(state, **meshes), active
 
 
-def _beside(active: np.ndarray, count: int) -> np.ndarray:
-    """Springs that carried and three on either side of them, around every pin of `count` springs."""
-    around = active.reshape(-1, count)
-    return np.logical_or.reduce([np.roll(around, k, axis=1) for k in range(-3, 4)]).ravel()
+def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
+    """Force of every pin on its planet [N], shape (N, 2, P), in the frame of the carrier.
 
+    What balances the mesh forces on the planet, whatever holds it: ``-(n_sp F_sp - n_pr F_pr)`` with the
+    normals of `femgear.gears.deviations.mesh_normals` on either side of the teeth.
 
-def _with_springs(problem: ContactProblem, springs: BearingSprings, near: np.ndarray):
-    """Compliance, gaps and arms of the cells and then of the springs `near`."""
-    cells, arms = len(problem.gap), springs.arms[near]
-    H = np.zeros((cells + len(arms), cells + len(arms)))
-    H[:cells, :cells] = problem.compliance
-    H[range(cells, len(H)), range(cells, len(H))] = springs.compliance
-    others = np.zeros((len(arms), problem.G.shape[1] - arms.shape[1]))
-    G = np.vstack([problem.G, np.hstack([others, arms])])
-    return H, np.concatenate([problem.gap, np.full(len(arms), springs.clearance)]), G
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    force, back_force : (2N, P) arrays
+        On drive and back flanks [N].
+    """
+    from femgear.gears.deviations import mesh_normals
+
+    N = planetary_set.n_planets
+    result = np.zeros((N, 2, np.shape(force)[1]))
+    for back, carried in ((False, force), (True, back_force)):
+        along = mesh_normals(planetary_set, back=back)[:, :, None] * np.asarray(carried)[:, None, :]
+        result += along[N:] - along[:N]
+    return result
 
 
 def bearing_law(displacement, stiffness: float, clearance: float):
@@ -158,23 +163,18 @@ def bearing_law(displacement, stiffness: float, clearance: float):
     return 2 * stiffness / np.pi * carried
 
 
-def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
-    """Force of every pin on its planet [N], shape (N, 2, P), in the frame of the carrier.
+def _beside(active: np.ndarray, count: int) -> np.ndarray:
+    """Springs that carried and three on either side of them, around every pin of `count` springs."""
+    around = active.reshape(-1, count)
+    return np.logical_or.reduce([np.roll(around, k, axis=1) for k in range(-3, 4)]).ravel()
 
-    What balances the mesh forces on the planet, whatever holds it: ``-(n_sp F_sp - n_pr F_pr)`` with the
-    normals of `femgear.gears.deviations.mesh_normals` on either side of the teeth.
 
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    force, back_force : (2N, P) arrays
-        On drive and back flanks [N].
-    """
-    from femgear.gears.deviations import mesh_normals
-
-    N = planetary_set.n_planets
-    result = np.zeros((N, 2, np.shape(force)[1]))
-    for back, carried in ((False, force), (True, back_force)):
-        along = mesh_normals(planetary_set, back=back)[:, :, None] * np.asarray(carried)[:, None, :]
-        result += along[N:] - along[:N]
-    return result
+def _with_springs(problem: ContactProblem, springs: BearingSprings, near: np.ndarray):
+    """Compliance, gaps and arms of the cells and then of the springs `near`."""
+    cells, arms = len(problem.gap), springs.arms[near]
+    H = np.zeros((cells + len(arms), cells + len(arms)))
+    H[:cells, :cells] = problem.compliance
+    H[range(cells, len(H)), range(cells, len(H))] = springs.compliance
+    others = np.zeros((len(arms), problem.G.shape[1] - arms.shape[1]))
+    G = np.vstack([problem.G, np.hstack([others, arms])])
+    return H, np.concatenate([problem.gap, np.full(len(arms), springs.clearance)]), G

@@ -1,6 +1,8 @@
-"""From gears to flank compliances: sector grids, stiffness matrices, and one factorisation a gear.
+"""From gears to flank compliances, and from tooth loads back to the deformed gears.
 
-Displacement fields of all gears of a set under the tooth loads of one position.
+Every gear has one sector grid, one stiffness matrix and one factorisation (`make_sectors`, `make_bodies`).
+The displacement fields of all gears of a set under the tooth loads of one position follow from the same
+sectors (`deformed_set`).
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.assembly import Bodies, mesh_pairs
+from femgear.contact.assembly import Bodies, acting_flanks, mesh_pairs
 from femgear.contact.candidates import tooth_zero_angles
 from femgear.contact.flanks import flank_compliance, flank_load_columns, flank_stations
 
@@ -139,7 +141,7 @@ def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> n
 
     stations = flank_stations(grid, planetary_set.ring)
     pair = mesh_pairs(planetary_set)[1]
-    active = pair.pitch_roll_2 - pair.sign * np.asarray(pair.path)
+    active = pair.roll_on(1, pair.path)
     # every station carries the part of its own piece of the flank that is active
     middle = 0.5 * (stations.roll[1:] + stations.roll[:-1])
     ends = np.concatenate([stations.roll[:1], middle, stations.roll[-1:]])
@@ -190,15 +192,14 @@ def deformed_set(
     position : int
         Index into ``cycle.position``.
     """
-    s, N = planetary_set, planetary_set.n_planets
+    s = planetary_set
     sun_angle, planet_angles, ring_angle = tooth_zero_angles(s, float(cycle.position[position]))
-    meshes = range(N)
-    bodies = [("sun", "sun", sectors.sun, np.zeros(2), sun_angle, [(j, 0, 0) for j in meshes])]
+    on_sun, on_planets, on_ring = acting_flanks(s.n_planets)
+    bodies = [("sun", "sun", sectors.sun, np.zeros(2), sun_angle, on_sun)]
     for n, psi in enumerate(s.planet_angles):
         centre = s.centre_distance * np.array([np.cos(psi), np.sin(psi)])
-        on_planet = [(n, 1, 0), (N + n, 0, 1)]
-        bodies.append((f"planet {n + 1}", "planet", sectors.planet, centre, planet_angles[n], on_planet))
-    bodies.append(("ring", "ring", sectors.ring, np.zeros(2), ring_angle, [(N + j, 1, 0) for j in meshes]))
+        bodies.append((f"planet {n + 1}", "planet", sectors.planet, centre, planet_angles[n], on_planets[n]))
+    bodies.append(("ring", "ring", sectors.ring, np.zeros(2), ring_angle, on_ring))
     return tuple(
         DeformedBody(name, kind, centre, float(angle), _displacement(s, sector, cycle, position, acting))
         for name, kind, sector, centre, angle, acting in bodies
@@ -226,8 +227,7 @@ def _displacement(planetary_set, sector: Sector, cycle, position, acting):
         moved_on = -1 if mesh < N and gear == 0 else 1
         for tooth, path, tooth_load, flanks in sides:
             for t in np.flatnonzero(tooth_load[mesh, :, position] > 0.0):
-                zeta = np.clip(path[mesh, t, position], *pair.path)
-                roll = pair.pitch_roll_1 + zeta if gear == 0 else pair.pitch_roll_2 - pair.sign * zeta
+                roll = pair.roll_on(gear, path[mesh, t, position])
                 number = (tooth[gear, mesh, t] + moved_on * turns) % sector.gear.teeth
                 force = tooth_load[mesh, t, position]
                 loads[number] += force * (flanks[drive] @ _hat(roll, stations.roll))

@@ -3,13 +3,12 @@
 Both flanks are exact involutes. The separation of a point ``P`` of flank 1 from flank 2 is measured along
 the normal of flank 2 through ``P``, which is tangent to the base circle of gear 2: involutes of one base
 circle are parallel curves, so the distance is the base radius times the angle between their origins. The
-formula holds off the line of action and at tip corners as well.
+formula holds off the line of action and at tip corners as well. Deviations add separations of profiles along
+the flanks (`profile_form`) and of whole tooth pairs (`pair_separations`).
 
-Gear 1 drives. Its flank is drawn as a left flank; roll lengths on gear 1 grow with the path coordinate.
-
-Separations that deviations add: of profiles along the flanks, and of whole tooth pairs.
-
-Which teeth a pair consists of, and where tooth number zero of every gear stands.
+Gear 1 drives. Its flank is drawn as a left flank; roll lengths on gear 1 grow with the path coordinate. Which
+teeth a pair consists of, and where tooth number zero of every gear stands, is told by `tooth_numbers` and
+`tooth_zero_angles`.
 """
 
 from __future__ import annotations
@@ -25,6 +24,8 @@ from femgear.errors import ContactError
 if TYPE_CHECKING:
     from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
+
+WINDOW_NODES = np.array([0.0, 0.5, 1.0])
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,10 @@ class FlankPair:
         start = max(self.limits_1[0] - self.pitch_roll_1, roll_2[0])
         return start, min(self.limits_1[1] - self.pitch_roll_1, roll_2[1])
 
-
-def _roll(gear: Gear, radius: float) -> float:
-    return float(np.sqrt(max(radius**2 - gear.base_radius**2, 0.0)))
+    def roll_on(self, gear: int, zeta):
+        """Roll length [m] on gear 1 (0) or gear 2 (1) at path coordinates, kept on the path of contact."""
+        zeta = np.clip(zeta, *self.path)
+        return self.pitch_roll_1 + zeta if gear == 0 else self.pitch_roll_2 - self.sign * zeta
 
 
 def flank_pair(gear_1: Gear, gear_2: Gear, centre_distance: float, pressure_angle: float) -> FlankPair:
@@ -145,23 +147,6 @@ def admissible_arcs(pair: FlankPair, zeta):
     return low, high
 
 
-def _arc_of_foot(pair: FlankPair, zeta, roll_2):
-    """Arc length on flank 1 of the point whose foot on flank 2 has the roll length `roll_2` (secant)."""
-    rb1, rb2 = pair.base_radius_1, pair.base_radius_2
-    target = roll_2**2 / (2 * rb2)
-    contact_1 = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * rb1)
-    contact_2 = np.maximum(pair.pitch_roll_2 - pair.sign * zeta, 0.0) ** 2 / (2 * rb2)
-    arc = contact_1 + pair.sign * (contact_2 - target)
-    for _ in range(12):
-        roll_1 = np.sqrt(2 * rb1 * np.maximum(arc, 0.0))
-        foot = separation(pair, zeta, roll_1)[1]
-        error = foot * np.abs(foot) / (2 * rb2) - target
-        arc = arc + pair.sign * error
-        if np.abs(error).max(initial=0.0) < 1e-15:
-            break
-    return arc
-
-
 @dataclass(frozen=True)
 class Windows:
     """Windows of pressure cells for many positions of one mesh; leading shape (..., pairs).
@@ -199,43 +184,6 @@ class Windows:
     roll_2: np.ndarray
     at_low_edge: np.ndarray
     at_high_edge: np.ndarray
-
-
-WINDOW_NODES = np.array([0.0, 0.5, 1.0])
-
-
-def cell_edges(cells: int) -> np.ndarray:
-    """Cell edges as fractions of a window: inside a flank, at its low end, at its high end, at both.
-
-    Where flanks end they meet at an angle: a light load is carried within some micrometres of the corner, so
-    that the cells there shrink to ``1 / cells^2`` of the window.
-
-    Returns
-    -------
-    (4, cells + 1) array
-    """
-    t = np.linspace(0.0, 1.0, cells + 1)
-    return np.stack([t, t**2, 1.0 - (1.0 - t) ** 2, np.sin(0.5 * np.pi * t) ** 2])
-
-
-def cell_centres(cells: int) -> np.ndarray:
-    """Middles of the cells as fractions of a window, shape (4, cells)."""
-    edges = cell_edges(cells)
-    return 0.5 * (edges[:, 1:] + edges[:, :-1])
-
-
-def equal_cells(cells: int) -> np.ndarray:
-    """Share of every cell (last axis) of the layouts that lies in each of equal cells, (4, cells, cells)."""
-    edges, equal = cell_edges(cells), np.linspace(0.0, 1.0, cells + 1)
-    low, high = edges[:, None, :-1], edges[:, None, 1:]
-    overlap = np.minimum(high, equal[1:, None]) - np.maximum(low, equal[:-1, None])
-    return np.maximum(overlap, 0.0) / (high - low)
-
-
-def window_polynomials(cells: int) -> np.ndarray:
-    """Quadratic Lagrange polynomials of the window nodes at the cell centres, shape (4, cells, 3)."""
-    t = cell_centres(cells)
-    return np.stack([(2 * t - 1) * (t - 1), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
 
 
 def windows(
@@ -308,20 +256,38 @@ def windows(
     )
 
 
-def _separation_at(pair: FlankPair, zeta, arc, form):
-    """Separation at arc lengths on flank 1, deviations of the profiles included."""
-    roll_1 = np.sqrt(2 * pair.base_radius_1 * np.maximum(arc, 0.0))
-    gap, roll_2 = separation(pair, zeta, roll_1)
-    return gap if form is None else gap + form(roll_1, roll_2)
+def cell_edges(cells: int) -> np.ndarray:
+    """Cell edges as fractions of a window: inside a flank, at its low end, at its high end, at both.
+
+    Where flanks end they meet at an angle: a light load is carried within some micrometres of the corner, so
+    that the cells there shrink to ``1 / cells^2`` of the window.
+
+    Returns
+    -------
+    (4, cells + 1) array
+    """
+    t = np.linspace(0.0, 1.0, cells + 1)
+    return np.stack([t, t**2, 1.0 - (1.0 - t) ** 2, np.sin(0.5 * np.pi * t) ** 2])
 
 
-def _nearest_arc(pair: FlankPair, zeta, centre, low, high, reach, form):
-    """Arc length of the smallest separation within `reach` of the contact of the unmodified flanks."""
-    begin = np.maximum(centre - reach, low)
-    end = np.maximum(np.minimum(centre + reach, high), begin)
-    arc = begin[..., None] + (end - begin)[..., None] * np.linspace(0.0, 1.0, 97)
-    best = _separation_at(pair, zeta[..., None], arc, form).argmin(axis=-1)
-    return np.take_along_axis(arc, best[..., None], axis=-1)[..., 0]
+def cell_centres(cells: int) -> np.ndarray:
+    """Middles of the cells as fractions of a window, shape (4, cells)."""
+    edges = cell_edges(cells)
+    return 0.5 * (edges[:, 1:] + edges[:, :-1])
+
+
+def equal_cells(cells: int) -> np.ndarray:
+    """Share of every cell (last axis) of the layouts that lies in each of equal cells, (4, cells, cells)."""
+    edges, equal = cell_edges(cells), np.linspace(0.0, 1.0, cells + 1)
+    low, high = edges[:, None, :-1], edges[:, None, 1:]
+    overlap = np.minimum(high, equal[1:, None]) - np.maximum(low, equal[:-1, None])
+    return np.maximum(overlap, 0.0) / (high - low)
+
+
+def window_polynomials(cells: int) -> np.ndarray:
+    """Quadratic Lagrange polynomials of the window nodes at the cell centres, shape (4, cells, 3)."""
+    t = cell_centres(cells)
+    return np.stack([(2 * t - 1) * (t - 1), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
 
 
 def profile_form(planetary_set, deviations, kind, back):
@@ -415,3 +381,40 @@ def tooth_zero_angles(planetary_set: PlanetarySet, position: float = 0.0):
     planets = psi + np.pi - half_angle(s.planet, sun_angle) - turned[:N] * s.planet.pitch_angle
     ring = psi[0] - half_angle(s.ring, ring_angle) - turned[N] * s.ring.pitch_angle
     return float(sun), planets, float(ring)
+
+
+def _roll(gear: Gear, radius: float) -> float:
+    return float(np.sqrt(max(radius**2 - gear.base_radius**2, 0.0)))
+
+
+def _arc_of_foot(pair: FlankPair, zeta, roll_2):
+    """Arc length on flank 1 of the point whose foot on flank 2 has the roll length `roll_2` (secant)."""
+    rb1, rb2 = pair.base_radius_1, pair.base_radius_2
+    target = roll_2**2 / (2 * rb2)
+    contact_1 = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * rb1)
+    contact_2 = np.maximum(pair.pitch_roll_2 - pair.sign * zeta, 0.0) ** 2 / (2 * rb2)
+    arc = contact_1 + pair.sign * (contact_2 - target)
+    for _ in range(12):
+        roll_1 = np.sqrt(2 * rb1 * np.maximum(arc, 0.0))
+        foot = separation(pair, zeta, roll_1)[1]
+        error = foot * np.abs(foot) / (2 * rb2) - target
+        arc = arc + pair.sign * error
+        if np.abs(error).max(initial=0.0) < 1e-15:
+            break
+    return arc
+
+
+def _separation_at(pair: FlankPair, zeta, arc, form):
+    """Separation at arc lengths on flank 1, deviations of the profiles included."""
+    roll_1 = np.sqrt(2 * pair.base_radius_1 * np.maximum(arc, 0.0))
+    gap, roll_2 = separation(pair, zeta, roll_1)
+    return gap if form is None else gap + form(roll_1, roll_2)
+
+
+def _nearest_arc(pair: FlankPair, zeta, centre, low, high, reach, form):
+    """Arc length of the smallest separation within `reach` of the contact of the unmodified flanks."""
+    begin = np.maximum(centre - reach, low)
+    end = np.maximum(np.minimum(centre + reach, high), begin)
+    arc = begin[..., None] + (end - begin)[..., None] * np.linspace(0.0, 1.0, 97)
+    best = _separation_at(pair, zeta[..., None], arc, form).argmin(axis=-1)
+    return np.take_along_axis(arc, best[..., None], axis=-1)[..., 0]

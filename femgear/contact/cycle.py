@@ -1,8 +1,7 @@
 """One walk through the mesh cycle: all 2N meshes of a planetary set solved together at each position.
 
-What a walk through the mesh cycle gives: loads, motions and stiffness of all 2N meshes.
-
-The other flanks: a negative torque is the mirror image of a set under a positive one.
+It gives loads, motions and stiffness of the meshes (`MeshCycle`). A negative torque loads the other flanks:
+it is the mirror image of a set under a positive one (`walk_either_flank`).
 """
 
 from __future__ import annotations
@@ -33,6 +32,13 @@ from femgear.gears.deviations import mirrored_deviations
 if TYPE_CHECKING:
     from femgear.gears.deviations import SetDeviations
     from femgear.gears.planetary import PlanetarySet
+
+ROUGH_STIFFNESS = 10e9
+"""Stiffness of a mesh per face width, to size windows [N/m^2]."""
+HELD = 2.56
+"""A window is 3.2 half widths wide: it holds the contact of this many times the force that sized it."""
+LARGEST_RESIDUAL = 1e-9
+"""Of contact conditions and equilibrium; rounding leaves 1e-14."""
 
 
 @dataclass(frozen=True)
@@ -170,62 +176,6 @@ class MeshCycle:
         return (self.force > 0) & (self.back_force > 0)
 
 
-def cycle_without_load(
-    n_planets: int,
-    position: np.ndarray,
-    *,
-    periods: int,
-    contact: str,
-    cells: int,
-    pressures: bool = False,
-) -> MeshCycle:
-    """The defined result without load: nothing touches, nothing is stiff, no pressure has a place."""
-    N, positions = n_planets, len(position)
-    zero, teeth = np.zeros((2 * N, positions)), np.zeros((2 * N, 1, positions))
-    found = {}
-    if pressures:
-        found = {
-            "pressure": np.zeros((2 * N, 1, cells, positions)),
-            "pressure_offset": np.zeros((2 * N, cells)),
-            "pressure_centre": teeth,
-        }
-    return MeshCycle(
-        position=position,
-        deflection=zero,
-        sun_arc=np.zeros(positions),
-        force=zero,
-        back_force=zero,
-        stiffness=zero,
-        tooth_load=teeth,
-        path=teeth,
-        tooth=np.zeros((2, 2 * N, 1), int),
-        back_tooth_load=teeth,
-        back_path=teeth,
-        back_tooth=np.zeros((2, 2 * N, 1), int),
-        bearing_force=np.zeros((N, 2, positions)),
-        max_pressure=zero,
-        edge_contact=np.zeros((2 * N, positions), bool),
-        open_planets=np.ones((N, positions), bool),
-        residual=np.zeros(positions),
-        iterations=np.zeros(positions, int),
-        member_motion=np.zeros((0, positions)),
-        member_names=(),
-        periods=periods,
-        contact=contact,
-        unknowns=0,
-        message="no torque: no tooth carries load and the mesh stiffness is zero",
-        **found,
-    )
-
-
-ROUGH_STIFFNESS = 10e9
-"""Stiffness of a mesh per face width, to size windows [N/m^2]."""
-HELD = 2.56
-"""A window is 3.2 half widths wide: it holds the contact of this many times the force that sized it."""
-LARGEST_RESIDUAL = 1e-9
-"""Of contact conditions and equilibrium; rounding leaves 1e-14."""
-
-
 def walk_mesh_cycle(
     planetary_set: PlanetarySet,
     bodies: Bodies,
@@ -332,6 +282,157 @@ def walk_mesh_cycle(
         "the contact windows do not contain the contact after seven enlargements",
         code="E-CONTACT-WINDOW",
         remedy="reduce operation.torque or the errors",
+    )
+
+
+def walk_either_flank(
+    planetary_set,
+    bodies,
+    *,
+    sun_torque,
+    positions=64,
+    contact="profile",
+    deviations=None,
+    supports=RIGID,
+    periods=1,
+    planet_gaps=None,
+    both_flanks=False,
+    pressures=False,
+    held_bodies=None,
+    progress=None,
+) -> MeshCycle:
+    """`walk_mesh_cycle` for a torque of either sign; results keep the order of planets and positions.
+
+    For a negative torque the right flanks of the sun carry. Position zero is then where the right flanks of
+    "sun-planet 1" touch at the pitch point, and positions still run with the rotation of the sun. The
+    mirror image turns the other way: its record ends at position zero, so that records which do not close
+    hold the same configurations too.
+    """
+    options = {
+        "contact": contact,
+        "supports": supports,
+        "periods": periods,
+        "both_flanks": both_flanks,
+        "pressures": pressures,
+        "held_bodies": held_bodies,
+        "progress": progress,
+    }
+    if sun_torque >= 0:
+        return walk_mesh_cycle(
+            planetary_set,
+            bodies,
+            sun_torque=sun_torque,
+            positions=positions,
+            deviations=deviations,
+            planet_gaps=planet_gaps,
+            **options,
+        )
+    mirrored, order = mirrored_set(planetary_set)
+    turned = None if planet_gaps is None else np.asarray(planet_gaps, float)[order]
+    if deviations is not None:
+        deviations = mirrored_deviations(deviations, planetary_set, mirrored, order)
+    cycle = walk_mesh_cycle(
+        mirrored,
+        bodies,
+        sun_torque=-sun_torque,
+        deviations=deviations,
+        planet_gaps=turned,
+        positions=-cycle_positions(positions, periods=periods)[::-1],
+        **options,
+    )
+    return _seen_from_front(cycle, planetary_set, order)
+
+
+def _seen_from_front(cycle: MeshCycle, planetary_set, order) -> MeshCycle:
+    """Results of the mirror image in the order of planets and positions of the original."""
+    planet = np.argsort(order)
+    mesh, axis = np.concatenate([planet, planet + len(order)]), planetary_set.planet_angles[0]
+    by_mesh = ("deflection", "force", "back_force", "stiffness", "max_pressure", "edge_contact")
+    found = {name: getattr(cycle, name)[mesh][:, ::-1] for name in by_mesh}
+    found |= {name: getattr(cycle, name)[::-1] for name in ("sun_arc", "residual", "iterations")}
+    # the pair that comes first along the path leaves first when the rotation is seen from behind
+    for side in ("", "back_"):
+        found[f"{side}tooth_load"] = getattr(cycle, f"{side}tooth_load")[mesh][:, ::-1, ::-1]
+        found[f"{side}path"] = -getattr(cycle, f"{side}path")[mesh][:, ::-1, ::-1]
+        found[f"{side}tooth"] = -getattr(cycle, f"{side}tooth")[:, mesh][:, :, ::-1]
+    if cycle.pressure is not None:
+        found["pressure"] = cycle.pressure[mesh][:, ::-1, ::-1, ::-1]
+        found["pressure_offset"] = -cycle.pressure_offset[mesh][:, ::-1]
+        found["pressure_centre"] = -cycle.pressure_centre[mesh][:, ::-1, ::-1]
+    if cycle.held_stiffness is not None:
+        found["held_stiffness"] = cycle.held_stiffness[mesh][:, ::-1]
+        found["held_compliance"] = cycle.held_compliance[mesh][:, mesh][:, :, ::-1]
+    return replace(
+        cycle,
+        position=0.0 - cycle.position[::-1],
+        open_planets=cycle.open_planets[planet][:, ::-1],
+        bearing_force=_reflected(cycle.bearing_force, axis)[planet][:, :, ::-1],
+        member_motion=_reflected_motion(cycle, axis, planet)[:, ::-1],
+        **found,
+    )
+
+
+def _reflected(vectors: np.ndarray, axis: float) -> np.ndarray:
+    """Vectors (m, 2, P) reflected in the line at the angle `axis`."""
+    c, s = np.cos(2 * axis), np.sin(2 * axis)
+    return np.einsum("ij,mjp->mip", np.array([[c, s], [s, -c]]), vectors)
+
+
+def _reflected_motion(cycle: MeshCycle, axis: float, back) -> np.ndarray:
+    """Motions of the members reflected in the line through the first planet, planets in their own order."""
+    vectors = _reflected(cycle.member_motion.reshape(-1, 2, cycle.member_motion.shape[1]), axis)
+    names = [name.split(":")[0] for name in cycle.member_names[::2]]
+    planets = [i for i, name in enumerate(names) if name.startswith("planet")]
+    if planets:
+        vectors[planets] = vectors[planets][back]
+    return vectors.reshape(cycle.member_motion.shape)
+
+
+def cycle_without_load(
+    n_planets: int,
+    position: np.ndarray,
+    *,
+    periods: int,
+    contact: str,
+    cells: int,
+    pressures: bool = False,
+) -> MeshCycle:
+    """The defined result without load: nothing touches, nothing is stiff, no pressure has a place."""
+    N, positions = n_planets, len(position)
+    zero, teeth = np.zeros((2 * N, positions)), np.zeros((2 * N, 1, positions))
+    found = {}
+    if pressures:
+        found = {
+            "pressure": np.zeros((2 * N, 1, cells, positions)),
+            "pressure_offset": np.zeros((2 * N, cells)),
+            "pressure_centre": teeth,
+        }
+    return MeshCycle(
+        position=position,
+        deflection=zero,
+        sun_arc=np.zeros(positions),
+        force=zero,
+        back_force=zero,
+        stiffness=zero,
+        tooth_load=teeth,
+        path=teeth,
+        tooth=np.zeros((2, 2 * N, 1), int),
+        back_tooth_load=teeth,
+        back_path=teeth,
+        back_tooth=np.zeros((2, 2 * N, 1), int),
+        bearing_force=np.zeros((N, 2, positions)),
+        max_pressure=zero,
+        edge_contact=np.zeros((2 * N, positions), bool),
+        open_planets=np.ones((N, positions), bool),
+        residual=np.zeros(positions),
+        iterations=np.zeros(positions, int),
+        member_motion=np.zeros((0, positions)),
+        member_names=(),
+        periods=periods,
+        contact=contact,
+        unknowns=0,
+        message="no torque: no tooth carries load and the mesh stiffness is zero",
+        **found,
     )
 
 
@@ -505,106 +606,3 @@ def _penetrated_outsider(setup: MeshWindows, p, deflection) -> float:
     penetrates = ~setup.near[:, p] & (gap < deflection[:, None])
     relative = deflection - gap.min(axis=1)
     return float(relative[penetrates.any(axis=1)].max(initial=0.0))
-
-
-def walk_either_flank(
-    planetary_set,
-    bodies,
-    *,
-    sun_torque,
-    positions=64,
-    contact="profile",
-    deviations=None,
-    supports=RIGID,
-    periods=1,
-    planet_gaps=None,
-    both_flanks=False,
-    pressures=False,
-    held_bodies=None,
-    progress=None,
-) -> MeshCycle:
-    """`walk_mesh_cycle` for a torque of either sign; results keep the order of planets and positions.
-
-    For a negative torque the right flanks of the sun carry. Position zero is then where the right flanks of
-    "sun-planet 1" touch at the pitch point, and positions still run with the rotation of the sun. The
-    mirror image turns the other way: its record ends at position zero, so that records which do not close
-    hold the same configurations too.
-    """
-    options = {
-        "contact": contact,
-        "supports": supports,
-        "periods": periods,
-        "both_flanks": both_flanks,
-        "pressures": pressures,
-        "held_bodies": held_bodies,
-        "progress": progress,
-    }
-    if sun_torque >= 0:
-        return walk_mesh_cycle(
-            planetary_set,
-            bodies,
-            sun_torque=sun_torque,
-            positions=positions,
-            deviations=deviations,
-            planet_gaps=planet_gaps,
-            **options,
-        )
-    mirrored, order = mirrored_set(planetary_set)
-    turned = None if planet_gaps is None else np.asarray(planet_gaps, float)[order]
-    if deviations is not None:
-        deviations = mirrored_deviations(deviations, planetary_set, mirrored, order)
-    cycle = walk_mesh_cycle(
-        mirrored,
-        bodies,
-        sun_torque=-sun_torque,
-        deviations=deviations,
-        planet_gaps=turned,
-        positions=-cycle_positions(positions, periods=periods)[::-1],
-        **options,
-    )
-    return _seen_from_front(cycle, planetary_set, order)
-
-
-def _seen_from_front(cycle: MeshCycle, planetary_set, order) -> MeshCycle:
-    """Results of the mirror image in the order of planets and positions of the original."""
-    planet = np.argsort(order)
-    mesh, axis = np.concatenate([planet, planet + len(order)]), planetary_set.planet_angles[0]
-    by_mesh = ("deflection", "force", "back_force", "stiffness", "max_pressure", "edge_contact")
-    found = {name: getattr(cycle, name)[mesh][:, ::-1] for name in by_mesh}
-    found |= {name: getattr(cycle, name)[::-1] for name in ("sun_arc", "residual", "iterations")}
-    # the pair that comes first along the path leaves first when the rotation is seen from behind
-    for side in ("", "back_"):
-        found[f"{side}tooth_load"] = getattr(cycle, f"{side}tooth_load")[mesh][:, ::-1, ::-1]
-        found[f"{side}path"] = -getattr(cycle, f"{side}path")[mesh][:, ::-1, ::-1]
-        found[f"{side}tooth"] = -getattr(cycle, f"{side}tooth")[:, mesh][:, :, ::-1]
-    if cycle.pressure is not None:
-        found["pressure"] = cycle.pressure[mesh][:, ::-1, ::-1, ::-1]
-        found["pressure_offset"] = -cycle.pressure_offset[mesh][:, ::-1]
-        found["pressure_centre"] = -cycle.pressure_centre[mesh][:, ::-1, ::-1]
-    if cycle.held_stiffness is not None:
-        found["held_stiffness"] = cycle.held_stiffness[mesh][:, ::-1]
-        found["held_compliance"] = cycle.held_compliance[mesh][:, mesh][:, :, ::-1]
-    return replace(
-        cycle,
-        position=0.0 - cycle.position[::-1],
-        open_planets=cycle.open_planets[planet][:, ::-1],
-        bearing_force=_reflected(cycle.bearing_force, axis)[planet][:, :, ::-1],
-        member_motion=_reflected_motion(cycle, axis, planet)[:, ::-1],
-        **found,
-    )
-
-
-def _reflected(vectors: np.ndarray, axis: float) -> np.ndarray:
-    """Vectors (m, 2, P) reflected in the line at the angle `axis`."""
-    c, s = np.cos(2 * axis), np.sin(2 * axis)
-    return np.einsum("ij,mjp->mip", np.array([[c, s], [s, -c]]), vectors)
-
-
-def _reflected_motion(cycle: MeshCycle, axis: float, back) -> np.ndarray:
-    """Motions of the members reflected in the line through the first planet, planets in their own order."""
-    vectors = _reflected(cycle.member_motion.reshape(-1, 2, cycle.member_motion.shape[1]), axis)
-    names = [name.split(":")[0] for name in cycle.member_names[::2]]
-    planets = [i for i, name in enumerate(names) if name.startswith("planet")]
-    if planets:
-        vectors[planets] = vectors[planets][back]
-    return vectors.reshape(cycle.member_motion.shape)

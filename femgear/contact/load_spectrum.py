@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.contact.assembly import mesh_pairs
-from femgear.contact.flanks import LEFT, RIGHT, station_weights
+from femgear.contact.root_stress import station_forces
 
 if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
@@ -171,26 +171,6 @@ def load_spectrum(teeth: LoadedTeeth, *, closes: bool = True) -> LoadSpectrum:
     )
 
 
-def _engagement_peaks(teeth: LoadedTeeth, closes: bool) -> np.ndarray:
-    """Largest load of every engagement, shape (2N, engagements) [N]."""
-    meshes, slots, _ = teeth.load.shape
-    # the tooth that enters the first slot in one period is in the next slot a period later
-    entered = teeth.turn[None, :] - np.arange(slots)[:, None]
-    number = entered % teeth.periods if closes else entered - entered.min()
-    peaks = np.zeros((meshes, number.max() + 1))
-    np.maximum.at(peaks, (slice(None), number), teeth.load)
-    whole = np.bincount(number.ravel()) == slots * teeth.each
-    return peaks[:, whole] if whole.any() else peaks
-
-
-def _shares(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Share of the positive values of every row in each class; zero for a row without any."""
-    if not edges[-1] > 0.0:
-        return np.zeros((len(values), len(edges) - 1))
-    counts = np.array([np.histogram(row[row > 0.0], edges)[0] for row in values], float)
-    return counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
-
-
 def root_ranges(
     planetary_set: PlanetarySet, roots: RootStresses, teeth: LoadedTeeth, *, closes: bool = True
 ) -> tuple[RootRange, ...]:
@@ -211,12 +191,8 @@ def root_ranges(
         Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on.
     """
     N = planetary_set.n_planets
-    bodies = [("sun", roots.sun, [(j, 0, LEFT) for j in range(N)])]
-    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
-    bodies += [("planet", roots.planet, [(n, 1, LEFT), (N + n, 0, RIGHT)]) for n in range(N)]
-    bodies.append(("ring", roots.ring, [(N + j, 1, LEFT) for j in range(N)]))
     found = {}
-    for kind, root, acting in bodies:
+    for kind, root, acting in roots.of_bodies(N):
         for one in _body_ranges(planetary_set, kind, root, acting, teeth, closes):
             found[one.mesh, one.gear] = one
     return tuple(found[mesh, gear] for mesh in range(2 * N) for gear in (0, 1))
@@ -251,19 +227,31 @@ def body_stress(planetary_set, root: RootStress, acting, teeth: LoadedTeeth, sam
             columns = root.influence[:, :, flank * n : (flank + 1) * n].reshape(-1, n)
             for load, path, tooth in zip(loads[mesh], paths[mesh], numbers[gear, mesh], strict=True):
                 if load[samples].any():
-                    zeta = np.clip(path[samples], *pair.path)
-                    roll = pair.pitch_roll_1 + zeta if gear == 0 else pair.pitch_roll_2 - pair.sign * zeta
-                    stress = columns @ _station_forces(roll, load[samples], root.roll)
+                    roll = pair.roll_on(gear, path[samples])
+                    forces = station_forces(roll[None], load[None, samples], root.roll)
+                    stress = columns @ forces[0]
                     total += np.roll(stress.reshape(total.shape), tooth % z, axis=0)
     return total
 
 
-def _station_forces(roll, load, stations) -> np.ndarray:
-    """Loads (p,) at the roll lengths (p,) as forces at the flank stations, shape (n, p) [N]."""
-    index, weight = station_weights(roll, stations)
-    forces = np.zeros((len(stations), len(load)))
-    np.add.at(forces, (index, np.arange(len(load))[:, None]), weight * load[:, None])
-    return forces
+def _engagement_peaks(teeth: LoadedTeeth, closes: bool) -> np.ndarray:
+    """Largest load of every engagement, shape (2N, engagements) [N]."""
+    meshes, slots, _ = teeth.load.shape
+    # the tooth that enters the first slot in one period is in the next slot a period later
+    entered = teeth.turn[None, :] - np.arange(slots)[:, None]
+    number = entered % teeth.periods if closes else entered - entered.min()
+    peaks = np.zeros((meshes, number.max() + 1))
+    np.maximum.at(peaks, (slice(None), number), teeth.load)
+    whole = np.bincount(number.ravel()) == slots * teeth.each
+    return peaks[:, whole] if whole.any() else peaks
+
+
+def _shares(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Share of the positive values of every row in each class; zero for a row without any."""
+    if not edges[-1] > 0.0:
+        return np.zeros((len(values), len(edges) - 1))
+    counts = np.array([np.histogram(row[row > 0.0], edges)[0] for row in values], float)
+    return counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
 
 
 def _body_ranges(planetary_set, kind, root: RootStress, acting, teeth: LoadedTeeth, closes):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.assembly import mesh_pairs
+from femgear.contact.assembly import acting_flanks, mesh_pairs
 from femgear.contact.flanks import (
     LEFT,
     RIGHT,
@@ -72,6 +72,12 @@ class RootStresses:
     sun: RootStress
     planet: RootStress
     ring: RootStress
+
+    def of_bodies(self, n_planets: int) -> list[tuple[str, RootStress, list]]:
+        """Kind, influence and drive flanks (mesh, gear of the pair, side) of every body of a set."""
+        sun, planets, ring = acting_flanks(n_planets)
+        on_planets = [("planet", self.planet, acting) for acting in planets]
+        return [("sun", self.sun, sun), *on_planets, ("ring", self.ring, ring)]
 
 
 @dataclass(frozen=True)
@@ -262,16 +268,44 @@ def root_stress_cycle(
     """
     N = planetary_set.n_planets
     found = {}
-    meshes = range(N)
-    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
-    bodies = [("sun", roots.sun, [(j, 0, LEFT) for j in meshes])]
-    bodies += [("planet", roots.planet, [(n, 1, LEFT), (N + n, 0, RIGHT)]) for n in meshes]
-    bodies.append(("ring", roots.ring, [(N + j, 1, LEFT) for j in meshes]))
-    for kind, root, acting in bodies:
+    for kind, root, acting in roots.of_bodies(N):
         loads = _tooth_loads(planetary_set, root, cycle, acting, reverse)
         for target in acting:
             found[target[:2]] = _one_mesh(planetary_set, kind, root, cycle, target, loads, reverse)
     return tuple(found[mesh, gear] for mesh in range(2 * N) for gear in (0, 1))
+
+
+def tooth_history(root: RootCycle, *, start: int = 0) -> RootHistory:
+    """Follow one tooth from slot to slot through the mesh.
+
+    Parameters
+    ----------
+    root : RootCycle
+    start : int
+        Mesh period of the record in which the tooth enters the first slot; records of one period serve all
+        teeth.
+    """
+    slots, positions = root.path.shape
+    each = positions // root.periods
+    slot = np.repeat(np.arange(slots), each)
+    position = (start + slot) % root.periods * each + np.tile(np.arange(each), slots)
+    return RootHistory(root.path[slot, position], root.load[slot, position], root.stress[slot, position])
+
+
+def worst_history(root: RootCycle) -> RootHistory:
+    """History of the tooth with the largest stress in the root of its loaded flank."""
+    slot, position, _ = root.worst
+    period = position * root.periods // root.path.shape[1]
+    return tooth_history(root, start=(period - slot) % root.periods)
+
+
+def station_forces(roll, load, stations) -> np.ndarray:
+    """Forces at the flank stations (T, n, P) [N] under loads (T, P) of teeth at roll lengths (T, P)."""
+    index, weight = station_weights(roll, stations)
+    forces = np.zeros((len(roll), len(stations), roll.shape[1]))
+    t, p = np.indices(roll.shape)
+    np.add.at(forces, (t[..., None], index, p[..., None]), weight * load[..., None])
+    return forces
 
 
 def _tooth_loads(planetary_set, root: RootStress, cycle, acting, reverse) -> list:
@@ -287,22 +321,12 @@ def _tooth_loads(planetary_set, root: RootStress, cycle, acting, reverse) -> lis
         for mesh, gear, drive in acting:
             flank = drive if not back else RIGHT if drive == LEFT else LEFT
             pair = mesh_pairs(planetary_set)[int(mesh >= planetary_set.n_planets)]
-            zeta = np.clip(-path[mesh] if reverse else path[mesh], *pair.path)
-            roll = pair.pitch_roll_1 + zeta if gear == 0 else pair.pitch_roll_2 - pair.sign * zeta
-            forces = _station_loads(root, roll, load[mesh], flank)
+            roll = pair.roll_on(gear, -path[mesh] if reverse else path[mesh])
+            n, one_flank = len(root.roll), station_forces(roll, load[mesh], root.roll)
+            forces = np.zeros((len(roll), 2 * n, roll.shape[1]))
+            forces[:, flank * n : (flank + 1) * n] = one_flank
             loaded += [one for one in zip(tooth[gear, mesh], forces, strict=True) if one[1].any()]
     return loaded
-
-
-def _station_loads(root: RootStress, roll, load, flank) -> np.ndarray:
-    """Forces at the stations of both flanks of every tooth (T, 2 n, P) [N] under loads (T, P) at `roll`."""
-    index, weight = station_weights(roll, root.roll)
-    teeth, positions = roll.shape
-    n = len(root.roll)
-    result = np.zeros((teeth, 2 * n, positions))
-    t, p = np.indices((teeth, positions))
-    np.add.at(result, (t[..., None], index + flank * n, p[..., None]), weight * load[..., None])
-    return result
 
 
 def _one_mesh(planetary_set, kind, root: RootStress, cycle, target, loads, reverse) -> RootCycle:
@@ -337,27 +361,3 @@ def _slots(teeth, kind) -> np.ndarray:
     # the sun's teeth come one after another, those of planets and ring the other way round
     step = 1 if kind == "sun" else -1
     return np.concatenate([teeth[:1] - step, teeth, teeth[-1:] + step])
-
-
-def tooth_history(root: RootCycle, *, start: int = 0) -> RootHistory:
-    """Follow one tooth from slot to slot through the mesh.
-
-    Parameters
-    ----------
-    root : RootCycle
-    start : int
-        Mesh period of the record in which the tooth enters the first slot; records of one period serve all
-        teeth.
-    """
-    slots, positions = root.path.shape
-    each = positions // root.periods
-    slot = np.repeat(np.arange(slots), each)
-    position = (start + slot) % root.periods * each + np.tile(np.arange(each), slots)
-    return RootHistory(root.path[slot, position], root.load[slot, position], root.stress[slot, position])
-
-
-def worst_history(root: RootCycle) -> RootHistory:
-    """History of the tooth with the largest stress in the root of its loaded flank."""
-    slot, position, _ = root.worst
-    period = position * root.periods // root.path.shape[1]
-    return tooth_history(root, start=(period - slot) % root.periods)

@@ -1,9 +1,8 @@
 """Both flanks of the teeth: phases and tooth numbers of the drive side, and of the back side in its mirror.
 
-The back flanks of a set are the drive flanks of its mirror image. Mesh ``2N + j`` is the back side of mesh
-``j``: its path coordinate runs backwards, and its flanks approach when those of mesh ``j`` part.
-
-The mirror image of a planetary set.
+The back flanks of a set are the drive flanks of its mirror image (`mirrored_set`). Mesh ``2N + j`` is the
+back side of mesh ``j``: its path coordinate runs backwards, and its flanks approach when those of mesh ``j``
+part.
 """
 
 from __future__ import annotations
@@ -17,23 +16,6 @@ from femgear.contact.candidates import tooth_numbers, tooth_zero_angles
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
-
-
-def mirrored_set(planetary_set):
-    """The set seen from behind, and the place of each of its planets in the original one.
-
-    Returns
-    -------
-    PlanetarySet
-        Planet angles counted the other way round, ascending from the first planet.
-    order : (N,) int array
-        Mirrored planet ``i`` is original planet ``order[i]``.
-    """
-    angles = np.asarray(planetary_set.planet_angles)
-    turned = np.mod(angles[0] - angles, 2 * np.pi)
-    order = np.argsort(turned, kind="stable")
-    return replace(planetary_set, planet_angles=tuple(angles[0] + turned[order])), order
-
 
 DRIVE, BACK = 1.0, -1.0
 
@@ -69,13 +51,6 @@ def flank_side(planetary_set: PlanetarySet, direction: float) -> FlankSide:
     return FlankSide(direction, phase, np.repeat([s.backlash_sun_planet, s.backlash_planet_ring], N))
 
 
-def _mirrored_position(planetary_set, mirrored) -> float:
-    """Position of the mirror image, in [0, 1), at which its sun stands like the original at zero."""
-    image, original = tooth_zero_angles(mirrored)[0], tooth_zero_angles(planetary_set)[0]
-    turns = (2 * planetary_set.planet_angles[0] - image - original) / planetary_set.sun.pitch_angle
-    return float(turns - np.floor(turns))
-
-
 def side_teeth(planetary_set: PlanetarySet, index: np.ndarray, direction: float):
     """Tooth numbers (2N, pairs) on gear 1 and gear 2 of the pairs `index`, in the count of the drive side."""
     if direction > 0:
@@ -102,3 +77,26 @@ def side_teeth(planetary_set: PlanetarySet, index: np.ndarray, direction: float)
     teeth[0][N:] += planet_offset[:, None]
     teeth[1][N:] += offset(ring_m, ring, s.ring)
     return teeth[0], teeth[1]
+
+
+def mirrored_set(planetary_set):
+    """The set seen from behind, and the place of each of its planets in the original one.
+
+    Returns
+    -------
+    PlanetarySet
+        Planet angles counted the other way round, ascending from the first planet.
+    order : (N,) int array
+        Mirrored planet ``i`` is original planet ``order[i]``.
+    """
+    angles = np.asarray(planetary_set.planet_angles)
+    turned = np.mod(angles[0] - angles, 2 * np.pi)
+    order = np.argsort(turned, kind="stable")
+    return replace(planetary_set, planet_angles=tuple(angles[0] + turned[order])), order
+
+
+def _mirrored_position(planetary_set, mirrored) -> float:
+    """Position of the mirror image, in [0, 1), at which its sun stands like the original at zero."""
+    image, original = tooth_zero_angles(mirrored)[0], tooth_zero_angles(planetary_set)[0]
+    turns = (2 * planetary_set.planet_angles[0] - image - original) / planetary_set.sun.pitch_angle
+    return float(turns - np.floor(turns))

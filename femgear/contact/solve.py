@@ -144,45 +144,6 @@ def tangent_stiffness(H, state: ContactState, mesh, window, cell, n_meshes) -> n
     return stiffness
 
 
-def _ends_of_contacts(state: ContactState, index, window, cell) -> np.ndarray:
-    """Places in `index` of the last loaded cells of every end, and the open candidates next to them.
-
-    A row of the second kind is -1 where the window or the flank ends, shape (2, ends).
-    """
-    edge = np.flatnonzero(np.diff(window[index]))
-    first, last = np.append(0, edge + 1), np.append(edge, len(index) - 1)
-    loaded = np.concatenate([first, last])
-    beside = index[loaded] + np.repeat([-1, 1], len(first))
-    inside = (beside >= 0) & (beside < len(cell))
-    beside = np.where(inside, beside, index[loaded])
-    same = window[beside] == window[index[loaded]]
-    next_cell = np.abs(cell[beside] - cell[index[loaded]]) == 1
-    return np.stack([loaded, np.where(same & next_cell & ~state.active[beside], beside, -1)])
-
-
-def _smooth_tangent(H, state: ContactState, index, ends) -> float:
-    """Slope of the load over the common approach of the candidates `index` [N/m]."""
-    first, last = np.split(ends[0], 2)
-    alone = np.tile(first == last, 2)[ends[1] >= 0]
-    loaded, beside = ends[:, ends[1] >= 0]
-    lower = factor(H[np.ix_(index, index)])
-    columns = np.zeros((len(index), 1 + 2 * len(loaded)))
-    columns[:, 0] = 1.0
-    columns[loaded, 1 + np.arange(len(loaded))] = 1.0
-    columns[:, 1 + len(loaded) :] = H[np.ix_(index, beside)]
-    half = forward(lower, columns)
-    one, unit, reach = half[:, 0], half[:, 1 : 1 + len(loaded)], half[:, 1 + len(loaded) :]
-    rate, closing = one @ unit, 1.0 - one @ reach
-    # what the slope loses without the last cell, and gains with the next one
-    lost = np.where(alone, 0.0, rate**2 / (unit**2).sum(axis=0))
-    gained = closing**2 / (H[beside, beside] - (reach**2).sum(axis=0))
-    come, left = state.loads[index[loaded]] * closing, state.gaps[beside] * rate
-    usable = (closing > 0) & (rate > 0) & (come + left > 0)
-    share = np.divide(come, come + left, out=np.full(len(come), 0.5), where=usable)
-    change = 0.5 * (share * gained - (1.0 - share) * lost)
-    return float(one @ one + change[usable].sum())
-
-
 def mesh_tangent_matrix(H, active, mesh_of_candidate, n_meshes) -> np.ndarray:
     """Tangent stiffness of all meshes together, with the coupling through their common bodies.
 
@@ -328,3 +289,42 @@ def _state(problem: Problem, step: Step, iterations: int, method: str) -> Contac
         method=method,
         open_motions=np.abs(step.null).max(axis=1, initial=0.0) > 1e-8,
     )
+
+
+def _ends_of_contacts(state: ContactState, index, window, cell) -> np.ndarray:
+    """Places in `index` of the last loaded cells of every end, and the open candidates next to them.
+
+    A row of the second kind is -1 where the window or the flank ends, shape (2, ends).
+    """
+    edge = np.flatnonzero(np.diff(window[index]))
+    first, last = np.append(0, edge + 1), np.append(edge, len(index) - 1)
+    loaded = np.concatenate([first, last])
+    beside = index[loaded] + np.repeat([-1, 1], len(first))
+    inside = (beside >= 0) & (beside < len(cell))
+    beside = np.where(inside, beside, index[loaded])
+    same = window[beside] == window[index[loaded]]
+    next_cell = np.abs(cell[beside] - cell[index[loaded]]) == 1
+    return np.stack([loaded, np.where(same & next_cell & ~state.active[beside], beside, -1)])
+
+
+def _smooth_tangent(H, state: ContactState, index, ends) -> float:
+    """Slope of the load over the common approach of the candidates `index` [N/m]."""
+    first, last = np.split(ends[0], 2)
+    alone = np.tile(first == last, 2)[ends[1] >= 0]
+    loaded, beside = ends[:, ends[1] >= 0]
+    lower = factor(H[np.ix_(index, index)])
+    columns = np.zeros((len(index), 1 + 2 * len(loaded)))
+    columns[:, 0] = 1.0
+    columns[loaded, 1 + np.arange(len(loaded))] = 1.0
+    columns[:, 1 + len(loaded) :] = H[np.ix_(index, beside)]
+    half = forward(lower, columns)
+    one, unit, reach = half[:, 0], half[:, 1 : 1 + len(loaded)], half[:, 1 + len(loaded) :]
+    rate, closing = one @ unit, 1.0 - one @ reach
+    # what the slope loses without the last cell, and gains with the next one
+    lost = np.where(alone, 0.0, rate**2 / (unit**2).sum(axis=0))
+    gained = closing**2 / (H[beside, beside] - (reach**2).sum(axis=0))
+    come, left = state.loads[index[loaded]] * closing, state.gaps[beside] * rate
+    usable = (closing > 0) & (rate > 0) & (come + left > 0)
+    share = np.divide(come, come + left, out=np.full(len(come), 0.5), where=usable)
+    change = 0.5 * (share * gained - (1.0 - share) * lost)
+    return float(one @ one + change[usable].sum())

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import GridError
+from femgear.fe.elasticity import symmetric_lu
 
 
 @dataclass(frozen=True)
@@ -48,19 +49,15 @@ class SectorSchur:
 
 
 def symmetric_factor(matrix):
-    """Sparse LU of a symmetric matrix in SuperLU's symmetric mode.
+    """Sparse LU of the stiffness of a sector, see `elasticity.symmetric_lu`.
 
     Raises
     ------
     GridError
         When the matrix is singular: the body can move without straining.
     """
-    from scipy.sparse.linalg import splu
-
     try:
-        return splu(
-            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
+        return symmetric_lu(matrix)
     except RuntimeError as error:
         raise GridError(
             f"the stiffness matrix of a sector is singular ({error})",

@@ -1,8 +1,8 @@
-"""Plane linear elasticity on six-node triangles: material, stiffness, mass, loads and checks.
+"""Plane linear elasticity on six-node triangles: material, stiffness, mass, loads, checked solutions.
 
-Degrees of freedom are numbered ``2 * node + component`` (x 0, y 1) in the node numbers of the grid.
-
-What the sparse solver does not check: supports before a solve; equilibrium and energy after it.
+Degrees of freedom are numbered ``2 * node + component`` (x 0, y 1) in the node numbers of the grid. The
+sparse solver checks neither supports before a solve nor equilibrium and energy after it: `checked_solve`
+does.
 """
 
 from __future__ import annotations
@@ -14,167 +14,6 @@ import numpy as np
 
 from femgear.errors import CaseError, FemgearError, GridError
 from femgear.fe.grid import Grid, boundary_edges
-
-
-def rank_check(grid: Grid, fixed, *, springs=None) -> None:
-    """Refuse a body, or a loose part of one, that can move without straining.
-
-    Parameters
-    ----------
-    grid : Grid
-    fixed : (k,) int array
-        Degrees of freedom held.
-    springs : sparse array, shape (2n, 2n), optional
-        Further stiffness to ground, such as `foundation`.
-
-    Raises
-    ------
-    GridError
-        Saying which part can move, and how.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    n = grid.n_nodes
-    pairs = grid.triangles[:, [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5]]].reshape(-1, 2)
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    count, part = connected_components(links, directed=False)
-    held = np.zeros((2 * n,), dtype=bool)
-    held[np.asarray(fixed, dtype=int)] = True
-    for k in range(count):
-        mine = part == k
-        centre = 0.5 * (grid.points[mine].min(axis=0) + grid.points[mine].max(axis=0))
-        size = max(np.ptp(grid.points[mine], axis=0).max(), np.finfo(float).tiny)
-        motions = np.zeros((n, 2, 3))
-        motions[mine, 0, 0] = motions[mine, 1, 1] = 1.0
-        motions[mine, 0, 2] = -(grid.points[mine, 1] - centre[1]) / size
-        motions[mine, 1, 2] = (grid.points[mine, 0] - centre[0]) / size
-        motions = motions.reshape(-1, 3)
-        reaction = motions[held].T @ motions[held]
-        if springs is not None:
-            ground = motions.T @ (springs @ motions)
-            reaction = reaction + ground / max(np.abs(ground).max(), np.finfo(float).tiny)
-        value, vector = np.linalg.eigh(reaction)
-        if value[0] <= 1e-10 * max(value[-1], 1e-300):
-            raise GridError(
-                f"part {k + 1} of {count} of the body, {np.count_nonzero(mine)} nodes around "
-                f"({centre[0]:.6g}, {centre[1]:.6g}) m, can {_motion(vector[:, 0], centre, size)}",
-                code="E-GRID-FREE",
-                limit="at least three independent supports for each part",
-                remedy="hold its bore or rim, or join it to a part that is held",
-            )
-
-
-def _motion(vector, centre, size):
-    x, y, turn = vector[0], vector[1], vector[2] / size
-    if abs(turn) * size < 1e-6 * np.hypot(x, y):
-        return f"move along ({x:.3f}, {y:.3f})"
-    pivot = size * np.round((centre + np.array([-y, x]) / turn) / size, 9) + 0.0
-    return f"turn about ({pivot[0]:.6g}, {pivot[1]:.6g}) m"
-
-
-def check_solution(K, u, f, *, fixed=(), tolerance: float = 1e-6) -> float:
-    """Refuse a solution of ``K u = f`` that is not one; return its relative residual.
-
-    Parameters
-    ----------
-    K : sparse array, shape (n, n)
-    u, f : (n,) or (n, m) arrays
-    fixed : (k,) int array
-        Degrees of freedom that were prescribed; their equations give the reactions.
-    tolerance : float
-        Largest residual relative to the load and the forces of the prescribed motions.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    FemgearError
-        When numbers are not finite, equilibrium is missed, or strain energy is negative.
-    """
-    u, f = (np.atleast_2d(np.asarray(a, dtype=float).T).T for a in (u, f))
-    if not (np.isfinite(u).all() and np.isfinite(f).all()):
-        raise FemgearError("the load or the solution holds numbers that are not finite", code="E-SOLVE-NAN")
-    free = np.ones(K.shape[0], dtype=bool)
-    free[np.asarray(fixed, dtype=int)] = False
-    driven = np.where(free[:, None], 0.0, u)
-    scale = np.linalg.norm((f - K @ driven)[free], axis=0)
-    forces = K @ u
-    miss = np.linalg.norm((forces - f)[free], axis=0)
-    relative = float(np.max(miss / np.where(scale > 0, scale, 1.0), initial=0.0))
-    if not relative <= tolerance:
-        raise FemgearError(
-            f"the solution misses equilibrium: relative residual {relative:.2e}",
-            code="E-SOLVE-RESIDUAL",
-            limit=f"{tolerance:g}",
-            remedy="check that every part of the body is held and that the material data are sensible",
-        )
-    energy = (u * forces).sum(axis=0)
-    size = (np.abs(u) * np.abs(forces)).sum(axis=0)
-    if np.any(energy < -1e-9 * size):
-        raise FemgearError(
-            f"the strain energy is negative ({0.5 * energy.min():.3e} J)",
-            code="E-SOLVE-ENERGY",
-            limit=">= 0 J",
-        )
-    return relative
-
-
-def checked_solve(grid: Grid, K, f, *, fixed, values=0.0, springs=None) -> np.ndarray:
-    """Solve ``K u = f`` with prescribed displacements, checking rank before and equilibrium after.
-
-    Parameters
-    ----------
-    grid : Grid
-    K : sparse array, shape (2n, 2n)
-        All stiffness, `springs` included.
-    f : (2n,) or (2n, m) array
-        Loads [N].
-    fixed : (k,) int array
-        Prescribed degrees of freedom.
-    values : float or (k,) array
-        Their displacement [m].
-    springs : sparse array, optional
-        The part of `K` that ties the body to ground, see `rank_check`.
-
-    Returns
-    -------
-    array of the shape of `f`
-        Displacements [m].
-
-    Raises
-    ------
-    GridError
-        When a part of the body is free to move.
-    FemgearError
-        When the solution fails `check_solution`.
-    """
-    rank_check(grid, fixed, springs=springs)
-    f = np.asarray(f, dtype=float)
-    if not np.isfinite(f).all():
-        raise FemgearError("the load holds numbers that are not finite", code="E-SOLVE-NAN")
-    free = np.ones(K.shape[0], dtype=bool)
-    free[np.asarray(fixed, dtype=int)] = False
-    u = np.zeros(f.shape)
-    u[np.asarray(fixed, dtype=int)] = np.reshape(values, np.shape(values) + (1,) * (f.ndim - 1))
-    K = K.tocsc()
-    factor = _factor(K[free][:, free].tocsc())
-    u[free] = factor.solve((f - K @ u)[free])
-    check_solution(K, u, f, fixed=fixed)
-    return u
-
-
-def _factor(K):
-    from scipy.sparse.linalg import splu
-
-    options = {"SymmetricMode": True}
-    try:
-        return splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    except RuntimeError as error:
-        raise FemgearError(f"the stiffness matrix is singular: {error}", code="E-SOLVE-SINGULAR") from error
-
 
 STATES = ("plane strain", "plane stress")
 
@@ -323,18 +162,6 @@ def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness
     return 0.5 * (K + K.T).tocsc()
 
 
-def _xx(u, v, w):
-    return (w.lam + 2 * w.mu) * u.grad[0] * v.grad[0] + w.mu * u.grad[1] * v.grad[1]
-
-
-def _yy(u, v, w):
-    return (w.lam + 2 * w.mu) * u.grad[1] * v.grad[1] + w.mu * u.grad[0] * v.grad[0]
-
-
-def _xy(u, v, w):
-    return w.lam * u.grad[1] * v.grad[0] + w.mu * u.grad[0] * v.grad[1]
-
-
 def mass(grid: Grid, material: Material, thickness=1.0):
     """Consistent mass matrix, shape (2n, 2n) [kg]; arguments as in `stiffness`."""
     from scipy.sparse import csc_array
@@ -354,10 +181,6 @@ def mass(grid: Grid, material: Material, thickness=1.0):
         ),
         shape=(size, size),
     )
-
-
-def _by_region(value):
-    return dict(value) if isinstance(value, Mapping) else {None: value}
 
 
 def per_element(grid: Grid, value) -> np.ndarray:
@@ -388,17 +211,6 @@ def per_element(grid: Grid, value) -> np.ndarray:
             limit="all of " + ", ".join(sorted(grid.regions)),
         )
     return result
-
-
-def _edge_quadrature(grid, name):
-    """Nodes (k, 3), shape values (3, q), positions (k, q, 2) and tangents times weight (k, q, 2)."""
-    edges = boundary_edges(grid, name)
-    s, weight = np.polynomial.legendre.leggauss(4)
-    shape = np.array([0.5 * s * (s - 1), 0.5 * s * (s + 1), 1 - s**2])
-    slope = np.array([s - 0.5, s + 0.5, -2 * s])
-    x = np.einsum("iq,kic->kqc", shape, grid.points[edges])
-    tangent = np.einsum("iq,kic->kqc", slope, grid.points[edges]) * weight[:, None]
-    return edges, shape, x, tangent
 
 
 def edge_load(grid: Grid, boundary: str, traction, *, thickness: float = 1.0) -> np.ndarray:
@@ -500,3 +312,191 @@ def stress(grid: Grid, material: Material, displacement, *, state: str) -> np.nd
     return np.stack(
         [spread + 2 * mu * gradient[..., 0, 0], spread + 2 * mu * gradient[..., 1, 1], shear], axis=-1
     )
+
+
+def _xx(u, v, w):
+    return (w.lam + 2 * w.mu) * u.grad[0] * v.grad[0] + w.mu * u.grad[1] * v.grad[1]
+
+
+def _yy(u, v, w):
+    return (w.lam + 2 * w.mu) * u.grad[1] * v.grad[1] + w.mu * u.grad[0] * v.grad[0]
+
+
+def _xy(u, v, w):
+    return w.lam * u.grad[1] * v.grad[0] + w.mu * u.grad[0] * v.grad[1]
+
+
+def _by_region(value):
+    return dict(value) if isinstance(value, Mapping) else {None: value}
+
+
+def _edge_quadrature(grid, name):
+    """Nodes (k, 3), shape values (3, q), positions (k, q, 2) and tangents times weight (k, q, 2)."""
+    edges = boundary_edges(grid, name)
+    s, weight = np.polynomial.legendre.leggauss(4)
+    shape = np.array([0.5 * s * (s - 1), 0.5 * s * (s + 1), 1 - s**2])
+    slope = np.array([s - 0.5, s + 0.5, -2 * s])
+    x = np.einsum("iq,kic->kqc", shape, grid.points[edges])
+    tangent = np.einsum("iq,kic->kqc", slope, grid.points[edges]) * weight[:, None]
+    return edges, shape, x, tangent
+
+
+def checked_solve(grid: Grid, K, f, *, fixed, values=0.0, springs=None) -> np.ndarray:
+    """Solve ``K u = f`` with prescribed displacements, checking rank before and equilibrium after.
+
+    Parameters
+    ----------
+    grid : Grid
+    K : sparse array, shape (2n, 2n)
+        All stiffness, `springs` included.
+    f : (2n,) or (2n, m) array
+        Loads [N].
+    fixed : (k,) int array
+        Prescribed degrees of freedom.
+    values : float or (k,) array
+        Their displacement [m].
+    springs : sparse array, optional
+        The part of `K` that ties the body to ground, see `rank_check`.
+
+    Returns
+    -------
+    array of the shape of `f`
+        Displacements [m].
+
+    Raises
+    ------
+    GridError
+        When a part of the body is free to move.
+    FemgearError
+        When the solution fails `check_solution`.
+    """
+    rank_check(grid, fixed, springs=springs)
+    f = np.asarray(f, dtype=float)
+    if not np.isfinite(f).all():
+        raise FemgearError("the load holds numbers that are not finite", code="E-SOLVE-NAN")
+    free = np.ones(K.shape[0], dtype=bool)
+    free[np.asarray(fixed, dtype=int)] = False
+    u = np.zeros(f.shape)
+    u[np.asarray(fixed, dtype=int)] = np.reshape(values, np.shape(values) + (1,) * (f.ndim - 1))
+    K = K.tocsc()
+    try:
+        factor = symmetric_lu(K[free][:, free])
+    except RuntimeError as error:
+        raise FemgearError(f"the stiffness matrix is singular: {error}", code="E-SOLVE-SINGULAR") from error
+    u[free] = factor.solve((f - K @ u)[free])
+    check_solution(K, u, f, fixed=fixed)
+    return u
+
+
+def symmetric_lu(matrix):
+    """Sparse LU of a symmetric matrix in SuperLU's symmetric mode; RuntimeError where it is singular."""
+    from scipy.sparse.linalg import splu
+
+    options = {"SymmetricMode": True}
+    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+
+
+def rank_check(grid: Grid, fixed, *, springs=None) -> None:
+    """Refuse a body, or a loose part of one, that can move without straining.
+
+    Parameters
+    ----------
+    grid : Grid
+    fixed : (k,) int array
+        Degrees of freedom held.
+    springs : sparse array, shape (2n, 2n), optional
+        Further stiffness to ground, such as `foundation`.
+
+    Raises
+    ------
+    GridError
+        Saying which part can move, and how.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = grid.n_nodes
+    pairs = grid.triangles[:, [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5]]].reshape(-1, 2)
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    count, part = connected_components(links, directed=False)
+    held = np.zeros((2 * n,), dtype=bool)
+    held[np.asarray(fixed, dtype=int)] = True
+    for k in range(count):
+        mine = part == k
+        centre = 0.5 * (grid.points[mine].min(axis=0) + grid.points[mine].max(axis=0))
+        size = max(np.ptp(grid.points[mine], axis=0).max(), np.finfo(float).tiny)
+        motions = np.zeros((n, 2, 3))
+        motions[mine, 0, 0] = motions[mine, 1, 1] = 1.0
+        motions[mine, 0, 2] = -(grid.points[mine, 1] - centre[1]) / size
+        motions[mine, 1, 2] = (grid.points[mine, 0] - centre[0]) / size
+        motions = motions.reshape(-1, 3)
+        reaction = motions[held].T @ motions[held]
+        if springs is not None:
+            ground = motions.T @ (springs @ motions)
+            reaction = reaction + ground / max(np.abs(ground).max(), np.finfo(float).tiny)
+        value, vector = np.linalg.eigh(reaction)
+        if value[0] <= 1e-10 * max(value[-1], 1e-300):
+            raise GridError(
+                f"part {k + 1} of {count} of the body, {np.count_nonzero(mine)} nodes around "
+                f"({centre[0]:.6g}, {centre[1]:.6g}) m, can {_motion(vector[:, 0], centre, size)}",
+                code="E-GRID-FREE",
+                limit="at least three independent supports for each part",
+                remedy="hold its bore or rim, or join it to a part that is held",
+            )
+
+
+def check_solution(K, u, f, *, fixed=(), tolerance: float = 1e-6) -> float:
+    """Refuse a solution of ``K u = f`` that is not one; return its relative residual.
+
+    Parameters
+    ----------
+    K : sparse array, shape (n, n)
+    u, f : (n,) or (n, m) arrays
+    fixed : (k,) int array
+        Degrees of freedom that were prescribed; their equations give the reactions.
+    tolerance : float
+        Largest residual relative to the load and the forces of the prescribed motions.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    FemgearError
+        When numbers are not finite, equilibrium is missed, or strain energy is negative.
+    """
+    u, f = (np.atleast_2d(np.asarray(a, dtype=float).T).T for a in (u, f))
+    if not (np.isfinite(u).all() and np.isfinite(f).all()):
+        raise FemgearError("the load or the solution holds numbers that are not finite", code="E-SOLVE-NAN")
+    free = np.ones(K.shape[0], dtype=bool)
+    free[np.asarray(fixed, dtype=int)] = False
+    driven = np.where(free[:, None], 0.0, u)
+    scale = np.linalg.norm((f - K @ driven)[free], axis=0)
+    forces = K @ u
+    miss = np.linalg.norm((forces - f)[free], axis=0)
+    relative = float(np.max(miss / np.where(scale > 0, scale, 1.0), initial=0.0))
+    if not relative <= tolerance:
+        raise FemgearError(
+            f"the solution misses equilibrium: relative residual {relative:.2e}",
+            code="E-SOLVE-RESIDUAL",
+            limit=f"{tolerance:g}",
+            remedy="check that every part of the body is held and that the material data are sensible",
+        )
+    energy = (u * forces).sum(axis=0)
+    size = (np.abs(u) * np.abs(forces)).sum(axis=0)
+    if np.any(energy < -1e-9 * size):
+        raise FemgearError(
+            f"the strain energy is negative ({0.5 * energy.min():.3e} J)",
+            code="E-SOLVE-ENERGY",
+            limit=">= 0 J",
+        )
+    return relative
+
+
+def _motion(vector, centre, size):
+    x, y, turn = vector[0], vector[1], vector[2] / size
+    if abs(turn) * size < 1e-6 * np.hypot(x, y):
+        return f"move along ({x:.3f}, {y:.3f})"
+    pivot = size * np.round((centre + np.array([-y, x]) / turn) / size, 9) + 0.0
+    return f"turn about ({pivot[0]:.6g}, {pivot[1]:.6g}) m"

@@ -1,6 +1,6 @@
-"""Second-order triangle grids: the data, mirror images, rotated copies and checks.
+"""Second-order triangle grids: the data, mirror images, rotated copies, checks, and files.
 
-Grids in files: written whole and with a checksum, read with suspicion.
+Files are written whole and with a checksum, and read with suspicion.
 """
 
 from __future__ import annotations
@@ -49,12 +49,6 @@ class Grid:
     def n_nodes(self) -> int:
         """Number of nodes, corners and mid-side nodes together."""
         return len(self.points)
-
-
-def _read_only(value, dtype):
-    array = np.array(value, dtype=dtype)
-    array.setflags(write=False)
-    return array
 
 
 def ordered_nodes(grid: Grid, name: str) -> np.ndarray:
@@ -144,16 +138,6 @@ def mirror(
     return Grid(points, triangles, boundaries, regions)
 
 
-def _both_halves(boundaries, image, joined):
-    result = {}
-    for name, left in boundaries.items():
-        right = image[left][::-1, [1, 0, 2]]
-        result[f"{name}_left"], result[f"{name}_right"] = left, right
-        if name in joined:
-            result[name] = np.vstack([right, left] if right[-1, 1] == left[0, 0] else [left, right])
-    return result
-
-
 def copy_nodes(grid: Grid, count: int) -> np.ndarray:
     """Node numbers of every sector in the whole body that `rotated_copies` makes.
 
@@ -228,11 +212,6 @@ def rotated_copies(grid: Grid, count: int) -> Grid:
     shift = len(grid.triangles) * np.arange(count)[:, None]
     regions = {name: (elements + shift).ravel() for name, elements in grid.regions.items()}
     return Grid(points, triangles, boundaries, regions)
-
-
-def _turn(points, angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return points @ np.array([[c, s], [-s, c]])
 
 
 def jacobian_bounds(grid: Grid) -> np.ndarray:
@@ -352,28 +331,6 @@ def write_grid(path, grid: Grid, *, point_data: dict[str, np.ndarray] | None = N
         raise StorageError(f"cannot write the grid {path}: {error}", code="E-GRID-WRITE") from error
 
 
-def _three_components(value):
-    value = np.asarray(value, dtype=float)
-    return np.column_stack([value, np.zeros(len(value))]) if value.shape[1:] == (2,) else value
-
-
-def _seal(path):
-    """Append the SHA-256 of everything before it, in a section of comments that other readers skip."""
-    data = path.read_bytes()
-    path.write_bytes(data + _seal_of(data))
-
-
-def _seal_of(data):
-    return f"$Comments\nsha256 {hashlib.sha256(data).hexdigest()}\n$EndComments\n".encode()
-
-
-def _check_seal(path):
-    data = Path(path).read_bytes()
-    start = data.rfind(b"$Comments\n")
-    if start < 0 or data[start:] != _seal_of(data[:start]):
-        raise ValueError("its checksum is missing or is not that of its contents")
-
-
 def read_grid(path) -> Grid:
     """Read a grid that `write_grid` has written as ``.msh``.
 
@@ -410,3 +367,46 @@ def read_grid(path) -> Grid:
             remedy="delete the file; it is made again when needed",
         ) from error
     return grid
+
+
+def _read_only(value, dtype):
+    array = np.array(value, dtype=dtype)
+    array.setflags(write=False)
+    return array
+
+
+def _both_halves(boundaries, image, joined):
+    result = {}
+    for name, left in boundaries.items():
+        right = image[left][::-1, [1, 0, 2]]
+        result[f"{name}_left"], result[f"{name}_right"] = left, right
+        if name in joined:
+            result[name] = np.vstack([right, left] if right[-1, 1] == left[0, 0] else [left, right])
+    return result
+
+
+def _turn(points, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return points @ np.array([[c, s], [-s, c]])
+
+
+def _three_components(value):
+    value = np.asarray(value, dtype=float)
+    return np.column_stack([value, np.zeros(len(value))]) if value.shape[1:] == (2,) else value
+
+
+def _seal(path):
+    """Append the SHA-256 of everything before it, in a section of comments that other readers skip."""
+    data = path.read_bytes()
+    path.write_bytes(data + _seal_of(data))
+
+
+def _check_seal(path):
+    data = Path(path).read_bytes()
+    start = data.rfind(b"$Comments\n")
+    if start < 0 or data[start:] != _seal_of(data[:start]):
+        raise ValueError("its checksum is missing or is not that of its contents")
+
+
+def _seal_of(data):
+    return f"$Comments\nsha256 {hashlib.sha256(data).hexdigest()}\n$EndComments\n".encode()

@@ -1,13 +1,13 @@
-"""Tangential stress along a boundary that carries no load, as linear functionals of nodal displacements.
+"""Static displacement of whole cyclic bodies, and tangential stress along boundaries that carry no load.
 
-On a free boundary the normal and the shear stress vanish, so that the tangential stress is ``E' eps_t`` with
-``E' = E`` in plane stress and ``E / (1 - nu^2)`` in plane strain (Timoshenko and Goodier, "Theory of
-Elasticity", 3rd ed., section 16). The tangential strain ``eps_t = t . du/ds`` is that of the boundary edges.
-Along a six-node edge the derivative of the displacement is one order more accurate at the two Gauss points
-than elsewhere (Barlow, "Optimal stress locations in finite element models", Int. J. Numer. Meth. Eng. 10,
-1976); values at the vertices are interpolated from those by a cubic over the arc length.
-
-Displacement of a whole cyclic body under loads on any of its sectors, from one sector.
+The displacement of all sectors follows from one of them (`cyclic_displacement`). The stress is a linear
+functional of nodal displacements: on a free boundary the normal and the shear stress vanish, so that the
+tangential stress is ``E' eps_t`` with ``E' = E`` in plane stress and ``E / (1 - nu^2)`` in plane strain
+(Timoshenko and Goodier, "Theory of Elasticity", 3rd ed., section 16). The tangential strain ``eps_t = t .
+du/ds`` is that of the boundary edges. Along a six-node edge the derivative of the displacement is one order
+more accurate at the two Gauss points than elsewhere (Barlow, "Optimal stress locations in finite element
+models", Int. J. Numer. Meth. Eng. 10, 1976); values at the vertices are interpolated from those by a cubic
+over the arc length.
 """
 
 from __future__ import annotations
@@ -95,6 +95,53 @@ def plane_modulus(material: Material, state: str) -> float:
     return 4.0 * mu * (lam + mu) / (lam + 2.0 * mu)
 
 
+def cyclic_displacement(grid, stiffness, loads, *, held) -> np.ndarray:
+    """Static displacement of every sector in its own frame.
+
+    The loads are transformed over the sectors, each harmonic is solved on the sector with its cuts tied
+    (see `femgear.fe.compliance`), and the solutions are transformed back.
+
+    Parameters
+    ----------
+    grid : Grid
+        Sector with boundaries ``cut_left``, ``cut_right`` and `held`.
+    stiffness : (2n, 2n) sparse matrix
+        [N/m].
+    loads : (count, 2n) array
+        Nodal forces of each sector in its own frame [N].
+    held : str or None
+        Boundary that cannot move.
+
+    Returns
+    -------
+    (count, n, 2) array
+        [m].
+    """
+    count, size = loads.shape
+    inner, right, left = split_sector(grid, held)
+    cut = np.concatenate([right, left])
+    stiffness = stiffness.tocsc()
+    K_ib = stiffness[inner][:, cut].toarray()
+    harmonics = np.fft.rfft(loads, axis=0)
+    n_h, nb = len(harmonics), len(right)
+    forces = harmonics[:, inner].T
+    solved = symmetric_factor(stiffness[inner][:, inner]).solve(np.hstack([K_ib, forces.real, forces.imag]))
+    X_b, X_f = solved[:, : 2 * nb], solved[:, 2 * nb : 2 * nb + n_h] + 1j * solved[:, 2 * nb + n_h :]
+    S = stiffness[cut][:, cut].toarray() - K_ib.T @ X_b
+    on_cut = harmonics[:, cut] - (K_ib.T @ X_f).T
+    tie = np.empty((n_h, 2 * nb, nb), complex)
+    tie[:, :nb] = np.eye(nb)
+    phase = np.exp(2j * np.pi * np.arange(n_h) / count)
+    tie[:, nb:] = phase[:, None, None] * cut_rotation(count, nb)
+    adjoint = tie.conj().transpose(0, 2, 1)
+    u_right = np.linalg.solve(adjoint @ S @ tie, (adjoint @ on_cut[:, :, None]))
+    u_cut = (tie @ u_right)[:, :, 0]
+    field = np.zeros((n_h, size), complex)
+    field[:, inner] = (X_f - X_b @ u_cut.T).T
+    field[:, cut] = u_cut
+    return np.fft.irfft(field, n=count, axis=0).reshape(count, -1, 2)
+
+
 def _chain(grid: Grid, names) -> np.ndarray:
     """Edges of consecutive boundaries (k, 3): start, end, mid."""
     edges = np.vstack([boundary_edges(grid, name) for name in names])
@@ -146,50 +193,3 @@ def _cubic(known, wanted) -> np.ndarray:
     result = np.zeros((len(wanted), len(known)))
     np.put_along_axis(result, index, weight, axis=1)
     return result
-
-
-def cyclic_displacement(grid, stiffness, loads, *, held) -> np.ndarray:
-    """Static displacement of every sector in its own frame.
-
-    The loads are transformed over the sectors, each harmonic is solved on the sector with its cuts tied
-    (see `femgear.fe.compliance`), and the solutions are transformed back.
-
-    Parameters
-    ----------
-    grid : Grid
-        Sector with boundaries ``cut_left``, ``cut_right`` and `held`.
-    stiffness : (2n, 2n) sparse matrix
-        [N/m].
-    loads : (count, 2n) array
-        Nodal forces of each sector in its own frame [N].
-    held : str or None
-        Boundary that cannot move.
-
-    Returns
-    -------
-    (count, n, 2) array
-        [m].
-    """
-    count, size = loads.shape
-    inner, right, left = split_sector(grid, held)
-    cut = np.concatenate([right, left])
-    stiffness = stiffness.tocsc()
-    K_ib = stiffness[inner][:, cut].toarray()
-    harmonics = np.fft.rfft(loads, axis=0)
-    n_h, nb = len(harmonics), len(right)
-    forces = harmonics[:, inner].T
-    solved = symmetric_factor(stiffness[inner][:, inner]).solve(np.hstack([K_ib, forces.real, forces.imag]))
-    X_b, X_f = solved[:, : 2 * nb], solved[:, 2 * nb : 2 * nb + n_h] + 1j * solved[:, 2 * nb + n_h :]
-    S = stiffness[cut][:, cut].toarray() - K_ib.T @ X_b
-    on_cut = harmonics[:, cut] - (K_ib.T @ X_f).T
-    tie = np.empty((n_h, 2 * nb, nb), complex)
-    tie[:, :nb] = np.eye(nb)
-    phase = np.exp(2j * np.pi * np.arange(n_h) / count)
-    tie[:, nb:] = phase[:, None, None] * cut_rotation(count, nb)
-    adjoint = tie.conj().transpose(0, 2, 1)
-    u_right = np.linalg.solve(adjoint @ S @ tie, (adjoint @ on_cut[:, :, None]))
-    u_cut = (tie @ u_right)[:, :, 0]
-    field = np.zeros((n_h, size), complex)
-    field[:, inner] = (X_f - X_b @ u_cut.T).T
-    field[:, cut] = u_cut
-    return np.fft.irfft(field, n=count, axis=0).reshape(count, -1, 2)

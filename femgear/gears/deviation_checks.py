@@ -24,6 +24,11 @@ if TYPE_CHECKING:
     from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
 
+LONGEST_SEARCH = 4096
+"""Mesh periods that are searched for the least play."""
+LEAST_COVERAGE = 0.5
+"""Part of a flank that a measured profile should cover; beyond its ends it is constant."""
+
 
 def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[GeometryWarning, ...]:
     """Refuse deviations that do not belong to the set, and list what deserves a warning.
@@ -60,10 +65,6 @@ def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> 
         _check_sum(flank, form, gear)
         found += _short_profiles(flank, form, gear)
     return (*found, *_wedging(d, s))
-
-
-LONGEST_SEARCH = 4096
-"""Mesh periods that are searched for the least play."""
 
 
 def least_play(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[float, float]:
@@ -107,10 +108,6 @@ def _thickest(d: SetDeviations, s: PlanetarySet, kind: int, *, back: bool) -> fl
     gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
     rolls = [np.linspace(gear.form_roll, gear.tip_roll, 101) for gear in gears]
     return float(profile_separation(d, s, kind, rolls[0][:, None], rolls[1][None, :], back=back).min())
-
-
-LEAST_COVERAGE = 0.5
-"""Part of a flank that a measured profile should cover; beyond its ends it is constant."""
 
 
 def _short_profiles(flank: str, form: FlankForm, gear: Gear):

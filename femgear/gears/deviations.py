@@ -2,15 +2,14 @@
 
 All separations are in metres along the flank normal, positive where material is missing or flanks stand
 further apart; they add to the gap of the contact problem. Loaded flanks are those of a positive sun torque:
-left of the sun on left of the planet ("sun side"), right of the planet ("ring side") on left of the ring.
+left of the sun on left of the planet ("sun side"), right of the planet ("ring side") on left of the ring; a
+negative torque loads the flanks that the mirror image of the set has there (`mirrored_deviations`).
 
 Teeth are numbered counter-clockwise; tooth 0 of a gear is the one whose centre `kinematics.orientations`
 gives: of the sun and of every planet a tooth that touches at the pitch point of its mesh "sun-planet" at the
 position ``-phi``, of the ring one that touches at the pitch point of "planet 1-ring" there. A displacement
 ``u`` of a body changes the separation by its component along the line of action: involute flanks are parallel
 curves, so this is exact to first order (the next term is ``u^2`` over the centre distance).
-
-Deviations of a set as its mirror image has them: the flanks that a negative torque loads.
 """
 
 from __future__ import annotations
@@ -30,6 +29,14 @@ if TYPE_CHECKING:
 
 LONGEST_RECORD = 256
 """Mesh periods that a record spans at most unless told otherwise."""
+_ARRAYS = (
+    "sun_pitch",
+    "planet_pitch",
+    "planet_ring_side_pitch",
+    "ring_pitch",
+    "pin_errors",
+    "planet_thickness",
+)
 
 
 @dataclass(frozen=True)
@@ -134,16 +141,6 @@ class SetDeviations:
             or self.ovality.amplitude
             or np.ptp(self.planet_thickness)
         )
-
-
-_ARRAYS = (
-    "sun_pitch",
-    "planet_pitch",
-    "planet_ring_side_pitch",
-    "ring_pitch",
-    "pin_errors",
-    "planet_thickness",
-)
 
 
 def no_deviations(planetary_set: PlanetarySet) -> SetDeviations:

@@ -1,8 +1,8 @@
-"""Mesh stiffness after ISO 6336-1, method B: a check of computed stiffness, not an input to it.
+"""Mesh stiffness and nominal tooth stresses after ISO 6336, beside what is computed.
 
-Nominal stresses after ISO 6336 for orientation: sigma_H0 (part 2) and sigma_F0 (part 3, method B).
-
-Spur gears with tooth contact factors only: no application, dynamic or face load factors. Formulas are those
+The stiffness of part 1, method B, is a check of computed stiffness, not an input to it. Stresses are for
+orientation: sigma_H0 (part 2) and sigma_F0 (part 3, method B) of spur
+gears with tooth contact factors only: no application, dynamic or face load factors. Their formulas are those
 of ISO 6336-2:2006 and ISO 6336-3:2006; for contact ratios of two and above the later factor f_eps of
 ISO 6336-3:2019 is not applied. In the formulas here teeth and diameters of internal gears are negative and
 profile shifts have the sign of the standard, which for internal gears is minus that of `gear.Gear`.

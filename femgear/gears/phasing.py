@@ -1,7 +1,8 @@
 """Mesh phases of planets and what they make of the harmonics of the mesh frequency.
 
 Planets stand at assembly positions, whole multiples m_n of ``2 pi / Z`` from the first, ``Z = z_s + z_r``, so
-that every phase is a ratio of whole numbers and every sum over the planets is exact.
+that every phase is a ratio of whole numbers and every sum over the planets is exact. The sums tell which
+resultants the planets cancel, and which modes a harmonic can excite (`phasing_table`).
 
 Two conventions for the phases gamma_j, in mesh periods; the force or error of mesh j in harmonic h has the
 factor ``exp(2 pi i h gamma_j)``:
@@ -11,8 +12,6 @@ factor ``exp(2 pi i h gamma_j)``:
   J. Lin, J. Mech. Des. 126, 2004, 365-370). At assembly positions both are equal but for the lag of a planet.
 * ``"printed"``: ``+z_s psi_n / 2 pi`` and ``+z_r psi_n / 2 pi``, Eq. (6) of A. Kahraman, J. Mech. Des. 116,
   1994, 713-720. What sun meshes excite then travels round the other way than what ring meshes excite.
-
-Which resultants the planets cancel, and which modes a harmonic of the mesh frequency can excite.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears.checks import ASSEMBLY_TOLERANCE, feasible_angles
-from femgear.gears.gear import TEETH_RANGE
+from femgear.gears.gear import TEETH_RANGE, is_whole
 from femgear.gears.planetary import check_angles
 
 if TYPE_CHECKING:
@@ -34,6 +33,12 @@ if TYPE_CHECKING:
 
 CONVENTIONS = ("rotation", "printed")
 KINDS = ("in-phase", "counter-phased", "sequentially phased", "unequally phased")
+MEMBERS = ("sun", "ring", "carrier")
+RESULTANTS = ("torque", "lateral force", "thrust", "tilting moment")
+PLANET_RESULTANTS = ("torque", "tangential force", "radial force", "thrust", "tilting moment")
+MODES = ("rotational", "translational", "planet")
+ZERO = 1e-9
+"""Share of the mesh forces below which a sum counts as cancelled."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ class MeshPhasing:
     lag: float = 0.0
 
     def __post_init__(self):
-        _check(self)
+        _check_phasing(self)
         object.__setattr__(self, "positions", tuple(int(m) for m in self.positions))
 
     @property
@@ -163,18 +168,6 @@ def mesh_phasing(
     return MeshPhasing(sun_teeth, ring_teeth, positions, rotation, flank, convention, lag)
 
 
-def _angles(planet_angles) -> tuple[float, ...]:
-    try:
-        angles = tuple(float(a) for a in planet_angles)
-    except (TypeError, ValueError):
-        raise GeometryError(
-            f"planet angles {planet_angles!r}", code="E-ANGLES", key="set.planet_angles",
-            limit="a sequence of numbers [rad], one a planet", remedy="for instance equal_planet_angles(3)",
-        ) from None  # fmt: skip
-    check_angles(angles)
-    return angles
-
-
 def phasing_of_set(
     planetary_set: PlanetarySet, *, rotation: int = 1, flank: int = 1, convention: str = "rotation"
 ) -> MeshPhasing:
@@ -206,7 +199,7 @@ def standard_lag(planet_teeth: int) -> float:
     GeometryError
         No whole number of teeth that a gear can have (E-PHASING).
     """
-    if not _whole(planet_teeth) or not TEETH_RANGE[0] <= planet_teeth <= TEETH_RANGE[1]:
+    if not is_whole(planet_teeth) or not TEETH_RANGE[0] <= planet_teeth <= TEETH_RANGE[1]:
         raise GeometryError(
             f"the lag of a planet with {planet_teeth!r} teeth", code="E-PHASING", value=planet_teeth,
             limit=f"a whole number, {TEETH_RANGE[0]} to {TEETH_RANGE[1]}",
@@ -274,52 +267,6 @@ def cyclic_harmonic(phasing: MeshPhasing, harmonics) -> np.ndarray:
     return np.mod(harmonics * phasing.sun_teeth, phasing.n_planets)
 
 
-def check_harmonics(harmonics) -> np.ndarray:
-    """Harmonics as whole numbers from 1, (H,); refuses others (E-HARMONICS)."""
-    found = np.atleast_1d(np.asarray(harmonics))
-    if found.ndim != 1 or not len(found) or found.dtype.kind not in "iu" or found.min() < 1:
-        raise GeometryError(
-            f"harmonics {harmonics!r} of the mesh frequency", code="E-HARMONICS",
-            limit="whole numbers from 1", remedy="for instance range(1, 7)",
-        )  # fmt: skip
-    return found.astype(np.int64)
-
-
-def _whole(value) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
-
-
-def _check(phasing: MeshPhasing) -> None:
-    p, problem = phasing, None
-    whole = (*p.positions, p.sun_teeth, p.ring_teeth, p.rotation, p.flank)
-    if not all(_whole(value) for value in whole):
-        problem = "teeth, positions, rotation and flank must be whole numbers"
-    elif not all(TEETH_RANGE[0] <= z <= TEETH_RANGE[1] for z in (p.sun_teeth, p.ring_teeth)):
-        problem = (
-            f"{p.sun_teeth} sun and {p.ring_teeth} ring teeth, allowed {TEETH_RANGE[0]} to {TEETH_RANGE[1]}"
-        )
-    elif p.ring_teeth <= p.sun_teeth:
-        problem = f"a ring of {p.ring_teeth} teeth around a sun of {p.sun_teeth}, allowed: more than the sun"
-    elif not p.positions or p.positions[0] != 0 or np.any(np.diff([*p.positions, p.teeth_sum]) <= 0):
-        problem = f"positions {p.positions}, which must ascend from 0 to less than {p.teeth_sum}"
-    elif p.rotation not in (1, -1) or p.flank not in (1, -1):
-        problem = f"rotation {p.rotation} and flank {p.flank}, allowed 1 or -1"
-    elif p.convention not in CONVENTIONS:
-        problem = f"the convention {p.convention!r}, allowed {' or '.join(CONVENTIONS)}"
-    elif not isinstance(p.lag, int | float | np.number) or not math.isfinite(p.lag):
-        problem = f"a lag of {p.lag!r} periods, allowed: a finite number"
-    if problem:
-        raise GeometryError(f"mesh phases of {problem}", code="E-PHASING", remedy="see MeshPhasing")
-
-
-MEMBERS = ("sun", "ring", "carrier")
-RESULTANTS = ("torque", "lateral force", "thrust", "tilting moment")
-PLANET_RESULTANTS = ("torque", "tangential force", "radial force", "thrust", "tilting moment")
-MODES = ("rotational", "translational", "planet")
-ZERO = 1e-9
-"""Share of the mesh forces below which a sum counts as cancelled."""
-
-
 @dataclass(frozen=True, eq=False)
 class PhasingTable:
     """What a set makes of harmonics of the mesh frequency, when the mesh forces of all planets are equal.
@@ -328,7 +275,7 @@ class PhasingTable:
     ----------
     harmonics : (H,) int array
     kind : tuple of str
-        One of `femgear.gears.phasing.KINDS` for every harmonic, the same for sun and ring meshes.
+        One of `KINDS` for every harmonic, the same for sun and ring meshes.
     cyclic : (H,) int array
         k = mod(h z_s, N); -1 for unequally spaced planets.
     sums : (H, 2, 3) complex array
@@ -399,7 +346,7 @@ def phasing_table(phasing: MeshPhasing, harmonics=range(1, 7)) -> PhasingTable:
     GeometryError
         Harmonics that are no whole numbers from 1 (E-HARMONICS).
     """
-    harmonics = _whole_phasing_tables(harmonics)
+    harmonics = _checked_harmonics(harmonics)
     turns, N = np.array(phasing.turns), phasing.n_planets
     positions = np.array([phasing.positions] * 2)
     total = np.full(2, phasing.teeth_sum)
@@ -435,7 +382,7 @@ def cyclic_shares(phasing: MeshPhasing, harmonics=range(1, 7)) -> np.ndarray:
         with k = mod(h z_s, N): which of the planet modes of `phase_shares` it can excite.
         At unequal spacing the motions overlap, and several entries differ from 0.
     """
-    harmonics, N = _whole_phasing_tables(harmonics), phasing.n_planets
+    harmonics, N = _checked_harmonics(harmonics), phasing.n_planets
     orders = np.arange(N // 2 + 1)
     size = [
         np.abs(planet_sums(turns, phasing.positions, phasing.teeth_sum, harmonics, sense * orders))
@@ -446,7 +393,39 @@ def cyclic_shares(phasing: MeshPhasing, harmonics=range(1, 7)) -> np.ndarray:
     return np.where(shares < ZERO, 0.0, shares)
 
 
-def _whole_phasing_tables(harmonics) -> np.ndarray:
+def mesh_loads(directions, phasing: MeshPhasing, harmonics) -> np.ndarray:
+    """Loads of unit mesh forces with their phases on all coordinates of a model, by family of meshes.
+
+    Parameters
+    ----------
+    directions : (n, 2N) array
+        Mesh columns of a model, such as `femgear.system.assembler.mesh_directions`.
+    phasing : MeshPhasing
+    harmonics : (H,) sequence of int
+
+    Returns
+    -------
+    (H, 2, n) complex array
+        Loads by the sun meshes and by the ring meshes.
+    """
+    directions, N = np.asarray(directions), phasing.n_planets
+    factors = phase_factors(phasing, harmonics).reshape(-1, 2, N)
+    return np.einsum("nfj,hfj->hfn", directions.reshape(len(directions), 2, N), factors)
+
+
+def check_harmonics(harmonics) -> np.ndarray:
+    """Harmonics as whole numbers from 1, (H,); refuses others (E-HARMONICS)."""
+    found = np.atleast_1d(np.asarray(harmonics))
+    if found.ndim != 1 or not len(found) or found.dtype.kind not in "iu" or found.min() < 1:
+        raise GeometryError(
+            f"harmonics {harmonics!r} of the mesh frequency", code="E-HARMONICS",
+            limit="whole numbers from 1", remedy="for instance range(1, 7)",
+        )  # fmt: skip
+    return found.astype(np.int64)
+
+
+def _checked_harmonics(harmonics) -> np.ndarray:
+    """`check_harmonics`, whose refusal tells a range by its numbers."""
     return check_harmonics(list(harmonics) if isinstance(harmonics, range) else harmonics)
 
 
@@ -481,21 +460,36 @@ def _mode_shares(factors: np.ndarray, psi: np.ndarray, size: np.ndarray) -> np.n
     return np.where(shares < ZERO, 0.0, shares)
 
 
-def mesh_loads(directions, phasing: MeshPhasing, harmonics) -> np.ndarray:
-    """Loads of unit mesh forces with their phases on all coordinates of a model, by family of meshes.
+def _angles(planet_angles) -> tuple[float, ...]:
+    try:
+        angles = tuple(float(a) for a in planet_angles)
+    except (TypeError, ValueError):
+        raise GeometryError(
+            f"planet angles {planet_angles!r}", code="E-ANGLES", key="set.planet_angles",
+            limit="a sequence of numbers [rad], one a planet", remedy="for instance equal_planet_angles(3)",
+        ) from None  # fmt: skip
+    check_angles(angles)
+    return angles
 
-    Parameters
-    ----------
-    directions : (n, 2N) array
-        Mesh columns of a model, such as `femgear.system.assembler.mesh_directions`.
-    phasing : MeshPhasing
-    harmonics : (H,) sequence of int
 
-    Returns
-    -------
-    (H, 2, n) complex array
-        Loads by the sun meshes and by the ring meshes.
-    """
-    directions, N = np.asarray(directions), phasing.n_planets
-    factors = phase_factors(phasing, harmonics).reshape(-1, 2, N)
-    return np.einsum("nfj,hfj->hfn", directions.reshape(len(directions), 2, N), factors)
+def _check_phasing(phasing: MeshPhasing) -> None:
+    p, problem = phasing, None
+    whole = (*p.positions, p.sun_teeth, p.ring_teeth, p.rotation, p.flank)
+    if not all(is_whole(value) for value in whole):
+        problem = "teeth, positions, rotation and flank must be whole numbers"
+    elif not all(TEETH_RANGE[0] <= z <= TEETH_RANGE[1] for z in (p.sun_teeth, p.ring_teeth)):
+        problem = (
+            f"{p.sun_teeth} sun and {p.ring_teeth} ring teeth, allowed {TEETH_RANGE[0]} to {TEETH_RANGE[1]}"
+        )
+    elif p.ring_teeth <= p.sun_teeth:
+        problem = f"a ring of {p.ring_teeth} teeth around a sun of {p.sun_teeth}, allowed: more than the sun"
+    elif not p.positions or p.positions[0] != 0 or np.any(np.diff([*p.positions, p.teeth_sum]) <= 0):
+        problem = f"positions {p.positions}, which must ascend from 0 to less than {p.teeth_sum}"
+    elif p.rotation not in (1, -1) or p.flank not in (1, -1):
+        problem = f"rotation {p.rotation} and flank {p.flank}, allowed 1 or -1"
+    elif p.convention not in CONVENTIONS:
+        problem = f"the convention {p.convention!r}, allowed {' or '.join(CONVENTIONS)}"
+    elif not isinstance(p.lag, int | float | np.number) or not math.isfinite(p.lag):
+        problem = f"a lag of {p.lag!r} periods, allowed: a finite number"
+    if problem:
+        raise GeometryError(f"mesh phases of {problem}", code="E-PHASING", remedy="see MeshPhasing")

@@ -1,11 +1,9 @@
-"""A planetary set: closure at one centre distance, its meshes and their phases.
+"""A planetary set: closure at one centre distance, meshes and phases, usual angles, data that make no set.
 
 Frame: the carrier's, planets at angles psi_n counter-clockwise from the x axis. Positive torque on the sun
 turns it counter-clockwise; relative to the carrier the planets and the ring then turn clockwise. Loaded
 flanks: left (counter-clockwise) of the sun on left of the planet, right of the planet on left of the ring.
 Meshes j: "sun-planet 1" .. "sun-planet N", "planet 1-ring" .. "planet N-ring".
-
-Refusals of the data of a planetary set, and the usual planet angles.
 """
 
 from __future__ import annotations
@@ -19,79 +17,10 @@ import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears import involute
-from femgear.gears.gear import Gear, working_half_angles
+from femgear.gears.gear import Gear, is_whole, working_half_angles
 
 BACKLASH_TOLERANCE = 1e-4
 """Normal backlash, in modules, that counts as none: what four decimals of profile shifts leave open."""
-
-
-def equal_planet_angles(planets: int) -> tuple[float, ...]:
-    """Angles ``2 pi n / N`` [rad] of N equally spaced planets.
-
-    Raises
-    ------
-    GeometryError
-        Not a whole number of at least one planet (E-PLANETS).
-    """
-    whole = isinstance(planets, int | np.integer) and not isinstance(planets, bool)
-    if not whole or not 1 <= planets <= 1000:
-        raise GeometryError(
-            f"a planetary set with {planets!r} planets",
-            code="E-PLANETS",
-            key="set.planets",
-            value=planets,
-            limit="a whole number, 1 to 1000",
-            remedy="three planets share the load of a set best",
-        )
-    return tuple(2.0 * math.pi * n / int(planets) for n in range(int(planets)))
-
-
-def check_roles(planetary: PlanetarySet) -> None:
-    """Refuse gears that cannot be sun, planet and ring of one set (E-ROLE, E-MODULE)."""
-    sun, planet, ring = planetary.sun, planetary.planet, planetary.ring
-    for gear, internal in ((sun, False), (planet, False), (ring, True)):
-        if gear.internal is not internal:
-            raise GeometryError(
-                f"the {gear.name} is {'an external' if internal else 'an internal'} gear",
-                code="E-ROLE",
-                key=f"{gear.name}.internal",
-                value=gear.internal,
-                limit="sun and planet external, ring internal",
-            )
-        for entry in ("module", "pressure_angle"):
-            mine, suns = getattr(gear, entry), getattr(sun, entry)
-            if abs(mine - suns) > 1e-12 * suns:
-                raise GeometryError(
-                    f"{entry.replace('_', ' ')} of the {gear.name} is {mine:.6g}, of the sun {suns:.6g}",
-                    code="E-MODULE",
-                    key=f"{gear.name}.{entry}",
-                    value=mine,
-                    limit=f"{suns:.6g}",
-                    remedy="gears that mesh share module and pressure angle",
-                )
-
-
-def check_angles(angles: tuple[float, ...]) -> None:
-    """Refuse planet angles [rad] that are none, unordered or in the wrong unit (E-PLANETS, E-ANGLES)."""
-    if not 1 <= len(angles) <= 1000:
-        equal_planet_angles(len(angles))
-    problem = None
-    if not all(math.isfinite(a) for a in angles):
-        problem = "contain a value that is not finite"
-    elif any(b - a < 1e-9 for a, b in pairwise(angles)):
-        problem = "are not in ascending order, or two of them are equal"
-    elif angles[-1] - angles[0] > 2.0 * math.pi - 1e-9:
-        problem = f"span {angles[-1] - angles[0]:.6g} rad, more than one turn (degrees taken for radians?)"
-    if problem:
-        listing = ", ".join(f"{a:.6g}" for a in angles[:12])
-        raise GeometryError(
-            f"the planet angles [{listing}] rad {problem}",
-            code="E-ANGLES",
-            key="set.planet_angles",
-            value=listing,
-            limit="ascending, different, within one turn",
-            remedy="sort the angles; the case file takes them with a unit, such as '120 deg'",
-        )
 
 
 @dataclass(frozen=True)
@@ -324,15 +253,72 @@ def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, f
     return out[0], out[1]
 
 
-def _fraction(value: np.ndarray) -> np.ndarray:
-    """Part after the decimal point, with values a rounding error under one taken as zero."""
-    part = np.mod(value, 1.0)
-    return np.where(part > 1.0 - 1e-9, 0.0, np.where(part < 1e-9, 0.0, part))
+def equal_planet_angles(planets: int) -> tuple[float, ...]:
+    """Angles ``2 pi n / N`` [rad] of N equally spaced planets.
+
+    Raises
+    ------
+    GeometryError
+        Not a whole number of at least one planet (E-PLANETS).
+    """
+    if not is_whole(planets) or not 1 <= planets <= 1000:
+        raise GeometryError(
+            f"a planetary set with {planets!r} planets",
+            code="E-PLANETS",
+            key="set.planets",
+            value=planets,
+            limit="a whole number, 1 to 1000",
+            remedy="three planets share the load of a set best",
+        )
+    return tuple(2.0 * math.pi * n / int(planets) for n in range(int(planets)))
 
 
-def _undercut_roll(gear: Gear) -> float:
-    """Roll length [m] where an undercut flank ends, minus infinity without undercut."""
-    return gear.form_roll if gear.undercut else -math.inf
+def check_angles(angles: tuple[float, ...]) -> None:
+    """Refuse planet angles [rad] that are none, unordered or in the wrong unit (E-PLANETS, E-ANGLES)."""
+    if not 1 <= len(angles) <= 1000:
+        equal_planet_angles(len(angles))
+    problem = None
+    if not all(math.isfinite(a) for a in angles):
+        problem = "contain a value that is not finite"
+    elif any(b - a < 1e-9 for a, b in pairwise(angles)):
+        problem = "are not in ascending order, or two of them are equal"
+    elif angles[-1] - angles[0] > 2.0 * math.pi - 1e-9:
+        problem = f"span {angles[-1] - angles[0]:.6g} rad, more than one turn (degrees taken for radians?)"
+    if problem:
+        listing = ", ".join(f"{a:.6g}" for a in angles[:12])
+        raise GeometryError(
+            f"the planet angles [{listing}] rad {problem}",
+            code="E-ANGLES",
+            key="set.planet_angles",
+            value=listing,
+            limit="ascending, different, within one turn",
+            remedy="sort the angles; the case file takes them with a unit, such as '120 deg'",
+        )
+
+
+def check_roles(planetary: PlanetarySet) -> None:
+    """Refuse gears that cannot be sun, planet and ring of one set (E-ROLE, E-MODULE)."""
+    sun, planet, ring = planetary.sun, planetary.planet, planetary.ring
+    for gear, internal in ((sun, False), (planet, False), (ring, True)):
+        if gear.internal is not internal:
+            raise GeometryError(
+                f"the {gear.name} is {'an external' if internal else 'an internal'} gear",
+                code="E-ROLE",
+                key=f"{gear.name}.internal",
+                value=gear.internal,
+                limit="sun and planet external, ring internal",
+            )
+        for entry in ("module", "pressure_angle"):
+            mine, suns = getattr(gear, entry), getattr(sun, entry)
+            if abs(mine - suns) > 1e-12 * suns:
+                raise GeometryError(
+                    f"{entry.replace('_', ' ')} of the {gear.name} is {mine:.6g}, of the sun {suns:.6g}",
+                    code="E-MODULE",
+                    key=f"{gear.name}.{entry}",
+                    value=mine,
+                    limit=f"{suns:.6g}",
+                    remedy="gears that mesh share module and pressure angle",
+                )
 
 
 def _working_angle(one: Gear, two: Gear, distance: float) -> float:
@@ -341,10 +327,21 @@ def _working_angle(one: Gear, two: Gear, distance: float) -> float:
     )
 
 
+def _undercut_roll(gear: Gear) -> float:
+    """Roll length [m] where an undercut flank ends, minus infinity without undercut."""
+    return gear.form_roll if gear.undercut else -math.inf
+
+
 def _backlash(one: Gear, two: Gear, angle: float) -> float:
     eta_1, eta_2 = working_half_angles(one, two, angle)
     r_1, r_2 = one.base_radius / math.cos(angle), two.base_radius / math.cos(angle)
     return one.pitch_angle * r_1 - 2.0 * (r_1 * eta_1 + r_2 * eta_2)
+
+
+def _fraction(value: np.ndarray) -> np.ndarray:
+    """Part after the decimal point, with values a rounding error under one taken as zero."""
+    part = np.mod(value, 1.0)
+    return np.where(part > 1.0 - 1e-9, 0.0, np.where(part < 1e-9, 0.0, part))
 
 
 def _planet_lag(planetary: PlanetarySet) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import TEETH_RANGE
+from femgear.gears.gear import TEETH_RANGE, is_whole
 from femgear.gears.phasing import KINDS, MeshPhasing, phase_kinds, planet_sums, standard_lag
 from femgear.gears.planetary import equal_planet_angles
 
@@ -37,7 +37,7 @@ class ToothChoices:
     equally_spaced : (C,) bool array
         Whether ``(z_s + z_r) / N`` is whole.
     kind : (C, H) int array
-        Indices of `femgear.gears.phasing.KINDS` for the harmonics 1 to H.
+        Indices of `phasing.KINDS` for the harmonics 1 to H.
     cyclic : (C, H) int array
         mod(h z_s, N); -1 for unequal spacing.
     sums : (C, H, 2) array
@@ -249,8 +249,7 @@ def _check(wanted, distance, ratio_tolerance, closure, harmonics) -> None:
     numbers["harmonics"] = (harmonics, 1, 100)
     numbers |= {f"{name} teeth": (z, low, high) for name, z in zip(("sun", "planet", "ring"), wanted)}
     for name, (value, least, most) in numbers.items():
-        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        if not whole or not least <= value <= most:
+        if not is_whole(value) or not least <= value <= most:
             raise GeometryError(
                 f"neighbouring tooth numbers with {name} {value!r}", code="E-CHOICE", key=name,
                 value=value, limit=f"a whole number, {least} to {most}",

@@ -1,14 +1,16 @@
 """From the carrier frame to a fixed sensor: what the housing feels while the carrier turns.
 
-The radial displacement of the ring's outer surface is given in the frame of the carrier,
+What cannot be computed is refused first; `motion_of` tells how the sensor moves past the field. The radial
+displacement of the ring's outer surface is given in the frame of the carrier,
 
     u(phi, t) = Re sum_h sum_n U[h, n] exp(i n phi) exp(i h omega_m t),   h = 0..H, n = -n_max..n_max,
 
-and the sensor stands still at the housing angle phi_s, so that it sees phi = phi_s - Omega_c t. With
-the ring fixed omega_m = z_ring |Omega_c|: component (h, n) is heard at the carrier order
-h z_ring - sign(Omega_c) n. Two forms: exact (one line a component) and the Heaviside/linear form over P
-points of "Vibratory response of planetary gear sets housing by a spectral iterative approach -
-Modulation effects induced by carrier rotation", Eqs. (13)-(16), written out in time in `points`.
+and the sensor stands still at the housing angle phi_s, so that it sees phi = phi_s - Omega_c t. With the ring
+fixed omega_m = z_ring |Omega_c|: component (h, n) is heard at the carrier order h z_ring - sign(Omega_c) n.
+Two forms: exact (one line a component) and the Heaviside/linear form, in which the sensor hands over between
+P points of the ring as it passes them: "Vibratory response of planetary gear sets housing by a spectral
+iterative approach - Modulation effects induced by carrier rotation", Eqs. (13)-(16), in closed form
+(`heaviside_linear_lines`) and written out in time (`heaviside_linear`).
 
 Linear interpolation of exp(i n phi) between points first_point + 2 pi j / P is the sum over all
 integers q of sinc^2(m/P) exp(i m phi) exp(-i q P first_point) with m = n + q P and
@@ -18,21 +20,16 @@ The interpolated displacement has a kink whenever the sensor passes a point: its
 1/order^2 and those of its second derivative do not fall at all. Where z_ring is a multiple of P the
 images of the static deformation (h = 0) fall on the mesh orders h z_ring - n themselves.
 
-What the housing functions refuse before they compute, and how the sensor moves past the field.
-
-The classical model of a planet's passage: every planet carries a Hanning window past the sensor.
-
-The sensor hears sum_p w(phi - psi_p) s_p(t), phi its angle in the carrier frame, psi_p that of planet p,
-s_p the signal of the planet's mesh with the ring, and w(x) = (1 + cos(2 pi x / width))/2 for
-|x| < width/2, 0 elsewhere. A window that rides on the planet is a field of the carrier frame:
-U[h, n] = sum_p c_n exp(-i n psi_p) s_p[h], where
+In the classical model of a planet's passage every planet carries a Hanning window past the sensor, which
+hears sum_p w(phi - psi_p) s_p(t), phi its angle in the carrier frame, psi_p that of planet p, s_p the signal
+of the planet's mesh with the ring, and w(x) = (1 + cos(2 pi x / width))/2 for |x| < width/2, 0 elsewhere. A
+window that rides on the planet is a field of the carrier frame (`hanning_model`): U[h, n] = sum_p c_n exp(-i
+n psi_p) s_p[h], where
 
     c_n = width/(4 pi) sinc(v)/(1 - v^2),  v = n width/(2 pi),  c_n = width/(8 pi) where |v| = 1.
 
 width = 2 pi: McFadden and Smith (1985), every planet always heard; width = 2 pi/N: Inalpolat and
 Kahraman (2009), only the nearest planet of N is heard.
-
-Points of the ring in the carrier frame, and the hand-over between them as the sensor passes.
 """
 
 from __future__ import annotations
@@ -42,125 +39,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-
-
-@dataclass(frozen=True)
-class Motion:
-    """How the sensor moves past the carrier-frame field: direction +1, 0, -1 and the speed orders count."""
-
-    direction: int
-    base_speed: np.ndarray
-
-
-def read_only(obj, *names: str) -> None:
-    """Replace the named fields of a frozen dataclass by read-only arrays of their own."""
-    for name in names:
-        array = np.array(getattr(obj, name))
-        array.setflags(write=False)
-        object.__setattr__(obj, name, array)
-
-
-def checked_field(field) -> tuple[np.ndarray, np.ndarray]:
-    """The field as a complex array and its circumferential orders n = -n_max..n_max."""
-    field = np.asarray(field, dtype=complex)
-    if field.ndim < 2 or field.size == 0 or field.shape[-1] % 2 == 0 or not np.all(np.isfinite(field)):
-        raise CaseError(
-            f"the carrier-frame field of shape {field.shape} is not usable",
-            code="E-FIELD",
-            limit="finite values of shape (..., H + 1, 2 n_max + 1)",
-            remedy="give one column for every n = -n_max..n_max",
-        )
-    n_max = field.shape[-1] // 2
-    return field, np.arange(-n_max, n_max + 1)
-
-
-def checked_angle(angle: float) -> float:
-    if not np.isfinite(angle):
-        raise CaseError(
-            f"the angle {angle} is not a number of radians",
-            code="E-ANGLE",
-            key="housing.sensor_angle",
-            value=angle,
-            limit="a finite angle",
-            remedy="give an angle such as 0.5",
-        )
-    return float(angle)
-
-
-def check_points(points: int) -> None:
-    if points != int(points) or points < 3:
-        raise CaseError(
-            f"{points} points do not describe a ring",
-            code="E-POINTS",
-            key="housing.points",
-            value=points,
-            limit="an integer of at least 3, more than twice the largest nodal diameter that matters",
-            remedy="use 54 or more, a multiple of the number of planets",
-        )
-
-
-def check_teeth(z_ring: int) -> None:
-    if z_ring != int(z_ring) or z_ring < 1:
-        raise CaseError(
-            f"{z_ring} ring teeth do not give a mesh order",
-            code="E-TEETH",
-            key="ring.teeth",
-            value=z_ring,
-            limit="a positive integer",
-            remedy="give the number of teeth of the ring",
-        )
-
-
-def motion_of(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> Motion:
-    """Direction and base speed, refusing what the order analysis cannot express."""
-    check_teeth(z_ring)
-    speed = np.asarray(carrier_speed, dtype=float)
-    direction = np.unique(np.sign(speed))
-    if speed.shape != field.shape[:-2] or not np.all(np.isfinite(speed)) or direction.size != 1:
-        raise CaseError(
-            f"carrier speeds of shape {speed.shape}, directions {direction.tolist()}, do not fit the field",
-            code="E-SPEED",
-            value=carrier_speed,
-            limit=f"finite speeds of shape {field.shape[:-2]}, all of one direction",
-            remedy="one speed for every field; split a sweep where the carrier changes direction",
-        )
-    expected = z_ring * np.abs(speed)
-    given = expected if mesh_frequency is None else 2 * np.pi * np.asarray(mesh_frequency, dtype=float)
-    standing = direction[0] == 0
-    if given.shape != speed.shape or not np.all(given > 0) or not np.all(np.isfinite(given)):
-        raise CaseError(
-            "the mesh frequency is missing or not positive"
-            if standing
-            else "the mesh frequency is not usable",
-            code="E-SPEED",
-            value=mesh_frequency,
-            limit=f"positive mesh frequencies [Hz] of shape {speed.shape}",
-            remedy="give mesh_frequency: a carrier that stands still does not tell it",
-        )
-    if not standing and not np.allclose(given, expected, rtol=1e-6, atol=0):
-        raise CaseError(
-            "the mesh frequency is not that of a fixed ring, and a housing sensor does not ride on another",
-            code="E-SPEED",
-            value=mesh_frequency,
-            limit="z_ring |carrier_speed| / (2 pi)",
-            remedy="use a set whose ring or carrier is fixed",
-        )
-    return Motion(int(direction[0]), given / z_ring)
-
-
-def top_order(field: np.ndarray, z_ring: int, max_order: int | None) -> int:
-    harmonics, n_max = field.shape[-2] - 1, field.shape[-1] // 2
-    top = max((harmonics + 1) * z_ring, harmonics * z_ring + n_max) if max_order is None else max_order
-    if top != int(top) or top < 1:
-        raise CaseError(
-            f"{max_order} is not a highest carrier order",
-            code="E-ORDERS",
-            key="max_order",
-            value=max_order,
-            limit="a positive integer",
-            remedy="leave it out for (H + 1) z_ring",
-        )
-    return int(top)
 
 
 @dataclass(frozen=True)
@@ -382,141 +260,6 @@ def fixed_sensor_signal(lines: SensorLines, *, samples: int | None = None) -> Ho
     )
 
 
-def _synthesised(lines: np.ndarray, samples: int) -> np.ndarray:
-    """Re sum_k lines[k] exp(2 pi i k t), t in equal steps of one revolution."""
-    spectrum = lines * (samples / 2)
-    spectrum[..., 0] *= 2
-    return np.fft.irfft(spectrum, samples, axis=-1)
-
-
-def _sampled_components(field: np.ndarray, n: np.ndarray, points: int, first_point: float) -> np.ndarray:
-    """Components that P points tell apart: sum over all n of one residue modulo P, phase at point 0."""
-    at_first = field * np.exp(1j * n * first_point)
-    sampled = np.zeros((*field.shape[:-1], points), dtype=complex)
-    for residue in np.unique(n % points):
-        sampled[..., residue] = at_first[..., n % points == residue].sum(axis=-1)
-    return sampled
-
-
-def _interpolated_orders(
-    sampled: np.ndarray, z_ring: int, direction: int, top: int, away: float
-) -> np.ndarray:
-    """Two-sided lines -top..top of the linear interpolation: components and all their images."""
-    points = sampled.shape[-1]
-    order = np.arange(-top, top + 1)
-    two_sided = np.zeros((*sampled.shape[:-2], order.size), dtype=complex)
-    for h in range(sampled.shape[-2]):
-        m = direction * (h * z_ring - order)
-        two_sided += sampled[..., h, m % points] * (np.sinc(m / points) ** 2 * np.exp(1j * m * away))
-    return two_sided
-
-
-def _between_points(sampled: np.ndarray, points: int, away: float) -> np.ndarray:
-    """Value of the linear interpolation at the angle `away` from point 0."""
-    at_points = np.fft.ifft(sampled, axis=-1) * points
-    place = away * points / (2 * np.pi)
-    i = int(np.floor(place))
-    return (1 - (place - i)) * at_points[..., i % points] + (place - i) * at_points[..., (i + 1) % points]
-
-
-def _heard_orders(heard: np.ndarray, z_ring: int, direction: int, top: int) -> np.ndarray:
-    """Two-sided lines -top..top: every component added at order h z_ring - direction n."""
-    n_max = heard.shape[-1] // 2
-    two_sided = np.zeros((*heard.shape[:-2], 2 * top + 1), dtype=complex)
-    if direction == 0:
-        heard = heard.sum(axis=-1, keepdims=True)
-        n_max = 0
-    ascending = heard[..., ::-1] if direction > 0 else heard
-    for h in range(heard.shape[-2]):
-        low, high = h * z_ring - n_max, h * z_ring + n_max
-        first, last = max(low, -top), min(high, top)
-        if first <= last:
-            two_sided[..., top + first : top + last + 1] += ascending[..., h, first - low : last - low + 1]
-    return two_sided
-
-
-def _folded(two_sided: np.ndarray) -> np.ndarray:
-    """Single-sided amplitudes of Re sum_k c_k exp(i k x): c_k + conj(c_-k), real at order 0."""
-    top = two_sided.shape[-1] // 2
-    lines = two_sided[..., top:] + np.conj(two_sided[..., top::-1])
-    lines[..., 0] = two_sided[..., top].real
-    return lines
-
-
-def phased_harmonics(harmonics, mesh_phases) -> np.ndarray:
-    """Harmonics of planets that all do the same, each at its own mesh phase.
-
-    Parameters
-    ----------
-    harmonics : (..., H + 1) complex array
-        Mesh signal of a planet of phase zero: Re sum_h harmonics[h] exp(i h omega_m t).
-    mesh_phases : (N,) array
-        Phase of every planet's mesh with the ring, as a fraction of the mesh period.
-
-    Returns
-    -------
-    (..., N, H + 1) complex array
-    """
-    harmonics = np.asarray(harmonics, dtype=complex)
-    turns = np.outer(mesh_phases, np.arange(harmonics.shape[-1]))
-    return harmonics[..., None, :] * np.exp(2j * np.pi * turns)
-
-
-def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max: int = 24) -> np.ndarray:
-    """Carrier-frame field of the Hanning-window model, for `fixed_sensor_lines`.
-
-    Parameters
-    ----------
-    harmonics : (..., N, H + 1) complex array
-        Harmonics of every planet's mesh signal in common time, for example the mesh forces of the
-        planet-ring meshes, or from `phased_harmonics`.
-    planet_angles : (N,) array
-        Angles psi_p in the carrier frame [rad].
-    width : float, optional
-        Angle over which a planet is heard [rad], 0 < width <= 2 pi; default 2 pi/N.
-    n_max : int
-        Circumferential orders kept; c_n falls like 1/n^3 (width = 2 pi: nothing beyond n = 1).
-
-    Returns
-    -------
-    (..., H + 1, 2 n_max + 1) complex array
-        In the unit of the harmonics.
-
-    Raises
-    ------
-    CaseError
-        ``E-FIELD`` for harmonics that do not fit the planets; ``E-WINDOW`` for a width out of range.
-    """
-    harmonics, psi = np.asarray(harmonics, dtype=complex), np.asarray(planet_angles, dtype=float)
-    if harmonics.ndim < 2 or psi.shape != harmonics.shape[-2:-1] or not np.all(np.isfinite(harmonics)):
-        raise CaseError(
-            f"mesh harmonics of shape {harmonics.shape} do not fit {psi.size} planets",
-            code="E-FIELD",
-            limit="finite values of shape (..., planets, H + 1)",
-            remedy="give the harmonics of the planet-ring meshes alone",
-        )
-    width = 2 * np.pi / psi.size if width is None else width
-    # a width rounded from degrees may exceed the circle by one bit
-    if not 0 < width <= 2 * np.pi * (1 + 1e-12):
-        raise CaseError(
-            f"a window of {width} rad does not fit on the ring",
-            code="E-WINDOW",
-            value=width,
-            limit="0 < width <= 2 pi",
-            remedy="leave it out for 2 pi divided by the number of planets",
-        )
-    n = np.arange(-n_max, n_max + 1)
-    riding = _window_components(n, width)[:, None] * np.exp(-1j * np.outer(n, psi))
-    return np.swapaxes(riding @ harmonics, -1, -2)
-
-
-def _window_components(n: np.ndarray, width: float) -> np.ndarray:
-    """Fourier components c_n of the window on the circle."""
-    v = n * width / (2 * np.pi)
-    # sinc(v)/(1 - v^2) = (sinc(v - 1) + sinc(v + 1))/2 + sinc(v): no division at |v| = 1
-    return width / (4 * np.pi) * (np.sinc(v) + (np.sinc(v - 1) + np.sinc(v + 1)) / 2)
-
-
 def point_signals(field, z_ring: int, *, points: int, samples: int, first_point: float = 0.0) -> np.ndarray:
     """Signals u_j(t) of P equidistant points that stand still in the carrier frame, over one revolution.
 
@@ -638,3 +381,257 @@ def unresolved_share(field, points: int) -> np.ndarray:
     power = np.sum(np.abs(field[..., 1:, :]) ** 2, axis=-2)
     lost, total = power[..., 2 * np.abs(n) >= points].sum(axis=-1), power.sum(axis=-1)
     return np.sqrt(np.divide(lost, total, out=np.zeros_like(total), where=total > 0))
+
+
+def phased_harmonics(harmonics, mesh_phases) -> np.ndarray:
+    """Harmonics of planets that all do the same, each at its own mesh phase.
+
+    Parameters
+    ----------
+    harmonics : (..., H + 1) complex array
+        Mesh signal of a planet of phase zero: Re sum_h harmonics[h] exp(i h omega_m t).
+    mesh_phases : (N,) array
+        Phase of every planet's mesh with the ring, as a fraction of the mesh period.
+
+    Returns
+    -------
+    (..., N, H + 1) complex array
+    """
+    harmonics = np.asarray(harmonics, dtype=complex)
+    turns = np.outer(mesh_phases, np.arange(harmonics.shape[-1]))
+    return harmonics[..., None, :] * np.exp(2j * np.pi * turns)
+
+
+def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max: int = 24) -> np.ndarray:
+    """Carrier-frame field of the Hanning-window model, for `fixed_sensor_lines`.
+
+    Parameters
+    ----------
+    harmonics : (..., N, H + 1) complex array
+        Harmonics of every planet's mesh signal in common time, for example the mesh forces of the
+        planet-ring meshes, or from `phased_harmonics`.
+    planet_angles : (N,) array
+        Angles psi_p in the carrier frame [rad].
+    width : float, optional
+        Angle over which a planet is heard [rad], 0 < width <= 2 pi; default 2 pi/N.
+    n_max : int
+        Circumferential orders kept; c_n falls like 1/n^3 (width = 2 pi: nothing beyond n = 1).
+
+    Returns
+    -------
+    (..., H + 1, 2 n_max + 1) complex array
+        In the unit of the harmonics.
+
+    Raises
+    ------
+    CaseError
+        ``E-FIELD`` for harmonics that do not fit the planets; ``E-WINDOW`` for a width out of range.
+    """
+    harmonics, psi = np.asarray(harmonics, dtype=complex), np.asarray(planet_angles, dtype=float)
+    if harmonics.ndim < 2 or psi.shape != harmonics.shape[-2:-1] or not np.all(np.isfinite(harmonics)):
+        raise CaseError(
+            f"mesh harmonics of shape {harmonics.shape} do not fit {psi.size} planets",
+            code="E-FIELD",
+            limit="finite values of shape (..., planets, H + 1)",
+            remedy="give the harmonics of the planet-ring meshes alone",
+        )
+    width = 2 * np.pi / psi.size if width is None else width
+    # a width rounded from degrees may exceed the circle by one bit
+    if not 0 < width <= 2 * np.pi * (1 + 1e-12):
+        raise CaseError(
+            f"a window of {width} rad does not fit on the ring",
+            code="E-WINDOW",
+            value=width,
+            limit="0 < width <= 2 pi",
+            remedy="leave it out for 2 pi divided by the number of planets",
+        )
+    n = np.arange(-n_max, n_max + 1)
+    riding = _window_components(n, width)[:, None] * np.exp(-1j * np.outer(n, psi))
+    return np.swapaxes(riding @ harmonics, -1, -2)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How the sensor moves past the carrier-frame field: direction +1, 0, -1 and the speed orders count."""
+
+    direction: int
+    base_speed: np.ndarray
+
+
+def motion_of(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> Motion:
+    """Direction and base speed, refusing what the order analysis cannot express."""
+    check_teeth(z_ring)
+    speed = np.asarray(carrier_speed, dtype=float)
+    direction = np.unique(np.sign(speed))
+    if speed.shape != field.shape[:-2] or not np.all(np.isfinite(speed)) or direction.size != 1:
+        raise CaseError(
+            f"carrier speeds of shape {speed.shape}, directions {direction.tolist()}, do not fit the field",
+            code="E-SPEED",
+            value=carrier_speed,
+            limit=f"finite speeds of shape {field.shape[:-2]}, all of one direction",
+            remedy="one speed for every field; split a sweep where the carrier changes direction",
+        )
+    expected = z_ring * np.abs(speed)
+    given = expected if mesh_frequency is None else 2 * np.pi * np.asarray(mesh_frequency, dtype=float)
+    standing = direction[0] == 0
+    if given.shape != speed.shape or not np.all(given > 0) or not np.all(np.isfinite(given)):
+        raise CaseError(
+            "the mesh frequency is missing or not positive"
+            if standing
+            else "the mesh frequency is not usable",
+            code="E-SPEED",
+            value=mesh_frequency,
+            limit=f"positive mesh frequencies [Hz] of shape {speed.shape}",
+            remedy="give mesh_frequency: a carrier that stands still does not tell it",
+        )
+    if not standing and not np.allclose(given, expected, rtol=1e-6, atol=0):
+        raise CaseError(
+            "the mesh frequency is not that of a fixed ring, and a housing sensor does not ride on another",
+            code="E-SPEED",
+            value=mesh_frequency,
+            limit="z_ring |carrier_speed| / (2 pi)",
+            remedy="use a set whose ring or carrier is fixed",
+        )
+    return Motion(int(direction[0]), given / z_ring)
+
+
+def top_order(field: np.ndarray, z_ring: int, max_order: int | None) -> int:
+    harmonics, n_max = field.shape[-2] - 1, field.shape[-1] // 2
+    top = max((harmonics + 1) * z_ring, harmonics * z_ring + n_max) if max_order is None else max_order
+    if top != int(top) or top < 1:
+        raise CaseError(
+            f"{max_order} is not a highest carrier order",
+            code="E-ORDERS",
+            key="max_order",
+            value=max_order,
+            limit="a positive integer",
+            remedy="leave it out for (H + 1) z_ring",
+        )
+    return int(top)
+
+
+def checked_field(field) -> tuple[np.ndarray, np.ndarray]:
+    """The field as a complex array and its circumferential orders n = -n_max..n_max."""
+    field = np.asarray(field, dtype=complex)
+    if field.ndim < 2 or field.size == 0 or field.shape[-1] % 2 == 0 or not np.all(np.isfinite(field)):
+        raise CaseError(
+            f"the carrier-frame field of shape {field.shape} is not usable",
+            code="E-FIELD",
+            limit="finite values of shape (..., H + 1, 2 n_max + 1)",
+            remedy="give one column for every n = -n_max..n_max",
+        )
+    n_max = field.shape[-1] // 2
+    return field, np.arange(-n_max, n_max + 1)
+
+
+def checked_angle(angle: float) -> float:
+    if not np.isfinite(angle):
+        raise CaseError(
+            f"the angle {angle} is not a number of radians",
+            code="E-ANGLE",
+            key="housing.sensor_angle",
+            value=angle,
+            limit="a finite angle",
+            remedy="give an angle such as 0.5",
+        )
+    return float(angle)
+
+
+def check_points(points: int) -> None:
+    if points != int(points) or points < 3:
+        raise CaseError(
+            f"{points} points do not describe a ring",
+            code="E-POINTS",
+            key="housing.points",
+            value=points,
+            limit="an integer of at least 3, more than twice the largest nodal diameter that matters",
+            remedy="use 54 or more, a multiple of the number of planets",
+        )
+
+
+def check_teeth(z_ring: int) -> None:
+    if z_ring != int(z_ring) or z_ring < 1:
+        raise CaseError(
+            f"{z_ring} ring teeth do not give a mesh order",
+            code="E-TEETH",
+            key="ring.teeth",
+            value=z_ring,
+            limit="a positive integer",
+            remedy="give the number of teeth of the ring",
+        )
+
+
+def read_only(obj, *names: str) -> None:
+    """Replace the named fields of a frozen dataclass by read-only arrays of their own."""
+    for name in names:
+        array = np.array(getattr(obj, name))
+        array.setflags(write=False)
+        object.__setattr__(obj, name, array)
+
+
+def _heard_orders(heard: np.ndarray, z_ring: int, direction: int, top: int) -> np.ndarray:
+    """Two-sided lines -top..top: every component added at order h z_ring - direction n."""
+    n_max = heard.shape[-1] // 2
+    two_sided = np.zeros((*heard.shape[:-2], 2 * top + 1), dtype=complex)
+    if direction == 0:
+        heard = heard.sum(axis=-1, keepdims=True)
+        n_max = 0
+    ascending = heard[..., ::-1] if direction > 0 else heard
+    for h in range(heard.shape[-2]):
+        low, high = h * z_ring - n_max, h * z_ring + n_max
+        first, last = max(low, -top), min(high, top)
+        if first <= last:
+            two_sided[..., top + first : top + last + 1] += ascending[..., h, first - low : last - low + 1]
+    return two_sided
+
+
+def _folded(two_sided: np.ndarray) -> np.ndarray:
+    """Single-sided amplitudes of Re sum_k c_k exp(i k x): c_k + conj(c_-k), real at order 0."""
+    top = two_sided.shape[-1] // 2
+    lines = two_sided[..., top:] + np.conj(two_sided[..., top::-1])
+    lines[..., 0] = two_sided[..., top].real
+    return lines
+
+
+def _sampled_components(field: np.ndarray, n: np.ndarray, points: int, first_point: float) -> np.ndarray:
+    """Components that P points tell apart: sum over all n of one residue modulo P, phase at point 0."""
+    at_first = field * np.exp(1j * n * first_point)
+    sampled = np.zeros((*field.shape[:-1], points), dtype=complex)
+    for residue in np.unique(n % points):
+        sampled[..., residue] = at_first[..., n % points == residue].sum(axis=-1)
+    return sampled
+
+
+def _interpolated_orders(
+    sampled: np.ndarray, z_ring: int, direction: int, top: int, away: float
+) -> np.ndarray:
+    """Two-sided lines -top..top of the linear interpolation: components and all their images."""
+    points = sampled.shape[-1]
+    order = np.arange(-top, top + 1)
+    two_sided = np.zeros((*sampled.shape[:-2], order.size), dtype=complex)
+    for h in range(sampled.shape[-2]):
+        m = direction * (h * z_ring - order)
+        two_sided += sampled[..., h, m % points] * (np.sinc(m / points) ** 2 * np.exp(1j * m * away))
+    return two_sided
+
+
+def _between_points(sampled: np.ndarray, points: int, away: float) -> np.ndarray:
+    """Value of the linear interpolation at the angle `away` from point 0."""
+    at_points = np.fft.ifft(sampled, axis=-1) * points
+    place = away * points / (2 * np.pi)
+    i = int(np.floor(place))
+    return (1 - (place - i)) * at_points[..., i % points] + (place - i) * at_points[..., (i + 1) % points]
+
+
+def _synthesised(lines: np.ndarray, samples: int) -> np.ndarray:
+    """Re sum_k lines[k] exp(2 pi i k t), t in equal steps of one revolution."""
+    spectrum = lines * (samples / 2)
+    spectrum[..., 0] *= 2
+    return np.fft.irfft(spectrum, samples, axis=-1)
+
+
+def _window_components(n: np.ndarray, width: float) -> np.ndarray:
+    """Fourier components c_n of the window on the circle."""
+    v = n * width / (2 * np.pi)
+    # sinc(v)/(1 - v^2) = (sinc(v - 1) + sinc(v + 1))/2 + sinc(v): no division at |v| = 1
+    return width / (4 * np.pi) * (np.sinc(v) + (np.sinc(v - 1) + np.sinc(v + 1)) / 2)

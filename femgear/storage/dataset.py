@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 RPM = np.pi / 30.0
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
+MEMBERS = ("carrier", "ring", "sun")
 
 
 def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
@@ -59,9 +60,6 @@ def response_entries(result: Any) -> dict[str, tuple]:
 
 def _mesh_names(n: int) -> list[str]:
     return [f"sun-planet {i + 1}" for i in range(n)] + [f"planet {i + 1}-ring" for i in range(n)]
-
-
-MEMBERS = ("carrier", "ring", "sun")
 
 
 def in_space(data: RigidSet, motions: np.ndarray, axes: tuple[str, ...]) -> tuple[np.ndarray, list[str]]:

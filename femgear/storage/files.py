@@ -1,6 +1,6 @@
 """Files written so that they are either the old or the new one, whole; every failure a `StorageError`.
 
-Datasets in NetCDF-4 files: written with checksums, read with suspicion.
+Datasets are NetCDF-4 files, written with checksums and read with suspicion.
 """
 
 from __future__ import annotations
@@ -25,116 +25,75 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}")
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
+# bytes of the disk that stay free
 _RESERVE = 1_000_000
+FORMAT = 1
+# bytes that a file may declare beyond four times its size
+_MARGIN = 1_000_000
 
 
-@contextlib.contextmanager
-def storage_errors(path: str | os.PathLike) -> Iterator[None]:
-    """Turn an `OSError` of the block into a `StorageError` that names ``path``."""
-    try:
-        yield
-    except OSError as error:
-        raise storage_error(error, path) from error
+def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
+    """Write a dataset as NetCDF-4 with a checksum (Fletcher-32) on every chunk.
 
-
-def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageError:
-    """The `StorageError` that says what an `OSError` says, ``E-DISK-FULL`` or ``E-STORAGE``."""
-    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-    return StorageError(
-        error.strerror or str(error),
-        code="E-DISK-FULL" if full else "E-STORAGE",
-        file=None if path is None else os.fsdecode(path),
-        remedy="free some space or name another folder" if full else None,
-    )
-
-
-@contextlib.contextmanager
-def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
-    """Hold a lock file for the block; the system releases it when the process ends, however it ends.
-
-    Advisory (``flock``): it keeps those out that ask for it. Where the system has no ``flock`` (Windows)
-    nothing is locked.
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Real, text or boolean variables, each with attributes ``units`` and ``long_name``; so the numeric
+        coordinates. Real numbers are stored as float64.
+    path : path-like
 
     Raises
     ------
     StorageError
-        ``E-LOCKED``: another process, or another block of this one, holds it.
+        ``E-SCHEMA``: complex variable, missing attribute. ``E-DISK-FULL``, ``E-STORAGE``.
     """
-    path = Path(path)
+    encoding = {}
+    for name, variable in dataset.variables.items():
+        kind = variable.dtype.kind
+        _check_variable(str(name), variable, coordinate=name in dataset.coords, path=path)
+        encoding[name] = {"_FillValue": None} if kind in "OUS" or variable.ndim == 0 else {"fletcher32": True}
+        if kind == "f":
+            encoding[name] |= {"dtype": "float64", "_FillValue": None}
+    stamped = dataset.assign_attrs(femgear_format=FORMAT, femgear_version=__version__)
+    replace_file(
+        path,
+        lambda temporary: stamped.to_netcdf(temporary, engine="h5netcdf", encoding=encoding),
+        size=int(dataset.nbytes),
+    )
+
+
+def read_dataset(path: str | os.PathLike) -> xr.Dataset:
+    """Dataset of a file that `write_dataset` wrote, loaded into memory.
+
+    The file is walked first: links, data kept in other files, unusual types and declared sizes that the
+    file cannot hold are refused before anything is read.
+
+    Raises
+    ------
+    StorageError
+        ``E-STORAGE`` (missing, truncated, checksum), ``E-HOSTILE`` (see above), ``E-FORMAT``.
+    """
+    import xarray as xr
+
+    name = os.fspath(path)
     with storage_errors(path):
-        descriptor = _locked(path)
+        if not os.path.isfile(path):
+            raise StorageError("no such file", code="E-STORAGE", file=name)
+        _refuse_hostile(path)
     try:
-        yield
-    finally:
-        path.unlink(missing_ok=True)
-        if descriptor is not None:
-            os.close(descriptor)
-
-
-def _locked(path: Path) -> int | None:
-    try:
-        import fcntl
-    except ImportError:
-        return None
-    while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # whoever held it before may have removed the file that is open here
-            if path.exists() and os.path.samestat(os.stat(path), os.fstat(descriptor)):
-                return descriptor
-        except BlockingIOError:
-            os.close(descriptor)
-            raise StorageError(
-                "another run is writing into this folder",
-                code="E-LOCKED",
-                file=str(path.parent),
-                remedy="wait until it has ended, or name another folder",
-            ) from None
-        except BaseException:
-            os.close(descriptor)
-            raise
-        os.close(descriptor)
-
-
-def is_safe_path(name: str) -> bool:
-    """Whether a relative path stays in its folder and has plain names only."""
-    path = Path(name)
-    return (
-        bool(path.parts)
-        and not path.is_absolute()
-        and all(_NAME.fullmatch(p) and p != ".." for p in path.parts)
-    )
-
-
-def checked_name(name: str) -> str:
-    """``name`` if every file system takes it as one plain file name, else refused.
-
-    Raises
-    ------
-    StorageError
-        ``E-NAME``.
-    """
-    if not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.startswith(".") or name.endswith("."):
+        dataset = xr.load_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False)
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
+        raise StorageError(f"damaged: {error}", file=name, remedy="run the case again") from error
+    version = dataset.attrs.get("femgear_format")
+    if version is None or int(version) > FORMAT:
         raise StorageError(
-            "not a safe file name",
-            code="E-NAME",
-            value=name,
-            limit="1 to 100 of A-Z a-z 0-9 . _ -, no dot at the ends, no reserved name",
+            "not written by this version of femgear",
+            code="E-FORMAT",
+            file=name,
+            value=version,
+            limit=f"femgear_format up to {FORMAT}",
         )
-    return name
-
-
-def checksum(path: str | os.PathLike) -> str:
-    """SHA-256 of a file."""
-    with storage_errors(path), open(path, "rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def write_text(text: str, path: str | os.PathLike) -> None:
-    """Write UTF-8 text so that the file is either the old or the new one, whole."""
-    data = text.encode()
-    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+    return dataset
 
 
 def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, size: int = 0) -> None:
@@ -175,38 +134,113 @@ def replace_file(path: str | os.PathLike, write: Callable[[Path], object], *, si
             temporary.unlink(missing_ok=True)
 
 
-FORMAT = 1
-_MARGIN = 1_000_000
+def write_text(text: str, path: str | os.PathLike) -> None:
+    """Write UTF-8 text so that the file is either the old or the new one, whole."""
+    data = text.encode()
+    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
 
 
-def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
-    """Write a dataset as NetCDF-4 with a checksum (Fletcher-32) on every chunk.
+def checksum(path: str | os.PathLike) -> str:
+    """SHA-256 of a file."""
+    with storage_errors(path), open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Real, text or boolean variables, each with attributes ``units`` and ``long_name``; so the numeric
-        coordinates. Real numbers are stored as float64.
-    path : path-like
+
+def checked_name(name: str) -> str:
+    """``name`` if every file system takes it as one plain file name, else refused.
 
     Raises
     ------
     StorageError
-        ``E-SCHEMA``: complex variable, missing attribute. ``E-DISK-FULL``, ``E-STORAGE``.
+        ``E-NAME``.
     """
-    encoding = {}
-    for name, variable in dataset.variables.items():
-        kind = variable.dtype.kind
-        _check_variable(str(name), variable, coordinate=name in dataset.coords, path=path)
-        encoding[name] = {"_FillValue": None} if kind in "OUS" or variable.ndim == 0 else {"fletcher32": True}
-        if kind == "f":
-            encoding[name] |= {"dtype": "float64", "_FillValue": None}
-    stamped = dataset.assign_attrs(femgear_format=FORMAT, femgear_version=__version__)
-    replace_file(
-        path,
-        lambda temporary: stamped.to_netcdf(temporary, engine="h5netcdf", encoding=encoding),
-        size=int(dataset.nbytes),
+    if not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.startswith(".") or name.endswith("."):
+        raise StorageError(
+            "not a safe file name",
+            code="E-NAME",
+            value=name,
+            limit="1 to 100 of A-Z a-z 0-9 . _ -, no dot at the ends, no reserved name",
+        )
+    return name
+
+
+def is_safe_path(name: str) -> bool:
+    """Whether a relative path stays in its folder and has plain names only."""
+    path = Path(name)
+    return (
+        bool(path.parts)
+        and not path.is_absolute()
+        and all(_NAME.fullmatch(p) and p != ".." for p in path.parts)
     )
+
+
+@contextlib.contextmanager
+def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
+    """Hold a lock file for the block; the system releases it when the process ends, however it ends.
+
+    Advisory (``flock``): it keeps those out that ask for it. Where the system has no ``flock`` (Windows)
+    nothing is locked.
+
+    Raises
+    ------
+    StorageError
+        ``E-LOCKED``: another process, or another block of this one, holds it.
+    """
+    path = Path(path)
+    with storage_errors(path):
+        descriptor = _locked(path)
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+@contextlib.contextmanager
+def storage_errors(path: str | os.PathLike) -> Iterator[None]:
+    """Turn an `OSError` of the block into a `StorageError` that names ``path``."""
+    try:
+        yield
+    except OSError as error:
+        raise storage_error(error, path) from error
+
+
+def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageError:
+    """The `StorageError` that says what an `OSError` says, ``E-DISK-FULL`` or ``E-STORAGE``."""
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    return StorageError(
+        error.strerror or str(error),
+        code="E-DISK-FULL" if full else "E-STORAGE",
+        file=None if path is None else os.fsdecode(path),
+        remedy="free some space or name another folder" if full else None,
+    )
+
+
+def _locked(path: Path) -> int | None:
+    try:
+        import fcntl
+    except ImportError:
+        return None
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # whoever held it before may have removed the file that is open here
+            if path.exists() and os.path.samestat(os.stat(path), os.fstat(descriptor)):
+                return descriptor
+        except BlockingIOError:
+            os.close(descriptor)
+            raise StorageError(
+                "another run is writing into this folder",
+                code="E-LOCKED",
+                file=str(path.parent),
+                remedy="wait until it has ended, or name another folder",
+            ) from None
+        except BaseException:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)
 
 
 def _check_variable(name: str, variable: xr.Variable, *, coordinate: bool, path: str | os.PathLike) -> None:
@@ -221,40 +255,6 @@ def _check_variable(name: str, variable: xr.Variable, *, coordinate: bool, path:
     missing = [key for key in ("units", "long_name") if key not in variable.attrs]
     if missing and not labels:
         raise StorageError(f"{name} lacks {' and '.join(missing)}", code="E-SCHEMA", file=os.fspath(path))
-
-
-def read_dataset(path: str | os.PathLike) -> xr.Dataset:
-    """Dataset of a file that `write_dataset` wrote, loaded into memory.
-
-    The file is walked first: links, data kept in other files, unusual types and declared sizes that the
-    file cannot hold are refused before anything is read.
-
-    Raises
-    ------
-    StorageError
-        ``E-STORAGE`` (missing, truncated, checksum), ``E-HOSTILE`` (see above), ``E-FORMAT``.
-    """
-    import xarray as xr
-
-    name = os.fspath(path)
-    with storage_errors(path):
-        if not os.path.isfile(path):
-            raise StorageError("no such file", code="E-STORAGE", file=name)
-        _refuse_hostile(path)
-    try:
-        dataset = xr.load_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False)
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
-        raise StorageError(f"damaged: {error}", file=name, remedy="run the case again") from error
-    version = dataset.attrs.get("femgear_format")
-    if version is None or int(version) > FORMAT:
-        raise StorageError(
-            "not written by this version of femgear",
-            code="E-FORMAT",
-            file=name,
-            value=version,
-            limit=f"femgear_format up to {FORMAT}",
-        )
-    return dataset
 
 
 def _refuse_hostile(path: str | os.PathLike) -> None:
@@ -278,9 +278,7 @@ def _refuse_hostile(path: str | os.PathLike) -> None:
                     raise _hostile(path, name, "is a named type")
                 if item.external or item.is_virtual:
                     raise _hostile(path, name, "keeps its data in other files")
-                if item.dtype.kind not in "fiubOS" or (
-                    item.dtype.kind == "O" and not h5py.check_string_dtype(item.dtype)
-                ):
+                if not _is_plain(item.dtype):
                     raise _hostile(path, name, f"has the type {item.dtype}")
                 declared += item.size * item.dtype.itemsize
     if declared > 4 * size + _MARGIN:

@@ -1,6 +1,6 @@
-"""Results on disk: one folder a run, one NetCDF file a stage, a manifest with checksums.
+"""Results on disk: one folder a run, one NetCDF file a stage, and a manifest of what the run wrote.
 
-The manifest of a results folder: what a run wrote, with checksums, and whether it came to its end.
+The manifest holds the checksum of every file and whether the run came to its end.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 MANIFEST = "manifest.json"
+CASE, LOCK = "case.toml", ".lock"
+RUNNING, FINISHED = ".running", ".finished"
 
 
 @dataclass(frozen=True)
@@ -66,97 +68,6 @@ class Manifest:
     def __post_init__(self):
         for name in ("files", "timings", "convergence", "versions"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
-
-
-def read_manifest(folder: str | os.PathLike) -> Manifest:
-    """Manifest of a results folder.
-
-    Raises
-    ------
-    StorageError
-        Missing, not a femgear manifest, of a newer format, or naming files outside the folder.
-    """
-    path = Path(folder) / MANIFEST
-    remedy = "name a folder that femgear run wrote"
-    with storage_errors(path):
-        if not path.is_file() or path.stat().st_size > 10_000_000:
-            raise StorageError(
-                "no manifest of reasonable size", code="E-MANIFEST", file=str(path), remedy=remedy
-            )
-        text = path.read_bytes()
-    try:
-        data = json.loads(text)
-        version = data.pop("femgear_format")
-    except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
-        raise StorageError(
-            "not a femgear manifest", code="E-MANIFEST", file=str(path), remedy=remedy
-        ) from None
-    if type(version) is not int or not 1 <= version <= FORMAT:
-        raise StorageError(
-            "written by another version of femgear",
-            code="E-FORMAT",
-            file=str(path),
-            value=version,
-            limit=f"1 to {FORMAT}",
-        )
-    try:
-        manifest = Manifest(format=version, **data)
-    except (TypeError, ValueError):
-        raise StorageError(
-            "not a femgear manifest", code="E-MANIFEST", file=str(path), remedy=remedy
-        ) from None
-    for name in manifest.files:
-        if not is_safe_path(name):
-            raise StorageError(
-                "names a file outside the folder", code="E-MANIFEST", file=str(path), value=name
-            )
-    return manifest
-
-
-def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> None:
-    """Write ``manifest.json``; the last file of a run."""
-    data = {
-        "femgear_format": manifest.format,
-        "complete": manifest.complete,
-        "files": dict(manifest.files),
-        "timings": dict(manifest.timings),
-        "convergence": _plain(dict(manifest.convergence)),
-        "versions": dict(manifest.versions),
-    }
-    write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", Path(folder) / MANIFEST)
-
-
-def _plain(value: object) -> object:
-    """JSON value of nested tables, lists, arrays and numbers."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def verify(folder: str | os.PathLike) -> tuple[str, ...]:
-    """Files of the manifest that are missing or changed."""
-    folder = Path(folder)
-    files = read_manifest(folder).files
-    return tuple(
-        n for n, digest in files.items() if not (folder / n).is_file() or checksum(folder / n) != digest
-    )
-
-
-def versions() -> dict[str, str]:
-    """Versions of femgear, Python and the libraries that compute."""
-    import platform
-    from importlib.metadata import version
-
-    libraries = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
-    return {"femgear": __version__, "python": platform.python_version(), **{n: version(n) for n in libraries}}
-
-
-CASE, LOCK = "case.toml", ".lock"
-RUNNING, FINISHED = ".running", ".finished"
 
 
 @dataclass(frozen=True)
@@ -252,41 +163,6 @@ def results_of(
     return results
 
 
-def _refuse_missing(folder: Path) -> None:
-    if not folder.is_dir():
-        raise StorageError("no such results folder", code="E-RESULTS-MISSING", file=str(folder))
-
-
-def _refuse_incomplete(results: Results) -> None:
-    if results.manifest.complete:
-        return
-    folder = results.folder
-    case = folder / CASE if CASE in results.manifest.files else "CASE"
-    raise StorageError(
-        _interrupted(results),
-        code="E-RESULTS-INCOMPLETE",
-        file=str(folder),
-        remedy=f"run it again: femgear run {case} -o {folder}",
-    )
-
-
-def _interrupted(results: Results) -> str:
-    stages = f"after: {', '.join(results.stages)}" if results.stages else "before a stage was complete"
-    return f"the run was interrupted {stages}"
-
-
-def folder_lock(folder: str | os.PathLike):
-    """Context in which this process alone writes into a results folder.
-
-    Raises
-    ------
-    StorageError
-        ``E-LOCKED`` while another run holds the folder (readers need no lock); no such folder.
-    """
-    _refuse_missing(Path(folder))
-    return exclusive_lock(Path(folder) / LOCK)
-
-
 @contextmanager
 def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Path]:
     """Folder for a run to write into, locked; old results stay until the new ones are complete.
@@ -333,65 +209,16 @@ def run_folder(folder: str | os.PathLike, *, force: bool = False) -> Iterator[Pa
             _remove_tree(folder / RUNNING)
 
 
-def _publish(folder: Path) -> None:
-    """Give the new files their places, the manifest last; may be repeated after an interruption."""
-    source = folder / FINISHED
-    if (source / MANIFEST).is_file():
-        new, old = read_manifest(source), read_manifest(folder)
-        with storage_errors(folder):
-            for name in new.files:
-                if (source / name).is_file():
-                    (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                    os.replace(source / name, folder / name)
-            _remove_unchanged(folder, {name: d for name, d in old.files.items() if name not in new.files})
-            os.replace(source / MANIFEST, folder / MANIFEST)
-    _remove_tree(source)
+def folder_lock(folder: str | os.PathLike):
+    """Context in which this process alone writes into a results folder.
 
-
-def _remove_tree(path: Path) -> None:
-    with storage_errors(path):
-        if path.is_dir():
-            shutil.rmtree(path)
-
-
-def _make(folder: Path) -> None:
-    """Create a folder, or refuse one that is not for results."""
-    if not folder.exists():
-        checked_name(folder.resolve().name)
-    with storage_errors(folder):
-        if folder.exists() and not folder.is_dir():
-            raise StorageError("exists and is not a folder", code="E-OUTPUT", file=str(folder))
-        folder.mkdir(parents=True, exist_ok=True)
-        foreign = any(path.name != LOCK for path in folder.iterdir())
-    if foreign and not (folder / MANIFEST).is_file():
-        raise StorageError(
-            "the folder holds files but no femgear results",
-            code="E-OUTPUT",
-            file=str(folder),
-            remedy="name a new folder",
-        )
-
-
-def _is_complete(folder: Path) -> bool:
-    return (folder / MANIFEST).is_file() and read_manifest(folder).complete
-
-
-def _refuse_changed(folder: Path, manifest: Manifest) -> None:
-    """Refuse to replace results in which somebody has changed a file."""
-    changed = [
-        n for n, digest in manifest.files.items() if (folder / n).exists() and _differs(folder / n, digest)
-    ]
-    if changed:
-        raise StorageError(
-            f"{', '.join(changed)} changed since the run wrote {'it' if len(changed) == 1 else 'them'}",
-            code="E-OUTPUT",
-            file=str(folder),
-            remedy="name a new folder, or move the changed files away",
-        )
-
-
-def _differs(path: Path, digest: str) -> bool:
-    return not path.is_file() or checksum(path) != digest
+    Raises
+    ------
+    StorageError
+        ``E-LOCKED`` while another run holds the folder (readers need no lock); no such folder.
+    """
+    _refuse_missing(Path(folder))
+    return exclusive_lock(Path(folder) / LOCK)
 
 
 def prepare_output(folder: str | os.PathLike) -> Path:
@@ -429,15 +256,6 @@ def prepare_output(folder: str | os.PathLike) -> Path:
             _remove_unchanged(folder, manifest.files)
     write_manifest(folder, Manifest(complete=False))
     return folder
-
-
-def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
-    for name, digest in files.items():
-        path = folder / name
-        # a link inside the folder must not lead the removal out of it
-        inside = path.resolve() == folder.resolve() / name
-        if inside and path.is_file() and checksum(path) == digest:
-            path.unlink()
 
 
 def record(
@@ -483,3 +301,181 @@ def finish(
         Numbers, texts, arrays and tables of these; numbers that are not finite are stored as null.
     """
     return record(folder, names, timings=timings, convergence=convergence, complete=True)
+
+
+def read_manifest(folder: str | os.PathLike) -> Manifest:
+    """Manifest of a results folder.
+
+    Raises
+    ------
+    StorageError
+        Missing, not a femgear manifest, of a newer format, or naming files outside the folder.
+    """
+    path = Path(folder) / MANIFEST
+    remedy = "name a folder that femgear run wrote"
+    with storage_errors(path):
+        if not path.is_file() or path.stat().st_size > 10_000_000:
+            raise StorageError(
+                "no manifest of reasonable size", code="E-MANIFEST", file=str(path), remedy=remedy
+            )
+        text = path.read_bytes()
+    try:
+        data = json.loads(text)
+        version = data.pop("femgear_format")
+    except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
+        raise StorageError(
+            "not a femgear manifest", code="E-MANIFEST", file=str(path), remedy=remedy
+        ) from None
+    if type(version) is not int or not 1 <= version <= FORMAT:
+        raise StorageError(
+            "written by another version of femgear",
+            code="E-FORMAT",
+            file=str(path),
+            value=version,
+            limit=f"1 to {FORMAT}",
+        )
+    try:
+        manifest = Manifest(format=version, **data)
+    except (TypeError, ValueError):
+        raise StorageError(
+            "not a femgear manifest", code="E-MANIFEST", file=str(path), remedy=remedy
+        ) from None
+    for name in manifest.files:
+        if not is_safe_path(name):
+            raise StorageError(
+                "names a file outside the folder", code="E-MANIFEST", file=str(path), value=name
+            )
+    return manifest
+
+
+def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> None:
+    """Write ``manifest.json``; the last file of a run."""
+    data = {
+        "femgear_format": manifest.format,
+        "complete": manifest.complete,
+        "files": dict(manifest.files),
+        "timings": dict(manifest.timings),
+        "convergence": _plain(dict(manifest.convergence)),
+        "versions": dict(manifest.versions),
+    }
+    write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", Path(folder) / MANIFEST)
+
+
+def verify(folder: str | os.PathLike) -> tuple[str, ...]:
+    """Files of the manifest that are missing or changed."""
+    folder = Path(folder)
+    files = read_manifest(folder).files
+    return tuple(n for n, digest in files.items() if _differs(folder / n, digest))
+
+
+def versions() -> dict[str, str]:
+    """Versions of femgear, Python and the libraries that compute."""
+    import platform
+    from importlib.metadata import version
+
+    libraries = ("numpy", "scipy", "scikit-fem", "gmsh", "xarray", "h5netcdf", "h5py")
+    return {"femgear": __version__, "python": platform.python_version(), **{n: version(n) for n in libraries}}
+
+
+def _plain(value: object) -> object:
+    """JSON value of nested tables, lists, arrays and numbers."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _differs(path: Path, digest: str) -> bool:
+    return not path.is_file() or checksum(path) != digest
+
+
+def _refuse_missing(folder: Path) -> None:
+    if not folder.is_dir():
+        raise StorageError("no such results folder", code="E-RESULTS-MISSING", file=str(folder))
+
+
+def _refuse_incomplete(results: Results) -> None:
+    if results.manifest.complete:
+        return
+    folder = results.folder
+    case = folder / CASE if CASE in results.manifest.files else "CASE"
+    raise StorageError(
+        _interrupted(results),
+        code="E-RESULTS-INCOMPLETE",
+        file=str(folder),
+        remedy=f"run it again: femgear run {case} -o {folder}",
+    )
+
+
+def _refuse_changed(folder: Path, manifest: Manifest) -> None:
+    """Refuse to replace results in which somebody has changed a file."""
+    changed = [
+        n for n, digest in manifest.files.items() if (folder / n).exists() and _differs(folder / n, digest)
+    ]
+    if changed:
+        raise StorageError(
+            f"{', '.join(changed)} changed since the run wrote {'it' if len(changed) == 1 else 'them'}",
+            code="E-OUTPUT",
+            file=str(folder),
+            remedy="name a new folder, or move the changed files away",
+        )
+
+
+def _interrupted(results: Results) -> str:
+    stages = f"after: {', '.join(results.stages)}" if results.stages else "before a stage was complete"
+    return f"the run was interrupted {stages}"
+
+
+def _is_complete(folder: Path) -> bool:
+    return (folder / MANIFEST).is_file() and read_manifest(folder).complete
+
+
+def _make(folder: Path) -> None:
+    """Create a folder, or refuse one that is not for results."""
+    if not folder.exists():
+        checked_name(folder.resolve().name)
+    with storage_errors(folder):
+        if folder.exists() and not folder.is_dir():
+            raise StorageError("exists and is not a folder", code="E-OUTPUT", file=str(folder))
+        folder.mkdir(parents=True, exist_ok=True)
+        foreign = any(path.name != LOCK for path in folder.iterdir())
+    if foreign and not (folder / MANIFEST).is_file():
+        raise StorageError(
+            "the folder holds files but no femgear results",
+            code="E-OUTPUT",
+            file=str(folder),
+            remedy="name a new folder",
+        )
+
+
+def _publish(folder: Path) -> None:
+    """Give the new files their places, the manifest last; may be repeated after an interruption."""
+    source = folder / FINISHED
+    if (source / MANIFEST).is_file():
+        new, old = read_manifest(source), read_manifest(folder)
+        with storage_errors(folder):
+            for name in new.files:
+                if (source / name).is_file():
+                    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                    os.replace(source / name, folder / name)
+            _remove_unchanged(folder, {name: d for name, d in old.files.items() if name not in new.files})
+            os.replace(source / MANIFEST, folder / MANIFEST)
+    _remove_tree(source)
+
+
+def _remove_tree(path: Path) -> None:
+    with storage_errors(path):
+        if path.is_dir():
+            shutil.rmtree(path)
+
+
+def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
+    for name, digest in files.items():
+        path = folder / name
+        # a link inside the folder must not lead the removal out of it
+        inside = path.resolve() == folder.resolve() / name
+        if inside and path.is_file() and checksum(path) == digest:
+            path.unlink()

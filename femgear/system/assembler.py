@@ -42,30 +42,6 @@ def planar_dofs(n_planets: int) -> tuple[str, ...]:
     return (*central, *(f"planet {n + 1}: {axis}" for n in range(n_planets) for axis in axes))
 
 
-def column_groups(
-    data: PlanarSet, *, back_flanks: bool = False, bearings: Sequence[str] = ()
-) -> dict[str, np.ndarray]:
-    """Places of the columns of W: ``meshes`` (2N,), ``back flanks`` (2N,), and (g, 2) of every bearing.
-
-    Parameters
-    ----------
-    data : PlanarSet
-    back_flanks : bool
-    bearings : sequence of {"carrier", "ring", "sun", "planets"}
-        In the order in which their columns follow.
-    """
-    n = 2 * data.n_planets
-    groups = {"meshes": np.arange(n)}
-    if back_flanks:
-        groups["back flanks"] = np.arange(n, 2 * n)
-    start = n * len(groups)
-    for name in bearings:
-        count = data.n_planets if name == "planets" else 1
-        groups[name] = np.arange(start, start + 2 * count).reshape(count, 2)
-        start += 2 * count
-    return groups
-
-
 def planar_system(
     data: PlanarSet,
     *,
@@ -129,6 +105,79 @@ def planar_system(
         dofs=tuple(str(name) for name in names),
         gyroscopic=gyroscopic,
     )
+
+
+def column_groups(
+    data: PlanarSet, *, back_flanks: bool = False, bearings: Sequence[str] = ()
+) -> dict[str, np.ndarray]:
+    """Places of the columns of W: ``meshes`` (2N,), ``back flanks`` (2N,), and (g, 2) of every bearing.
+
+    Parameters
+    ----------
+    data : PlanarSet
+    back_flanks : bool
+    bearings : sequence of {"carrier", "ring", "sun", "planets"}
+        In the order in which their columns follow.
+    """
+    n = 2 * data.n_planets
+    groups = {"meshes": np.arange(n)}
+    if back_flanks:
+        groups["back flanks"] = np.arange(n, 2 * n)
+    start = n * len(groups)
+    for name in bearings:
+        count = data.n_planets if name == "planets" else 1
+        groups[name] = np.arange(start, start + 2 * count).reshape(count, 2)
+        start += 2 * count
+    return groups
+
+
+def planar_meshes(
+    data: PlanarSet,
+    *,
+    stiffness: FourierSeries | StepSeries | MeshExcitation | None = None,
+    harmonics: int | None = None,
+    orders: tuple[int, ...] = (1,),
+    backlash: float | np.ndarray | None = None,
+    separates: bool = True,
+    smoothing: float = 0.0,
+) -> GearMeshes:
+    """The 2N meshes as elements.
+
+    Parameters
+    ----------
+    data : PlanarSet
+    stiffness : FourierSeries, StepSeries or MeshExcitation, optional
+        Of the meshes [N/m], or their static record; the constant stiffnesses of the set when not given.
+    harmonics, orders
+        Of a static record, see `elements.gear_meshes`.
+    backlash : float or (2N,) array, optional
+        Play along the line of action [m]. None takes that of the static record; without one, or where it
+        is zero there, the meshes have no back side.
+    separates, smoothing
+        See `elements.GearMeshes`.
+
+    Raises
+    ------
+    CaseError
+        A static record without the number of its harmonics (E-HARMONICS), values for another number of
+        meshes (E-SHAPE).
+    """
+    made = mesh_elements(stiffness, data.mesh_stiffness, harmonics, orders, record="static record")
+    backlash = made.backlash if backlash is None else backlash
+    return replace(made, backlash=backlash, separates=separates, smoothing=smoothing)
+
+
+def mesh_elements(stiffness, mean: np.ndarray, harmonics, orders, *, record: str) -> GearMeshes:
+    """Elements on the first columns of ``W``, of mean stiffness where none is given; see `planar_meshes`."""
+    columns = np.arange(len(mean))
+    if not isinstance(stiffness, MeshExcitation):
+        return GearMeshes(columns, constant(mean) if stiffness is None else stiffness)
+    if harmonics is None:
+        raise CaseError(
+            f"the mesh harmonics of the {record} are not said", code="E-HARMONICS", key="harmonics",
+            limit="a whole number of 1 or more",
+        )  # fmt: skip
+    return gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
 
 
 def mesh_directions(data: PlanarSet, flank: int = 1) -> np.ndarray:
@@ -223,55 +272,6 @@ def _bearing_columns(data: PlanarSet, name: str) -> np.ndarray:
         return pin_directions(data).reshape(-1, 2 * data.n_planets)
     first = 3 * CENTRAL.index(name)
     return np.eye(3 * (data.n_planets + 3))[:, first : first + 2]
-
-
-def planar_meshes(
-    data: PlanarSet,
-    *,
-    stiffness: FourierSeries | StepSeries | MeshExcitation | None = None,
-    harmonics: int | None = None,
-    orders: tuple[int, ...] = (1,),
-    backlash: float | np.ndarray | None = None,
-    separates: bool = True,
-    smoothing: float = 0.0,
-) -> GearMeshes:
-    """The 2N meshes as elements.
-
-    Parameters
-    ----------
-    data : PlanarSet
-    stiffness : FourierSeries, StepSeries or MeshExcitation, optional
-        Of the meshes [N/m], or their static record; the constant stiffnesses of the set when not given.
-    harmonics, orders
-        Of a static record, see `femgear.system.elements.gear_meshes`.
-    backlash : float or (2N,) array, optional
-        Play along the line of action [m]. None takes that of the static record; without one, or where it
-        is zero there, the meshes have no back side.
-    separates, smoothing
-        See `femgear.system.elements.GearMeshes`.
-
-    Raises
-    ------
-    CaseError
-        A static record without the number of its harmonics (E-HARMONICS), values for another number of
-        meshes (E-SHAPE).
-    """
-    made = mesh_elements(stiffness, data.mesh_stiffness, harmonics, orders, record="static record")
-    backlash = made.backlash if backlash is None else backlash
-    return replace(made, backlash=backlash, separates=separates, smoothing=smoothing)
-
-
-def mesh_elements(stiffness, mean: np.ndarray, harmonics, orders, *, record: str) -> GearMeshes:
-    """Elements on the first columns of ``W``, of mean stiffness where none is given; see `planar_meshes`."""
-    columns = np.arange(len(mean))
-    if not isinstance(stiffness, MeshExcitation):
-        return GearMeshes(columns, constant(mean) if stiffness is None else stiffness)
-    if harmonics is None:
-        raise CaseError(
-            f"the mesh harmonics of the {record} are not said", code="E-HARMONICS", key="harmonics",
-            limit="a whole number of 1 or more",
-        )  # fmt: skip
-    return gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
 
 
 def planar_springs(data: PlanarSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:

@@ -2,8 +2,8 @@
 
 An element acts on groups of columns of ``W`` and gives, for their deflections ``x = W^T q``, the forces
 ``f(x, t)`` of ``M q'' + C q' + K q + W f = load`` and the tangents ``df/dx``, for all instants at once.
-
-Instants of a period at which tangents jump: contacts that open or close, steps of a stiffness.
+Tangents jump where contacts open or close and where a stiffness steps; `tangent_jumps` finds these instants
+of a period.
 """
 
 from __future__ import annotations
@@ -21,6 +21,15 @@ from femgear.system.system import MeshExcitation
 
 # Phases a harmonic at which the sign of a stiffness is looked at, and rounding of its size.
 _PHASES, _ROUNDING = 32, 1e-12
+# Intervals of a period that are searched, and the share of a change that must be unlike its neighbours'.
+_INTERVALS = 512
+_UNLIKE = 0.1
+# Jumps below this share of the largest tangent do not count.
+_SMALL = 1e-9
+# Halvings before and after which a change that stays is a jump, and halvings down to rounding.
+_FIRST, _SECOND, _LAST = 6, 12, 50
+# Times that an interval is searched for one more jump.
+_ROUNDS = 4
 
 
 class Element(Protocol):
@@ -343,64 +352,6 @@ class PiecewiseSprings:
         return force[..., None], (self.slopes[0] + slope @ change)[..., None, None]
 
 
-def _check_pressing(stiffness) -> None:
-    """Refuse a stiffness of parting teeth that is negative somewhere in its period."""
-    if isinstance(stiffness, StepSeries):
-        values, turn = stiffness.values, stiffness.breaks
-    elif isinstance(stiffness, FourierSeries):
-        count = stiffness.amplitudes.shape[1]
-        turn = np.arange(_PHASES * count) / (_PHASES * count)
-        wave = np.exp(2j * np.pi * turn[:, None] * np.arange(count))
-        values = (stiffness.amplitudes @ wave.T).real
-    else:
-        return  # values on a grid, of a series that has been checked
-    lowest = values.min(axis=1)
-    mesh = int(np.argmin(lowest))
-    if not lowest[mesh] >= -_ROUNDING * np.abs(values[mesh]).max():
-        instant = float(turn[np.argmin(values[mesh])])
-        raise CaseError(
-            f"the stiffness of mesh {mesh + 1} is {lowest[mesh]:.4g} N/m at {instant:.4g} of its period, and "
-            "its teeth part", code="E-STIFFNESS", key="stiffness", value=float(lowest[mesh]),
-            limit="0 N/m or more at every instant",
-            remedy="lower the fluctuation or keep other harmonics of k(t), or take separates=False for a "
-            "line that may pull",
-        )  # fmt: skip
-
-
-def _columns(columns, width: int) -> np.ndarray:
-    """Columns as a (g, width) integer array."""
-    array = np.array(columns)
-    array = array.reshape(-1, width) if array.ndim < 2 else array
-    if array.shape[1] != width or not np.issubdtype(array.dtype, np.integer) or np.any(array < 0):
-        raise CaseError(
-            f"columns {array.tolist()}", code="E-SHAPE", limit=f"groups of {width} column numbers of W"
-        )
-    array.setflags(write=False)
-    return array
-
-
-def _numbers(value, key: str, code: str = "E-SHAPE") -> np.ndarray:
-    """A copy of the numbers, without text."""
-    return checked_numbers(value, key, code=code, unit="").copy()
-
-
-def _positive(name: str, value: float) -> None:
-    value = _numbers(value, name, "E-SMOOTHING")
-    if not (np.isfinite(value) and value >= 0.0):
-        raise CaseError(f"{name} of {value} m", code="E-SMOOTHING", limit="0 m or more")
-
-
-# Intervals of a period that are searched, and the share of a change that must be unlike its neighbours'.
-_INTERVALS = 512
-_UNLIKE = 0.1
-# Jumps below this share of the largest tangent do not count.
-_SMALL = 1e-9
-# Halvings before and after which a change that stays is a jump, and halvings down to rounding.
-_FIRST, _SECOND, _LAST = 6, 12, 50
-# Times that an interval is searched for one more jump.
-_ROUNDS = 4
-
-
 def tangent_jumps(tangents: Callable, states: np.ndarray, *, intervals: int = _INTERVALS) -> list[np.ndarray]:
     """Fractions of the period, for every state, at which its tangents jump; ascending, zero left out.
 
@@ -466,3 +417,50 @@ def _sorted(fractions) -> np.ndarray:
     values = np.sort(np.asarray(fractions, float))
     values = values[(values > 1e-13) & (values < 1.0 - 1e-13)]
     return values[np.diff(values, prepend=-1.0) > 1e-13]
+
+
+def _check_pressing(stiffness) -> None:
+    """Refuse a stiffness of parting teeth that is negative somewhere in its period."""
+    if isinstance(stiffness, StepSeries):
+        values, turn = stiffness.values, stiffness.breaks
+    elif isinstance(stiffness, FourierSeries):
+        count = stiffness.amplitudes.shape[1]
+        turn = np.arange(_PHASES * count) / (_PHASES * count)
+        wave = np.exp(2j * np.pi * turn[:, None] * np.arange(count))
+        values = (stiffness.amplitudes @ wave.T).real
+    else:
+        return  # values on a grid, of a series that has been checked
+    lowest = values.min(axis=1)
+    mesh = int(np.argmin(lowest))
+    if not lowest[mesh] >= -_ROUNDING * np.abs(values[mesh]).max():
+        instant = float(turn[np.argmin(values[mesh])])
+        raise CaseError(
+            f"the stiffness of mesh {mesh + 1} is {lowest[mesh]:.4g} N/m at {instant:.4g} of its period, and "
+            "its teeth part", code="E-STIFFNESS", key="stiffness", value=float(lowest[mesh]),
+            limit="0 N/m or more at every instant",
+            remedy="lower the fluctuation or keep other harmonics of k(t), or take separates=False for a "
+            "line that may pull",
+        )  # fmt: skip
+
+
+def _columns(columns, width: int) -> np.ndarray:
+    """Columns as a (g, width) integer array."""
+    array = np.array(columns)
+    array = array.reshape(-1, width) if array.ndim < 2 else array
+    if array.shape[1] != width or not np.issubdtype(array.dtype, np.integer) or np.any(array < 0):
+        raise CaseError(
+            f"columns {array.tolist()}", code="E-SHAPE", limit=f"groups of {width} column numbers of W"
+        )
+    array.setflags(write=False)
+    return array
+
+
+def _numbers(value, key: str, code: str = "E-SHAPE") -> np.ndarray:
+    """A copy of the numbers, without text."""
+    return checked_numbers(value, key, code=code, unit="").copy()
+
+
+def _positive(name: str, value: float) -> None:
+    value = _numbers(value, name, "E-SMOOTHING")
+    if not (np.isfinite(value) and value >= 0.0):
+        raise CaseError(f"{name} of {value} m", code="E-SMOOTHING", limit="0 m or more")

@@ -1,6 +1,6 @@
-"""Data of the lumped planetary set: rigid bodies, supports, radii, angles and torques.
+"""Data of planetary sets of rigid bodies: bodies, supports, radii, angles, torques, refusals.
 
-Refusals of data that no lumped planetary set can have.
+The planar set moves in its plane (E-PLANAR), helical bodies in all six directions (E-HELICAL).
 """
 
 from __future__ import annotations
@@ -18,65 +18,8 @@ from femgear.errors import CaseError
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
-
-def check_body(name: str, body: PlanarBody) -> None:
-    """Refuse a mass, inertia or support (E-PLANAR)."""
-    for entry, unit in (("mass", "kg"), ("inertia", "kg m^2")):
-        value = getattr(body, entry)
-        if not (math.isfinite(value) and value > 0.0):
-            _refuse(f"{name}.{entry}", value, unit, "finite and above 0")
-    for entry, unit in (("support", "N/m"), ("torsional_support", "N m/rad")):
-        value = getattr(body, entry)
-        if not value >= 0.0:
-            _refuse(f"{name}.{entry}", value, unit, "0 or more, or infinite")
-        if name == "planet" and value:
-            _refuse(f"planet.{entry}", value, unit, "0", remedy="give planet_bearing of the set")
-
-
-def check_set(data: PlanarSet) -> None:
-    """Refuse radii, angles and stiffnesses (E-PLANAR)."""
-    for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
-        value = getattr(data, name)
-        if not (math.isfinite(value) and value > 0.0):
-            _refuse(name, value, "m", "finite and above 0")
-    for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
-        value = getattr(data, name)
-        if not 0.0 < value < 0.5 * math.pi:
-            _refuse(name, value, "rad", "between 0 and pi/2", remedy="give radians")
-    for name in ("stiffness_sun_planet", "stiffness_planet_ring", "planet_bearing"):
-        values, allowed = getattr(data, name), "finite and above 0"
-        wrong = ~np.isfinite(values) | ~(values > 0.0)
-        if name == "planet_bearing":
-            allowed, wrong = "above 0, or infinite", ~(values > 0.0)
-        if len(values) != data.n_planets:
-            _refuse(name, f"{len(values)} values", "", f"one number, or {data.n_planets}")
-        if np.any(wrong):
-            _refuse(name, values[wrong][0], "N/m", allowed)
-    check_angles(data.planet_angles, code="E-PLANAR")
-
-
-def check_angles(angles: np.ndarray, *, code: str) -> None:
-    """Refuse planet angles that are none, unordered or span more than a turn."""
-    allowed = "one or more, finite, ascending, within one turn"
-    if not angles.size or angles.ndim != 1 or not np.all(np.isfinite(angles)):
-        refuse("planet_angles", angles.tolist(), "rad", allowed, code=code)
-    if np.any(np.diff(angles) < 1e-9) or np.ptp(angles) > 2.0 * math.pi - 1e-9:
-        remedy = "give radians, in ascending order"
-        refuse("planet_angles", angles.tolist(), "rad", allowed, code=code, remedy=remedy)
-
-
-def refuse(key: str, value, unit: str, limit: str, *, code: str, remedy: str | None = None):
-    """Refuse an entry of a set, such as ``planet.mass``, with its value and what is allowed."""
-    raise CaseError(
-        f"{key.replace('_', ' ').replace('.', ': ')} of {value} {unit}".rstrip(),
-        code=code, key=key, value=value, limit=limit, remedy=remedy,
-    )  # fmt: skip
-
-
-_refuse = partial(refuse, code="E-PLANAR")
-
-
 CENTRAL = ("carrier", "ring", "sun")
+DIRECTIONS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}
 
 
 @dataclass(frozen=True)
@@ -226,14 +169,70 @@ class PlanarTorque:
             raise CaseError(f"a torque of {self.torque} N m", code="E-VALUE", limit="finite")
 
 
-def inertia_of_reduced(reduced: float, radius: float) -> float:
-    """Polar inertia [kg m^2] of ``I / r^2`` [kg] at the radius [m] of ``u = r theta``."""
-    return reduced * radius**2
+@dataclass(frozen=True, eq=False)
+class HelicalSupport:
+    """Isotropic support of a body in all six directions; infinite holds a motion, zero leaves it free.
+
+    Parameters
+    ----------
+    radial, axial : float
+        [N/m]
+    tilt, torsional : float
+        Against rotation about the two axes in the plane, and about the axis of the body [N m/rad].
+
+    Notes
+    -----
+    As `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
+
+    Raises
+    ------
+    CaseError
+        Stiffnesses that are no numbers, negative or NaN (E-HELICAL).
+    """
+
+    radial: float | np.ndarray = 0.0
+    axial: float | np.ndarray = 0.0
+    tilt: float | np.ndarray = 0.0
+    torsional: float | np.ndarray = 0.0
+
+    def __post_init__(self):
+        check_support("support", self)
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Of the six directions, (6,) or (N, 6): two radial, axial, two tilts, torsional."""
+        r, z, w, u = np.broadcast_arrays(self.radial, self.axial, self.tilt, self.torsional)
+        return np.stack([r, r, z, w, w, u], axis=-1).astype(float)
 
 
-def torsional_of_reduced(stiffness: float, radius: float) -> float:
-    """Torsional stiffness [N m/rad] of a stiffness ``k_u`` [N/m] that acts on ``u = r theta``."""
-    return stiffness * radius**2
+@dataclass(frozen=True)
+class HelicalBody:
+    """A rigid body.
+
+    Parameters
+    ----------
+    mass : float
+        [kg]
+    inertia : float
+        Polar inertia about its axis [kg m^2].
+    diametral_inertia : float
+        About the axes in the plane through its centre [kg m^2].
+    support : HelicalSupport
+        To the housing.
+
+    Raises
+    ------
+    CaseError
+        Mass or inertias that are not finite and above 0 (E-HELICAL).
+    """
+
+    mass: float
+    inertia: float
+    diametral_inertia: float
+    support: HelicalSupport = field(default_factory=HelicalSupport)
+
+    def __post_init__(self):
+        check_helical_body("body", self)
 
 
 def planar_from_set(
@@ -300,18 +299,6 @@ def torque_shares(data: RigidSet) -> dict[str, float]:
     return {"sun": 1.0, "ring": 1.0, "carrier": -both}
 
 
-def member_radius(data: RigidSet, member: str) -> float:
-    """Radius [m] of ``u = r theta`` of the carrier, ring or sun."""
-    return data.centre_distance if member == "carrier" else getattr(data, f"{member}_radius")
-
-
-def flank_sign(data: RigidSet, torque: PlanarTorque | None) -> int:
-    """1 where the loaded flanks are those of a sun that drives counter-clockwise, else -1."""
-    if torque is None:
-        return 1
-    return -1 if torque.torque * torque_shares(data)[torque.member] < 0.0 else 1
-
-
 def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -> np.ndarray:
     """Forces on ``u`` of the driven member and the output, in static balance by `torque_shares`.
 
@@ -343,6 +330,18 @@ def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -
     return load
 
 
+def flank_sign(data: RigidSet, torque: PlanarTorque | None) -> int:
+    """1 where the loaded flanks are those of a sun that drives counter-clockwise, else -1."""
+    if torque is None:
+        return 1
+    return -1 if torque.torque * torque_shares(data)[torque.member] < 0.0 else 1
+
+
+def member_radius(data: RigidSet, member: str) -> float:
+    """Radius [m] of ``u = r theta`` of the carrier, ring or sun."""
+    return data.centre_distance if member == "carrier" else getattr(data, f"{member}_radius")
+
+
 def body_masses(data: PlanarSet) -> np.ndarray:
     """Mass, mass and ``I / r^2`` (N + 3, 3) [kg] of carrier, ring, sun and planets."""
     bodies = [(getattr(data, name), member_radius(data, name)) for name in CENTRAL]
@@ -350,10 +349,60 @@ def body_masses(data: PlanarSet) -> np.ndarray:
     return np.array([(body.mass, body.mass, body.inertia / r**2) for body, r in bodies])
 
 
-DIRECTIONS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}
+def inertia_of_reduced(reduced: float, radius: float) -> float:
+    """Polar inertia [kg m^2] of ``I / r^2`` [kg] at the radius [m] of ``u = r theta``."""
+    return reduced * radius**2
 
 
-_refuse_checks__body = partial(refuse, code="E-HELICAL")
+def torsional_of_reduced(stiffness: float, radius: float) -> float:
+    """Torsional stiffness [N m/rad] of a stiffness ``k_u`` [N/m] that acts on ``u = r theta``."""
+    return stiffness * radius**2
+
+
+def check_set(data: PlanarSet) -> None:
+    """Refuse radii, angles and stiffnesses (E-PLANAR)."""
+    for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
+        value = getattr(data, name)
+        if not (math.isfinite(value) and value > 0.0):
+            _refuse_planar(name, value, "m", "finite and above 0")
+    for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
+        value = getattr(data, name)
+        if not 0.0 < value < 0.5 * math.pi:
+            _refuse_planar(name, value, "rad", "between 0 and pi/2", remedy="give radians")
+    for name in ("stiffness_sun_planet", "stiffness_planet_ring", "planet_bearing"):
+        values, allowed = getattr(data, name), "finite and above 0"
+        wrong = ~np.isfinite(values) | ~(values > 0.0)
+        if name == "planet_bearing":
+            allowed, wrong = "above 0, or infinite", ~(values > 0.0)
+        if len(values) != data.n_planets:
+            _refuse_planar(name, f"{len(values)} values", "", f"one number, or {data.n_planets}")
+        if np.any(wrong):
+            _refuse_planar(name, values[wrong][0], "N/m", allowed)
+    check_angles(data.planet_angles, code="E-PLANAR")
+
+
+def check_body(name: str, body: PlanarBody) -> None:
+    """Refuse a mass, inertia or support (E-PLANAR)."""
+    for entry, unit in (("mass", "kg"), ("inertia", "kg m^2")):
+        value = getattr(body, entry)
+        if not (math.isfinite(value) and value > 0.0):
+            _refuse_planar(f"{name}.{entry}", value, unit, "finite and above 0")
+    for entry, unit in (("support", "N/m"), ("torsional_support", "N m/rad")):
+        value = getattr(body, entry)
+        if not value >= 0.0:
+            _refuse_planar(f"{name}.{entry}", value, unit, "0 or more, or infinite")
+        if name == "planet" and value:
+            _refuse_planar(f"planet.{entry}", value, unit, "0", remedy="give planet_bearing of the set")
+
+
+def check_angles(angles: np.ndarray, *, code: str) -> None:
+    """Refuse planet angles that are none, unordered or span more than a turn."""
+    allowed = "one or more, finite, ascending, within one turn"
+    if not angles.size or angles.ndim != 1 or not np.all(np.isfinite(angles)):
+        refuse("planet_angles", angles.tolist(), "rad", allowed, code=code)
+    if np.any(np.diff(angles) < 1e-9) or np.ptp(angles) > 2.0 * math.pi - 1e-9:
+        remedy = "give radians, in ascending order"
+        refuse("planet_angles", angles.tolist(), "rad", allowed, code=code, remedy=remedy)
 
 
 def check_helical_body(name: str, body: HelicalBody) -> None:
@@ -361,23 +410,10 @@ def check_helical_body(name: str, body: HelicalBody) -> None:
     for entry, unit in (("mass", "kg"), ("inertia", "kg m^2"), ("diametral_inertia", "kg m^2")):
         value = numbers(f"{name}.{entry}", getattr(body, entry), 0)
         if not (math.isfinite(value) and value > 0.0):
-            _refuse_checks__body(f"{name}.{entry}", value, unit, "finite and above 0")
+            refuse_helical(f"{name}.{entry}", value, unit, "finite and above 0")
     check_support(f"{name}.support", body.support, count=0)
     if name == "planet" and np.any(body.support.stiffness):
-        _refuse_checks__body(
-            "planet.support", "a planet", "", "none", remedy="give planet_bearing of the set"
-        )
-
-
-def numbers(key: str, values, dimensions: int | None = None) -> np.ndarray:
-    """Values as an array of floats, of so many dimensions where they are given (E-HELICAL)."""
-    try:
-        found = np.array(values, float)
-    except (TypeError, ValueError):
-        _refuse_checks__body(key, repr(values), "", "a number" if dimensions == 0 else "numbers")
-    if dimensions is not None and found.ndim != dimensions:
-        _refuse_checks__body(key, f"{found.size} values", "", "one number")
-    return found
+        refuse_helical("planet.support", "a planet", "", "none", remedy="give planet_bearing of the set")
 
 
 def check_support(key: str, support: HelicalSupport, *, count: int | None = None) -> None:
@@ -385,76 +421,33 @@ def check_support(key: str, support: HelicalSupport, *, count: int | None = None
     allowed = f"one number, or {count}" if count else "one number"
     # what is no support has none of its stiffnesses
     if not all(hasattr(support, entry) for entry in DIRECTIONS):
-        _refuse_checks__body(key, repr(support), "", "a HelicalSupport")
+        refuse_helical(key, repr(support), "", "a HelicalSupport")
     for entry, unit in DIRECTIONS.items():
         values = numbers(f"{key}.{entry}", getattr(support, entry))
         if count is not None and values.ndim and values.shape != (count,):
-            _refuse_checks__body(f"{key}.{entry}", f"{values.size} values", "", allowed)
+            refuse_helical(f"{key}.{entry}", f"{values.size} values", "", allowed)
         if not np.all(values >= 0.0):
-            _refuse_checks__body(f"{key}.{entry}", values.min(), unit, "0 or more, or infinite")
+            refuse_helical(f"{key}.{entry}", values.min(), unit, "0 or more, or infinite")
 
 
-@dataclass(frozen=True, eq=False)
-class HelicalSupport:
-    """Isotropic support of a body in all six directions; infinite holds a motion, zero leaves it free.
-
-    Parameters
-    ----------
-    radial, axial : float
-        [N/m]
-    tilt, torsional : float
-        Against rotation about the two axes in the plane, and about the axis of the body [N m/rad].
-
-    Notes
-    -----
-    As `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
-
-    Raises
-    ------
-    CaseError
-        Stiffnesses that are no numbers, negative or NaN (E-HELICAL).
-    """
-
-    radial: float | np.ndarray = 0.0
-    axial: float | np.ndarray = 0.0
-    tilt: float | np.ndarray = 0.0
-    torsional: float | np.ndarray = 0.0
-
-    def __post_init__(self):
-        check_support("support", self)
-
-    @property
-    def stiffness(self) -> np.ndarray:
-        """Of the six directions, (6,) or (N, 6): two radial, axial, two tilts, torsional."""
-        r, z, w, u = np.broadcast_arrays(self.radial, self.axial, self.tilt, self.torsional)
-        return np.stack([r, r, z, w, w, u], axis=-1).astype(float)
+def numbers(key: str, values, dimensions: int | None = None) -> np.ndarray:
+    """Values as an array of floats, of so many dimensions where they are given (E-HELICAL)."""
+    try:
+        found = np.array(values, float)
+    except (TypeError, ValueError):
+        refuse_helical(key, repr(values), "", "a number" if dimensions == 0 else "numbers")
+    if dimensions is not None and found.ndim != dimensions:
+        refuse_helical(key, f"{found.size} values", "", "one number")
+    return found
 
 
-@dataclass(frozen=True)
-class HelicalBody:
-    """A rigid body.
+def refuse(key: str, value, unit: str, limit: str, *, code: str, remedy: str | None = None):
+    """Refuse an entry of a set, such as ``planet.mass``, with its value and what is allowed."""
+    raise CaseError(
+        f"{key.replace('_', ' ').replace('.', ': ')} of {value} {unit}".rstrip(),
+        code=code, key=key, value=value, limit=limit, remedy=remedy,
+    )  # fmt: skip
 
-    Parameters
-    ----------
-    mass : float
-        [kg]
-    inertia : float
-        Polar inertia about its axis [kg m^2].
-    diametral_inertia : float
-        About the axes in the plane through its centre [kg m^2].
-    support : HelicalSupport
-        To the housing.
 
-    Raises
-    ------
-    CaseError
-        Mass or inertias that are not finite and above 0 (E-HELICAL).
-    """
-
-    mass: float
-    inertia: float
-    diametral_inertia: float
-    support: HelicalSupport = field(default_factory=HelicalSupport)
-
-    def __post_init__(self):
-        check_helical_body("body", self)
+_refuse_planar = partial(refuse, code="E-PLANAR")
+refuse_helical = _refuse_checks__body = partial(refuse, code="E-HELICAL")

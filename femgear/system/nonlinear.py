@@ -1,8 +1,7 @@
 """A system with nonlinear elements and harmonic forces: what harmonic balance and time integration solve.
 
-Forces of the elements at known instants: what depends on time alone is tabulated once.
-
-Constant loads that nothing takes up: the free motion that they drive away.
+What of the element forces depends on time alone is tabulated once for known instants (`tabulated_law`). A
+constant load that nothing takes up is told with the free motion that it drives away (`drift_note`).
 """
 
 from __future__ import annotations
@@ -17,6 +16,10 @@ from femgear.system.elements import Element, GearMeshes, PolynomialSprings
 from femgear.system.entries import checked_numbers
 from femgear.system.series import phase_of
 from femgear.system.system import MechanicalSystem
+
+Law = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]
+# Inertia that holds free motions, over the mean stiffness, and the share of the load that counts as balanced.
+_HELD, _BALANCED = 1e-12, 1e-6
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,11 @@ class NonlinearSystem:
         return total
 
     @property
+    def stiffness(self) -> np.ndarray:
+        """``K + W c W^T`` (n, n) with the reference c of the columns [N/m]."""
+        return self.system.K + (self.system.W * self.reference) @ self.system.W.T
+
+    @property
     def bases(self) -> int:
         """Number of base frequencies that the elements and forces name."""
         orders = [force.orders for force in self.forces]
@@ -120,33 +128,6 @@ def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
             remedy="leave out those that drive nothing, or give elements and forces one order a frequency",
         )  # fmt: skip
     return frequency
-
-
-def _check_system(system: MechanicalSystem) -> None:
-    """Refuse matrices of wrong shapes, numbers that are not finite, wrong symmetries, W without columns."""
-    n = len(system.M)
-    shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "load": (n,), "gyroscopic": (n, n)}
-    for name, shape in shapes.items():
-        array = getattr(system, name)
-        if array is None and name == "gyroscopic":
-            continue
-        if array.shape != shape:
-            raise CaseError(f"{name} has shape {array.shape}", code="E-SHAPE", limit=f"{shape}, as M")
-        if not np.all(np.isfinite(array)):
-            raise CaseError(f"{name} holds numbers that are not finite", code="E-FINITE")
-        size = np.abs(array).max(initial=0.0)
-        # circulatory forces make K unsymmetric, which time integration and shooting take
-        sign = {"M": 1.0, "gyroscopic": -1.0}.get(name, 0.0)
-        if sign and np.abs(array - sign * array.T).max(initial=0.0) > 1e-9 * size:
-            kind = "symmetric" if sign > 0 else "skew-symmetric"
-            raise CaseError(f"{name} is not {kind}", code="E-SYMMETRY", limit=f"{kind} to 1e-9")
-    if system.W.ndim != 2 or len(system.W) != n or not system.W.shape[1]:
-        raise CaseError(
-            f"W has shape {system.W.shape}", code="E-SHAPE", limit=f"({n}, 1 or more deflections)",
-            remedy="give one column for every deflection of an element",
-        )  # fmt: skip
-    if not np.all(np.isfinite(system.W)):
-        raise CaseError("W holds numbers that are not finite", code="E-FINITE")
 
 
 def element_forces(problem: NonlinearSystem, x, theta) -> tuple[np.ndarray, np.ndarray]:
@@ -180,9 +161,6 @@ def external_force(problem: NonlinearSystem, theta) -> np.ndarray:
     return total
 
 
-Law = Callable[[int, np.ndarray], tuple[np.ndarray, np.ndarray]]
-
-
 def tabulated_law(problem: NonlinearSystem, theta) -> Law:
     """A function of instant number and deflections: forces and tangents beyond the reference stiffness.
 
@@ -201,12 +179,12 @@ def tabulated_law(problem: NonlinearSystem, theta) -> Law:
     """
     theta, reference = np.asarray(theta, float), problem.reference
     every = np.arange(len(reference))
-    parts = [(element.columns, _single(element, theta)) for element in problem.elements]
+    parts = [(element.columns, _single_law(element, theta)) for element in problem.elements]
     if not parts:
         nothing = np.zeros(len(reference))
         return lambda i, x: (nothing, nothing)
     if any(columns.shape[1] > 1 for columns, _ in parts):
-        return _coupled(problem, theta)
+        return _coupled_law(problem, theta)
     if len(parts) == 1 and np.array_equal(parts[0][0][:, 0], every):
         only = parts[0][1]
 
@@ -226,103 +204,6 @@ def tabulated_law(problem: NonlinearSystem, theta) -> Law:
         return total, tangent
 
     return summed
-
-
-def _single(element: Element, theta) -> Law:
-    """Forces (g,) and slopes (g,) of an element on single columns."""
-    if type(element) is GearMeshes:
-        return _meshes(element, theta)
-    if type(element) is PolynomialSprings:
-        return _polynomial(element)
-
-    def general(i, x):
-        force, slope = element.evaluate(x[:, None], theta[i])
-        return force[:, 0], slope[:, 0, 0]
-
-    return general
-
-
-def _polynomial(element: PolynomialSprings) -> Law:
-    """``PolynomialSprings.evaluate`` with the coefficients of force and slope ready for Horner's rule."""
-    force_terms = list(element.coefficients.T[::-1])
-    slope_terms = [c * (len(force_terms) - d) for d, c in enumerate(force_terms)]
-
-    def law(i, x):
-        force, slope = force_terms[0], slope_terms[0]
-        for f, s in zip(force_terms[1:], slope_terms[1:]):
-            force, slope = force * x + f, slope * x + s
-        return force * x, slope
-
-    return law
-
-
-def _meshes(element: GearMeshes, theta) -> Law:
-    """``GearMeshes.evaluate`` with its series tabulated."""
-    k = np.array(element.stiffness.at(theta))
-    offset = element.force.at(theta) - k * element.deflection.at(theta)
-    if not element.separates:
-        return lambda i, x: (offset[i] + k[i] * x, k[i])
-    has_back = np.isfinite(element.backlash)
-    play = k * np.where(has_back, element.backlash, 0.0)
-    play[:, ~has_back] = np.inf
-    if element.smoothing:
-        return _smooth_meshes(k, offset, play, element.smoothing)
-    if not np.any(has_back):
-
-        def drive(i, x):
-            stiffness = k[i]
-            line = offset[i] + stiffness * x
-            closed = line > 0.0
-            return line * closed, stiffness * closed
-
-        return drive
-
-    def both(i, x):
-        stiffness = k[i]
-        line = offset[i] + stiffness * x
-        behind = line + play[i]
-        drive, back = line > 0.0, behind < 0.0
-        return np.maximum(line, 0.0) + np.minimum(behind, 0.0), stiffness * (drive | back)
-
-    return both
-
-
-def _smooth_meshes(k, offset, play, smoothing) -> Law:
-    length = smoothing * k
-    square = length * length
-    finite = np.isfinite(play[0])
-    gap = np.where(finite, play, 0.0)
-
-    def smooth(i, x):
-        line = offset[i] + k[i] * x
-        root = np.sqrt(line * line + square[i])
-        force, slope = 0.5 * (line + root), 0.5 * (1.0 + line / root)
-        behind = np.where(finite, -line - gap[i], 0.0)
-        root = np.sqrt(behind * behind + square[i])
-        back, back_slope = 0.5 * (behind + root), 0.5 * (1.0 + behind / root)
-        return force - finite * back, k[i] * (slope + finite * back_slope)
-
-    return smooth
-
-
-def _coupled(problem: NonlinearSystem, theta) -> Law:
-    """Elements on groups of columns, evaluated as they are."""
-    reference = np.diag(problem.reference)
-
-    def law(i, x):
-        total, tangent = -reference @ x, -reference
-        for element in problem.elements:
-            force, slope = element.evaluate(x[element.columns], theta[i])
-            for columns, f, t in zip(element.columns, force, slope):
-                total[columns] += f
-                tangent[columns[:, None], columns] += t
-        return total, tangent
-
-    return law
-
-
-# Inertia that holds free motions, over the mean stiffness, and the share of the load that counts as balanced.
-_HELD, _BALANCED = 1e-12, 1e-6
 
 
 def drift_note(problem: NonlinearSystem) -> str:
@@ -356,3 +237,123 @@ def drift_note(problem: NonlinearSystem) -> str:
         f"; the mean drifts: nothing takes up {share:.2g} of the constant load (it drives {name} away), "
         "balance it or add a support"
     )
+
+
+def _check_system(system: MechanicalSystem) -> None:
+    """Refuse matrices of wrong shapes, numbers that are not finite, wrong symmetries, W without columns."""
+    n = len(system.M)
+    shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "load": (n,), "gyroscopic": (n, n)}
+    for name, shape in shapes.items():
+        array = getattr(system, name)
+        if array is None and name == "gyroscopic":
+            continue
+        if array.shape != shape:
+            raise CaseError(f"{name} has shape {array.shape}", code="E-SHAPE", limit=f"{shape}, as M")
+        if not np.all(np.isfinite(array)):
+            raise CaseError(f"{name} holds numbers that are not finite", code="E-FINITE")
+        size = np.abs(array).max(initial=0.0)
+        # circulatory forces make K unsymmetric, which time integration and shooting take
+        sign = {"M": 1.0, "gyroscopic": -1.0}.get(name, 0.0)
+        if sign and np.abs(array - sign * array.T).max(initial=0.0) > 1e-9 * size:
+            kind = "symmetric" if sign > 0 else "skew-symmetric"
+            raise CaseError(f"{name} is not {kind}", code="E-SYMMETRY", limit=f"{kind} to 1e-9")
+    if system.W.ndim != 2 or len(system.W) != n or not system.W.shape[1]:
+        raise CaseError(
+            f"W has shape {system.W.shape}", code="E-SHAPE", limit=f"({n}, 1 or more deflections)",
+            remedy="give one column for every deflection of an element",
+        )  # fmt: skip
+    if not np.all(np.isfinite(system.W)):
+        raise CaseError("W holds numbers that are not finite", code="E-FINITE")
+
+
+def _single_law(element: Element, theta) -> Law:
+    """Forces (g,) and slopes (g,) of an element on single columns."""
+    if type(element) is GearMeshes:
+        return _mesh_law(element, theta)
+    if type(element) is PolynomialSprings:
+        return _polynomial_law(element)
+
+    def general(i, x):
+        force, slope = element.evaluate(x[:, None], theta[i])
+        return force[:, 0], slope[:, 0, 0]
+
+    return general
+
+
+def _polynomial_law(element: PolynomialSprings) -> Law:
+    """``PolynomialSprings.evaluate`` with the coefficients of force and slope ready for Horner's rule."""
+    force_terms = list(element.coefficients.T[::-1])
+    slope_terms = [c * (len(force_terms) - d) for d, c in enumerate(force_terms)]
+
+    def law(i, x):
+        force, slope = force_terms[0], slope_terms[0]
+        for f, s in zip(force_terms[1:], slope_terms[1:]):
+            force, slope = force * x + f, slope * x + s
+        return force * x, slope
+
+    return law
+
+
+def _mesh_law(element: GearMeshes, theta) -> Law:
+    """``GearMeshes.evaluate`` with its series tabulated."""
+    k = np.array(element.stiffness.at(theta))
+    offset = element.force.at(theta) - k * element.deflection.at(theta)
+    if not element.separates:
+        return lambda i, x: (offset[i] + k[i] * x, k[i])
+    has_back = np.isfinite(element.backlash)
+    play = k * np.where(has_back, element.backlash, 0.0)
+    play[:, ~has_back] = np.inf
+    if element.smoothing:
+        return _smooth_mesh_law(k, offset, play, element.smoothing)
+    if not np.any(has_back):
+
+        def drive(i, x):
+            stiffness = k[i]
+            line = offset[i] + stiffness * x
+            closed = line > 0.0
+            return line * closed, stiffness * closed
+
+        return drive
+
+    def both(i, x):
+        stiffness = k[i]
+        line = offset[i] + stiffness * x
+        behind = line + play[i]
+        drive, back = line > 0.0, behind < 0.0
+        return np.maximum(line, 0.0) + np.minimum(behind, 0.0), stiffness * (drive | back)
+
+    return both
+
+
+def _smooth_mesh_law(k, offset, play, smoothing) -> Law:
+    length = smoothing * k
+    square = length * length
+    finite = np.isfinite(play[0])
+    gap = np.where(finite, play, 0.0)
+
+    def smooth(i, x):
+        line = offset[i] + k[i] * x
+        root = np.sqrt(line * line + square[i])
+        force, slope = 0.5 * (line + root), 0.5 * (1.0 + line / root)
+        behind = np.where(finite, -line - gap[i], 0.0)
+        root = np.sqrt(behind * behind + square[i])
+        back, back_slope = 0.5 * (behind + root), 0.5 * (1.0 + behind / root)
+        return force - finite * back, k[i] * (slope + finite * back_slope)
+
+    return smooth
+
+
+def _coupled_law(problem: NonlinearSystem, theta) -> Law:
+    """Elements on groups of columns, evaluated as they are."""
+    reference = np.diag(problem.reference)
+
+    def law(i, x):
+        total, tangent = -reference @ x, -reference
+        for element in problem.elements:
+            force, slope = element.evaluate(x[element.columns], theta[i])
+            for columns, f, t in zip(element.columns, force, slope):
+                total[columns] += f
+                tangent[columns[:, None], columns] += t
+        return total, tangent
+
+    return law

@@ -1,10 +1,9 @@
-"""Coefficients that repeat with the phases of one or several base frequencies.
+"""Fourier series over one or several base frequencies: harmonics, repeating coefficients, spectral lines.
 
-Harmonics of real periodic signals, ``x(t) = Re sum_{h=0..H} X_h exp(i h omega t)``, and their products.
-
-Coefficients that repeat with several base frequencies at once: sums of Fourier series.
-
-Lines of a spectrum over one or several base frequencies: the combinations ``orders . omega`` kept.
+Harmonics of real periodic signals are one-sided, ``x(t) = Re sum_{h=0..H} X_h exp(i h omega t)``, and a
+product of signals is a matrix on them. Coefficients of elements repeat with the phases of the base
+frequencies, as a Fourier series, in steps, or as a sum of Fourier series with several base frequencies at
+once. Lines of a spectrum are the combinations ``orders . omega`` kept.
 """
 
 from __future__ import annotations
@@ -16,6 +15,11 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.system.entries import checked_numbers
 from femgear.system.system import MeshExcitation
+
+# Fluctuation, relative to the mean, below which there is none.
+_ROUNDING = 1e-12
+# Difference of two line frequencies, relative to the highest one, below which they are one.
+_COINCIDE = 1e-9
 
 
 def harmonics_of(samples, count: int) -> np.ndarray:
@@ -331,16 +335,10 @@ def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np
     rates, lines = np.concatenate(rates), np.concatenate(lines, axis=1)
     order = np.argsort(rates, kind="stable")
     rates, lines = rates[order], lines[:, order]
-    first = np.flatnonzero(np.diff(rates, prepend=-np.inf) > 1e-9 * rates.max(initial=0.0))
+    first = np.flatnonzero(np.diff(rates, prepend=-np.inf) > _COINCIDE * rates.max(initial=0.0))
     total = np.add.reduceat(lines, first, axis=1)
     total[:, 0] = total[:, 0].real
     return rates[first], total
-
-
-# Fluctuation, relative to the mean, below which there is none.
-_ROUNDING = 1e-12
-# Difference of two line frequencies, relative to the highest one, below which they are one.
-_COINCIDE = 1e-9
 
 
 def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:

@@ -1,8 +1,7 @@
 """Shafts that bend, shear and twist: Timoshenko beam elements, and two links with a joint of three springs.
 
 Every station has five coordinates, x and y across the axis, the tilts about x and y, and the rotation about
-the
-axis z; there is no axial motion. Stiffness and consistent mass: J. S. Przemieniecki, Theory of Matrix
+the axis z; there is no axial motion. Stiffness and consistent mass: J. S. Przemieniecki, Theory of Matrix
 Structural Analysis (1968), sections 5.6 and 11.3; gyroscopic terms: H. D. Nelson, J. Mech. Des. 102 (1980)
 793-803.
 """

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 
-def _freeze(obj, *names):
-    """Turn the named array fields into read-only contiguous arrays."""
+def freeze(obj, *names):
+    """Turn the named array fields of a frozen dataclass into read-only contiguous arrays."""
     for name in names:
         value = getattr(obj, name)
         if value is not None:
@@ -51,7 +51,7 @@ class MechanicalSystem:
     flexibility: np.ndarray | None = None
 
     def __post_init__(self):
-        _freeze(self, "M", "C", "K", "W", "load", "gyroscopic", "flexibility")
+        freeze(self, "M", "C", "K", "W", "load", "gyroscopic", "flexibility")
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class MeshExcitation:
     periods: int = 1
 
     def __post_init__(self):
-        _freeze(self, "stiffness", "deflection", "force", "backlash")
+        freeze(self, "stiffness", "deflection", "force", "backlash")
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class Modes:
     modal_load: np.ndarray | None = None
 
     def __post_init__(self):
-        _freeze(
+        freeze(
             self,
             "frequency",
             "damping_ratio",
@@ -187,7 +187,7 @@ class Response:
     periods: int = 1
 
     def __post_init__(self):
-        _freeze(
+        freeze(
             self,
             "mesh_frequency",
             "deflection",

@@ -1,18 +1,17 @@
-"""Errors of a planetary set as mesh deflections, each at its own frequency in the carrier frame.
+"""Errors of a planetary set as mesh deflections in the carrier frame, and its dampers from damping ratios.
 
-Teeth whose axis stands off the axis of rotation by an eccentricity turn with their member. In the frame of
-the carrier the sun, the planets and the ring turn with the mesh frequency over their numbers of teeth. The
-approach of flanks is that of the mesh columns, so that an eccentricity E of the sun changes the deflections
-at which the flanks of mesh n touch unloaded by ``E sin(psi_n - alpha - phi)``, phi its direction (Kahraman,
-J. Mech. Des. 116 (1994) 713-720, errors of the teeth; Mech. Mach. Theory 29 (1994) 1151-1165, runout). The
-carrier's own eccentricity stands still in its frame: see `carrier_pins`.
+Every error has its own frequency. Teeth whose axis stands off the axis of rotation by an eccentricity turn
+with their member. In the frame of the carrier the sun, the planets and the ring turn with the mesh frequency
+over their numbers of teeth. The approach of flanks is that of the mesh columns, so that an eccentricity E of
+the sun changes the deflections at which the flanks of mesh n touch unloaded by ``E sin(psi_n - alpha -
+phi)``, phi its direction (Kahraman, J. Mech. Des. 116 (1994) 713-720, errors of the teeth; Mech. Mach. Theory
+29 (1994) 1151-1165, runout). The carrier's own eccentricity stands still in its frame: see `carrier_pins`.
 
-Viscous dampers of meshes and supports from damping ratios, spring by spring.
-
-``c = 2 xi sqrt(k m_1 m_2 / (m_1 + m_2))`` for a mesh between two gears and ``c = 2 xi sqrt(k m)`` for a
-support: each spring with its own masses alone would be damped by xi (S. S. Rao, Mechanical Vibrations,
-section 2.6, critical damping, with the reduced mass of two bodies). In the whole set the ratio of a mode
-comes out of all dampers; `femgear.solvers.linear.modal.modal_damping` gives every mode a ratio instead.
+Viscous dampers of meshes and supports follow from damping ratios, spring by spring: ``c = 2 xi sqrt(k m_1 m_2
+/ (m_1 + m_2))`` for a mesh between two gears and ``c = 2 xi sqrt(k m)`` for a support. Each spring with its
+own masses alone would be damped by xi (S. S. Rao, Mechanical Vibrations, section 2.6, critical damping, with
+the reduced mass of two bodies). In the whole set the ratio of a mode comes out of all dampers;
+`femgear.solvers.linear.modal.modal_damping` gives every mode a ratio instead.
 """
 
 from __future__ import annotations
@@ -208,7 +207,7 @@ def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
 def with_errors(
     problem: NonlinearSystem, errors: TransmissionErrors, *, dampers=None, mesh_frequency: float | None = None
 ) -> NonlinearSystem:
-    """A lumped planetary problem with the errors added to the deflections of its drive flanks.
+    """A problem of `planar_problem` with the errors added to the deflections of its drive flanks.
 
     Parameters
     ----------
@@ -273,41 +272,6 @@ def carrier_pins(data: PlanarSet, amplitude: float, phase: float = 0.0) -> np.nd
             raise CaseError(f"a {name} of {value}", code="E-ERRORS", key=name, limit="one finite number")
     angle = phase - data.planet_angles
     return amplitude * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-
-
-def _check_teeth(data: PlanarSet, teeth) -> None:
-    """Refuse numbers that are no teeth, or not those of the base radii."""
-    names = ("sun", "planet", "ring")
-    values = [teeth.get(name) for name in names] if isinstance(teeth, dict) else [None]
-    numbers = [
-        z for z in values if isinstance(z, int | float | np.number) and float(z).is_integer() and z >= 1
-    ]
-    if len(numbers) != 3:
-        raise CaseError(
-            f"errors of gears with teeth {teeth}", code="E-ERRORS", key="teeth",
-            limit="whole numbers of sun, planet and ring, 1 or more",
-        )  # fmt: skip
-    for name, count, radius in zip(names[1:], numbers[1:], (data.planet_radius, data.ring_radius)):
-        teeth_ratio, radii_ratio = count / numbers[0], radius / data.sun_radius
-        if abs(radii_ratio / teeth_ratio - 1.0) > _RADII:
-            raise CaseError(
-                f"{name} and sun have {teeth_ratio:.5g} as ratio of teeth and {radii_ratio:.5g} as ratio of "
-                "base radii", code="E-TEETH", key="teeth", value=tuple(numbers), limit="the same to 1 %",
-                remedy="give the teeth of the set",
-            )  # fmt: skip
-
-
-def _rates(pushes, series: SummedSeries, frequency):
-    """Forces ``pushes e'`` of every harmonic of every part."""
-    for part in series.parts:
-        rate = float(np.dot(part.orders, frequency[: len(part.orders)]))
-        for h, line in enumerate(part.amplitudes.T):
-            if h and np.any(line):
-                yield HarmonicForce(pushes @ (1j * h * rate * line), tuple(h * o for o in part.orders))
-
-
-def _unit(base: int, count: int) -> tuple[int, ...]:
-    return tuple(int(place == base) for place in range(count))
 
 
 def mesh_dampers(stiffness, mass_1, mass_2, ratio) -> np.ndarray:
@@ -416,6 +380,41 @@ def equivalent_damping(data: PlanarSet, *, mesh_ratio, support_ratio, flank: int
     C += np.einsum("ina,n,jna->ij", pins, dampers, pins)
     T = free_motions(data)
     return T.T @ C @ T
+
+
+def _check_teeth(data: PlanarSet, teeth) -> None:
+    """Refuse numbers that are no teeth, or not those of the base radii."""
+    names = ("sun", "planet", "ring")
+    values = [teeth.get(name) for name in names] if isinstance(teeth, dict) else [None]
+    numbers = [
+        z for z in values if isinstance(z, int | float | np.number) and float(z).is_integer() and z >= 1
+    ]
+    if len(numbers) != 3:
+        raise CaseError(
+            f"errors of gears with teeth {teeth}", code="E-ERRORS", key="teeth",
+            limit="whole numbers of sun, planet and ring, 1 or more",
+        )  # fmt: skip
+    for name, count, radius in zip(names[1:], numbers[1:], (data.planet_radius, data.ring_radius)):
+        teeth_ratio, radii_ratio = count / numbers[0], radius / data.sun_radius
+        if abs(radii_ratio / teeth_ratio - 1.0) > _RADII:
+            raise CaseError(
+                f"{name} and sun have {teeth_ratio:.5g} as ratio of teeth and {radii_ratio:.5g} as ratio of "
+                "base radii", code="E-TEETH", key="teeth", value=tuple(numbers), limit="the same to 1 %",
+                remedy="give the teeth of the set",
+            )  # fmt: skip
+
+
+def _rates(pushes, series: SummedSeries, frequency):
+    """Forces ``pushes e'`` of every harmonic of every part."""
+    for part in series.parts:
+        rate = float(np.dot(part.orders, frequency[: len(part.orders)]))
+        for h, line in enumerate(part.amplitudes.T):
+            if h and np.any(line):
+                yield HarmonicForce(pushes @ (1j * h * rate * line), tuple(h * o for o in part.orders))
+
+
+def _unit(base: int, count: int) -> tuple[int, ...]:
+    return tuple(int(place == base) for place in range(count))
 
 
 def _numbers(name: str, value) -> np.ndarray:

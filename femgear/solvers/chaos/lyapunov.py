@@ -342,7 +342,7 @@ class _Stepped:
 
 
 def _product(factors):
-    """Of matrices in the order of time, the later one on the left, pair by pair."""
+    """Product of matrices in the order of time, the later one on the left, pair by pair."""
     while len(factors) > 1:
         rest = factors[len(factors) // 2 * 2 :]
         factors = np.concatenate([factors[1::2] @ factors[: len(factors) // 2 * 2 : 2], rest])

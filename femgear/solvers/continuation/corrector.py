@@ -1,11 +1,9 @@
-"""Newton's method on a curve ``F(u, parameter) = 0``: bordered systems, tangents, their orientation.
+"""Newton's method on a curve ``F(u, parameter) = 0``, and whether a step along the curve stayed on it.
 
-Allgower and Georg, Introduction to Numerical Continuation Methods (SIAM 2003), chapters 2, 3 and 6.
-
-Whether a step along a curve stayed on it: angle, contraction of Newton's method, way back, middle.
-
-Allgower and Georg, Introduction to Numerical Continuation Methods (SIAM 2003), chapter 6; Deuflhard, Newton
-Methods for Nonlinear Problems (Springer 2004), sections 2.1 and 5.1, for the contraction.
+Bordered systems, tangents and their orientation: Allgower and Georg, Introduction to Numerical Continuation
+Methods (SIAM 2003), chapters 2, 3 and 6. A step is judged by its angle, the contraction of Newton's method,
+the way back and the middle (chapter 6; Deuflhard, Newton Methods for Nonlinear Problems (Springer 2004),
+sections 2.1 and 5.1, for the contraction).
 """
 
 from __future__ import annotations
@@ -18,6 +16,17 @@ import numpy as np
 
 from femgear.errors import FemgearError
 
+# Residuals over the sizes of the rows, relative to 1 + |z|, that are rounding.
+_ROUNDING = 1e-13
+# Deviation of a chord from the mean of its tangents [rad], beyond a share of the angle between them.
+_CHORD, _CHORD_SHARE, _CORNER_SHARE = 0.003, 0.15, 0.6
+# Sharpest corner [rad] and distance of the chord from the plane of its sides, over its length.
+_SHARPEST, _ASIDE = 1.2, 0.05
+# Distance from the old point, over that of the prediction from it, after one Newton step on the way back.
+_RETURN = 0.1
+# Middle of a step: distance from the cubic between the ends over the length, and error of Simpson's rule.
+_OFFSET, _TURN = 0.03, 0.1
+
 
 class LostError(Exception):
     """A correction that did not succeed; the reason is its text."""
@@ -25,10 +34,6 @@ class LostError(Exception):
 
 class RoundingError(LostError):
     """A correction that came near a solution, but whose last steps are rounding: it is nearly singular."""
-
-
-# Residuals over the sizes of the rows, relative to 1 + |z|, that are rounding.
-_ROUNDING = 1e-13
 
 
 def told_value(parameter: float) -> str:
@@ -121,20 +126,6 @@ class CurvePoint:
         return np.vstack([self.derivative, self.tangent])
 
 
-def factored(matrix: np.ndarray):
-    """LU factors of a bordered matrix and the sign of its determinant."""
-    from scipy import linalg
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", linalg.LinAlgWarning)
-        factors = linalg.lu_factor(matrix, check_finite=False)
-    diagonal = np.diag(factors[0])
-    if not np.all(diagonal):
-        raise LostError("the bordered matrix is singular")
-    swaps = np.count_nonzero(factors[1] != np.arange(len(diagonal)))
-    return factors, float(np.prod(np.sign(diagonal)) * (-1) ** swaps)
-
-
 def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=None) -> CurvePoint:
     """Point of the curve in the plane ``normal . (z - guess) = 0``, by Newton's method.
 
@@ -187,19 +178,18 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     return CurvePoint(z, tangent, derivative, sign, len(lengths), float(contraction), lengths[-1])
 
 
-def _failed(residuals: list[float]) -> type[LostError]:
-    """Kind of a failure: the last steps began where the equations hold to rounding, or not."""
-    return RoundingError if max(residuals[-2:]) <= _ROUNDING else LostError
+def factored(matrix: np.ndarray):
+    """LU factors of a bordered matrix and the sign of its determinant."""
+    from scipy import linalg
 
-
-# Deviation of a chord from the mean of its tangents [rad], beyond a share of the angle between them.
-_CHORD, _CHORD_SHARE, _CORNER_SHARE = 0.003, 0.15, 0.6
-# Sharpest corner [rad] and distance of the chord from the plane of its sides, over its length.
-_SHARPEST, _ASIDE = 1.2, 0.05
-# Distance from the old point, over that of the prediction from it, after one Newton step on the way back.
-_RETURN = 0.1
-# Middle of a step: distance from the cubic between the ends over the length, and error of Simpson's rule.
-_OFFSET, _TURN = 0.03, 0.1
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", linalg.LinAlgWarning)
+        factors = linalg.lu_factor(matrix, check_finite=False)
+    diagonal = np.diag(factors[0])
+    if not np.all(diagonal):
+        raise LostError("the bordered matrix is singular")
+    swaps = np.count_nonzero(factors[1] != np.arange(len(diagonal)))
+    return factors, float(np.prod(np.sign(diagonal)) * (-1) ** swaps)
 
 
 def strain(
@@ -247,17 +237,6 @@ def strain(
     return max(turn / angle, np.sqrt(new.contraction / contraction))
 
 
-def _check_sides(point: CurvePoint, new: CurvePoint) -> None:
-    """A step over a corner between two straight sides goes forward along each of them."""
-    chord = new.z - point.z
-    sides = np.column_stack([point.tangent, new.tangent])
-    ways = np.linalg.lstsq(sides, chord, rcond=None)[0]
-    length = float(np.linalg.norm(chord))
-    aside = np.linalg.norm(chord - sides @ ways) / length
-    if not (aside <= _ASIDE and ways.min() >= -_ASIDE * length):
-        raise LostError(f"a corner that the step does not go around ({aside:.2g} aside): another curve")
-
-
 def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
     """Look at a step from its other end and at its middle, one evaluation each.
 
@@ -270,6 +249,22 @@ def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
         return
     _check_return(curve, point, new)
     _check_middle(curve, point, new)
+
+
+def _failed(residuals: list[float]) -> type[LostError]:
+    """Kind of a failure: the last steps began where the equations hold to rounding, or not."""
+    return RoundingError if max(residuals[-2:]) <= _ROUNDING else LostError
+
+
+def _check_sides(point: CurvePoint, new: CurvePoint) -> None:
+    """A step over a corner between two straight sides goes forward along each of them."""
+    chord = new.z - point.z
+    sides = np.column_stack([point.tangent, new.tangent])
+    ways = np.linalg.lstsq(sides, chord, rcond=None)[0]
+    length = float(np.linalg.norm(chord))
+    aside = np.linalg.norm(chord - sides @ ways) / length
+    if not (aside <= _ASIDE and ways.min() >= -_ASIDE * length):
+        raise LostError(f"a corner that the step does not go around ({aside:.2g} aside): another curve")
 
 
 def _check_return(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:

@@ -43,7 +43,7 @@ class CampbellData:
     tracked : TrackedModes
         Its parameter is the speed [rad/s].
     whirl : (p, m) array
-        Sense of the orbits, see `femgear.solvers.linear.modal.whirl`; zero without planes.
+        Sense of the orbits, see `modal.whirl`; zero without planes.
     orders : (k,) array
         Lines of excitation, ``order speed / 2 pi`` [Hz].
     critical : tuple of CriticalSpeed

@@ -1,6 +1,7 @@
-"""Frequency response by direct solution and by superposition of modes; excitation by transmission error.
+"""Frequency response by direct solution and by superposition of modes, and the resonances in it.
 
-Resonance frequencies and damping from a frequency response, with a verdict whether its modes overlap.
+The excitation is forces, or transmission errors of the meshes. Resonance frequencies and damping are read
+from a response with a verdict whether its modes overlap (`resonance_peaks`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,10 @@ from femgear.system.system import MechanicalSystem, Modes
 _BATCH = 2**26
 # Distance to an undamped pole, relative to it, below which the response is infinite.
 _RESONANT = 1e-12
+# Shift of the half-power band against the peak, relative to the band, of a mode that stands alone.
+_ALONE = 0.05
+# Samples inside the half-power band that its interpolation needs.
+_SAMPLES = 5
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,40 @@ class MeshErrorResponse:
     deflection: np.ndarray
     force: np.ndarray
     output: np.ndarray
+
+
+@dataclass(frozen=True)
+class ResonancePeak:
+    """One peak of a displacement response.
+
+    Parameters
+    ----------
+    frequency : float
+        Interpolated peak [Hz]; ``f_n sqrt(1 - 2 zeta^2)`` of a single mode.
+    natural_frequency : float
+        ``f_n`` [Hz] of the single mode with this peak and band; NaN without a band.
+    amplitude : float
+        Interpolated, in the unit of the response.
+    damping_ratio : float
+        From the half-power band; NaN where the response does not fall to it on both sides.
+    band : (float, float)
+        Half-power frequencies [Hz].
+    asymmetry : float
+        Distance between the peak and the middle of the band, in squares of frequency, over the band's width:
+        zero for a single mode.
+    verdict : str
+        ``"separate"``; ``"overlapping"`` where the response rises again before the end of the band, or the
+        band is not symmetric, so that the damping belongs to no single mode; ``"incomplete"`` where the
+        frequencies end before the band, as under heavy damping; ``"coarse"`` with too few samples in it.
+    """
+
+    frequency: float
+    natural_frequency: float
+    amplitude: float
+    damping_ratio: float
+    band: tuple[float, float]
+    asymmetry: float
+    verdict: str
 
 
 def direct_response(
@@ -75,7 +114,7 @@ def direct_response(
     speed : float
         That multiplies the gyroscopic matrix [rad/s].
     damping_ratio : float or (n,) array, optional
-        Modal damping that is added to ``C``; see `femgear.solvers.linear.modal.modal_damping`.
+        Modal damping that is added to ``C``; see `modal.modal_damping`.
 
     Returns
     -------
@@ -257,6 +296,42 @@ def unit_force(system: MechanicalSystem, *names: str) -> np.ndarray:
     return columns
 
 
+def resonance_peaks(frequency, response, *, prominence: float = 0.05) -> tuple[ResonancePeak, ...]:
+    """Peaks of ``|response|``, lowest frequency first.
+
+    Parameters
+    ----------
+    frequency : (F,) array
+        [Hz], ascending.
+    response : (F,) complex or real array
+        A receptance (displacement over force), or its size.
+    prominence : float
+        Height above the neighbouring valley, relative to the peak, that makes a peak.
+
+    Raises
+    ------
+    CaseError
+        Arrays that are no response (E-RESPONSE).
+
+    Notes
+    -----
+    Of one viscously damped mode ``1 / |H|^2`` is a parabola in ``x = f^2`` (Ewins, Modal Testing, 2nd ed.,
+    section 4.2), which makes parabolic interpolation exact. The half-power points satisfy
+    ``(x_2 - x_1) / x_peak = 2 tan(2 asin zeta)``, of which ``2 zeta = (f_2 - f_1) / f`` is the limit.
+    """
+    from scipy.signal import find_peaks
+
+    f, size = np.asarray(frequency, float), np.abs(np.asarray(response))
+    if f.ndim != 1 or f.shape != size.shape or not np.all(np.isfinite(size)) or np.any(np.diff(f) <= 0.0):
+        raise CaseError(
+            "no response to search for peaks", code="E-RESPONSE",
+            limit="finite values over ascending frequencies, as many of both",
+        )  # fmt: skip
+    places, found = find_peaks(size, prominence=0.0)
+    places = places[found["prominences"] >= prominence * size[places]]
+    return tuple(_peak(f**2, size, int(i)) for i in places)
+
+
 def _checked(frequency, inputs, outputs, n: int):
     """Angular frequencies, and inputs and outputs as matrices that fit."""
     frequency = np.atleast_1d(np.asarray(frequency, float))
@@ -304,82 +379,6 @@ def _resonance(where: str) -> ConvergenceError:
         f"undamped resonance {where}: infinite response", code="E-RESONANCE",
         remedy="give the motion some damping or move the frequency",
     )  # fmt: skip
-
-
-# Shift of the half-power band against the peak, relative to the band, of a mode that stands alone.
-_ALONE = 0.05
-# Samples inside the half-power band that its interpolation needs.
-_SAMPLES = 5
-
-
-@dataclass(frozen=True)
-class ResonancePeak:
-    """One peak of a displacement response.
-
-    Parameters
-    ----------
-    frequency : float
-        Interpolated peak [Hz]; ``f_n sqrt(1 - 2 zeta^2)`` of a single mode.
-    natural_frequency : float
-        ``f_n`` [Hz] of the single mode with this peak and band; NaN without a band.
-    amplitude : float
-        Interpolated, in the unit of the response.
-    damping_ratio : float
-        From the half-power band; NaN where the response does not fall to it on both sides.
-    band : (float, float)
-        Half-power frequencies [Hz].
-    asymmetry : float
-        Distance between the peak and the middle of the band, in squares of frequency, over the band's width:
-        zero for a single mode.
-    verdict : str
-        ``"separate"``; ``"overlapping"`` where the response rises again before the end of the band, or the
-        band is not symmetric, so that the damping belongs to no single mode; ``"incomplete"`` where the
-        frequencies end before the band, as under heavy damping; ``"coarse"`` with too few samples in it.
-    """
-
-    frequency: float
-    natural_frequency: float
-    amplitude: float
-    damping_ratio: float
-    band: tuple[float, float]
-    asymmetry: float
-    verdict: str
-
-
-def resonance_peaks(frequency, response, *, prominence: float = 0.05) -> tuple[ResonancePeak, ...]:
-    """Peaks of ``|response|``, lowest frequency first.
-
-    Parameters
-    ----------
-    frequency : (F,) array
-        [Hz], ascending.
-    response : (F,) complex or real array
-        A receptance (displacement over force), or its size.
-    prominence : float
-        Height above the neighbouring valley, relative to the peak, that makes a peak.
-
-    Raises
-    ------
-    CaseError
-        Arrays that are no response (E-RESPONSE).
-
-    Notes
-    -----
-    Of one viscously damped mode ``1 / |H|^2`` is a parabola in ``x = f^2`` (Ewins, Modal Testing, 2nd ed.,
-    section 4.2), which makes parabolic interpolation exact. The half-power points satisfy
-    ``(x_2 - x_1) / x_peak = 2 tan(2 asin zeta)``, of which ``2 zeta = (f_2 - f_1) / f`` is the limit.
-    """
-    from scipy.signal import find_peaks
-
-    f, size = np.asarray(frequency, float), np.abs(np.asarray(response))
-    if f.ndim != 1 or f.shape != size.shape or not np.all(np.isfinite(size)) or np.any(np.diff(f) <= 0.0):
-        raise CaseError(
-            "no response to search for peaks", code="E-RESPONSE",
-            limit="finite values over ascending frequencies, as many of both",
-        )  # fmt: skip
-    places, found = find_peaks(size, prominence=0.0)
-    places = places[found["prominences"] >= prominence * size[places]]
-    return tuple(_peak(f**2, size, int(i)) for i in places)
 
 
 def _peak(x: np.ndarray, size: np.ndarray, i: int) -> ResonancePeak:

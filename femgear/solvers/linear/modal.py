@@ -1,6 +1,8 @@
-"""Modal basis of a system with mean mesh stiffnesses, and what the modes left out leave behind.
+"""Modes of a system with mean mesh stiffnesses: real basis, complex modes, and damping by modal ratios.
 
-Complex modes: natural frequencies, damping and whirl with gyroscopic terms and any viscous damping.
+The real modes come with what those left out leave behind: the static flexibility from mesh forces and load to
+the meshes and to any output. Complex modes have natural frequencies, damping and whirl with gyroscopic terms
+and any viscous damping,
 
 ``(lambda^2 M + lambda D + K') x = 0`` with ``D = C + speed G`` and ``K' = K + W diag(mesh_stiffness) W^T``.
 """
@@ -12,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.system.system import MechanicalSystem, Modes, Response
+from femgear.system.system import MechanicalSystem, Modes, Response, freeze
 
 # Eigenvalues of two modes closer than this (relative) are one multiple eigenvalue: never cut through it.
 _MULTIPLE = 1e-6
@@ -20,6 +22,76 @@ _MULTIPLE = 1e-6
 _RIGID_TOLERANCE = 1e-6
 # Entries of a rigid mode this small relative to its largest one are rounding.
 _RIGID_ROUNDING = 1e-9
+# Eigenvalue relative to the largest one below which a motion has no stiffness.
+_RIGID = 1e-12
+# Pole relative to the largest one that counts as zero or as real.
+_ZERO = 1e-11
+# Condition of the eigenvectors above which the poles are taken for defective.
+_DEFECTIVE = 1e10
+
+
+@dataclass(frozen=True)
+class ComplexModes:
+    """Poles with their right and left vectors.
+
+    Of two conjugate poles the one with positive imaginary part stands for both; real poles stand alone.
+    Rigid motions enter by their velocity, so that free rotation makes a single pole at zero.
+
+    Parameters
+    ----------
+    eigenvalue : (p,) complex array
+        ``lambda`` [1/s], by size; exactly zero for rigid-body modes.
+    shape, drift : (n, p) complex arrays
+        Displacement of the elastic motions and velocity of the rigid ones; the right vector of a pole is
+        ``shape + drift / lambda``.
+    left : (n, p) complex array
+        Left vectors ``y``: ``y^H (2 lambda M + D) x = 1``.
+    paired : (p,) bool array
+        Whether the conjugate pole belongs to it.
+    speed : float
+        That multiplies the gyroscopic matrix [rad/s].
+    dofs : tuple of str
+    """
+
+    eigenvalue: np.ndarray
+    shape: np.ndarray
+    drift: np.ndarray
+    left: np.ndarray
+    paired: np.ndarray
+    speed: float
+    dofs: tuple[str, ...]
+
+    def __post_init__(self):
+        freeze(self, "eigenvalue", "shape", "drift", "left", "paired")
+
+    @property
+    def rigid(self) -> np.ndarray:
+        """Poles at zero (p,)."""
+        return self.eigenvalue == 0.0
+
+    @property
+    def right(self) -> np.ndarray:
+        """Right vectors (n, p) with ``x^H M x = 1``; of rigid modes their velocity."""
+        return np.where(
+            self.rigid, self.drift, self.shape + self.drift / np.where(self.rigid, 1.0, self.eigenvalue)
+        )
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """``|lambda| / 2 pi`` (p,) [Hz], the undamped natural frequency where damping is light."""
+        return np.abs(self.eigenvalue) / (2.0 * np.pi)
+
+    @property
+    def damped_frequency(self) -> np.ndarray:
+        """``Im lambda / 2 pi`` (p,) [Hz]; zero for real poles."""
+        return self.eigenvalue.imag / (2.0 * np.pi)
+
+    @property
+    def damping_ratio(self) -> np.ndarray:
+        """``-Re lambda / |lambda|`` (p,): negative where motions grow, +-1 for real poles, 0 if rigid."""
+        return np.where(
+            self.rigid, 0.0, -self.eigenvalue.real / np.where(self.rigid, 1.0, np.abs(self.eigenvalue))
+        )
 
 
 def solve_modes(
@@ -86,10 +158,10 @@ def solve_modes(
     static = springs.T @ flexible
     residual = static[:, :-1] - _modal_flexibility(rows, rows, omega)
     if system.flexibility is not None:
-        residual += _shared(system, mesh_stiffness) @ system.flexibility
+        residual += _spring_share(system, mesh_stiffness) @ system.flexibility
     return Modes(
         frequency=omega / (2.0 * np.pi),
-        damping_ratio=_damping(system, shape, omega, damping_ratio),
+        damping_ratio=_damping_ratios(system, shape, omega, damping_ratio),
         shape=shape,
         mesh_stiffness=np.asarray(mesh_stiffness, dtype=float),
         mesh_deflection=rows,
@@ -157,7 +229,137 @@ def output_response(modes: Modes, response: Response, rows, *, residual, load) -
     return out
 
 
+def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.0) -> ComplexModes:
+    """All modes of the damped, rotating system.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+        M positive definite, M and K symmetric. K may be negative on some motions (centripetal terms).
+    mesh_stiffness : (n_meshes,) array
+        [N/m], not negative.
+    speed : float
+        That multiplies ``system.gyroscopic`` [rad/s].
+
+    Raises
+    ------
+    CaseError
+        Matrices that do not fit, are not symmetric or not finite.
+    ConvergenceError
+        A mass that is not positive definite, or poles that share one vector (E-DEFECTIVE).
+
+    Notes
+    -----
+    State form of the real modes of ``K'`` and ``M`` (L. Meirovitch, Principles and Techniques of Vibrations,
+    1997, sections 4.4 and 4.9); the left vectors are the rows of the inverse of the right ones, so that both
+    are biorthonormal within multiple poles as well.
+    """
+    from scipy import linalg
+
+    square, real, rigid = _real_modes(system, mesh_stiffness)
+    damping = real.T @ damping_matrix(system, speed) @ real
+    m, elastic = int(np.count_nonzero(~rigid)), ~rigid
+    order = np.concatenate([np.flatnonzero(elastic), np.flatnonzero(rigid)])
+    # speeds scaled by a mean frequency keep the state matrix balanced
+    scale = np.exp(0.5 * np.mean(np.log(np.abs(square[elastic])))) if m else 1.0
+    state = np.zeros((m + len(square),) * 2)
+    state[:m, m : 2 * m] = scale * np.eye(m)
+    state[m : 2 * m, :m] = -np.diag(square[elastic]) / scale
+    state[m:, m:] = -damping[np.ix_(order, order)]
+    value, vector = linalg.eig(state)
+    inverse = _inverse(vector)
+    zero = max(_ZERO * np.abs(value).max(), 100.0 * np.finfo(float).eps * np.linalg.norm(state))
+    value = np.where(np.abs(value) <= zero, 0.0, value)
+    value = np.where(np.abs(value.imag) <= _ZERO * np.abs(value), value.real, value)
+    kept = np.flatnonzero(value.imag >= 0.0)
+    kept = kept[np.argsort(np.abs(value[kept]), kind="stable")]
+    modes = ComplexModes(
+        eigenvalue=value[kept], shape=real[:, elastic] @ vector[:m, kept],
+        drift=real[:, rigid] @ vector[2 * m :, kept] * scale,
+        left=(inverse[kept, m:] @ real[:, order].T).conj().T / scale,
+        paired=value[kept].imag > 0.0, speed=float(speed), dofs=system.dofs,
+    )  # fmt: skip
+    return _normalised(modes, system.M)
+
+
+def whirl(shape, mass, planes) -> np.ndarray:
+    """Sense of the orbits of every mode, from -1 (backward) over 0 (straight) to 1 (forward).
+
+    An orbit ``Re((X, Y) exp(i omega t))`` covers area at the rate ``-omega Im(conj(X) Y)``, positive for a
+    counter-clockwise one; the sum over the planes, weighted with their masses, is divided by its bound (G.
+    Genta, Dynamics of Rotating Systems, 2005, section 2.5). In a rotating frame it is the sense seen there.
+
+    Parameters
+    ----------
+    shape : (n, m) complex array
+    mass : (n,) array
+        Diagonal of the mass matrix.
+    planes : (k, 2) int array
+        Rows of x and y, or of radial and tangential, of one body each.
+
+    Returns
+    -------
+    (m,) array
+        Zero where nothing moves in the planes.
+    """
+    shape, mass, planes = np.asarray(shape), np.asarray(mass, float), np.asarray(planes, int).reshape(-1, 2)
+    x, y = shape[planes[:, 0]], shape[planes[:, 1]]
+    weight = np.sqrt(mass[planes[:, 0]] * mass[planes[:, 1]])
+    area = -2.0 * weight @ (x.conj() * y).imag
+    bound = weight @ (np.abs(x) ** 2 + np.abs(y) ** 2)
+    total = mass @ np.abs(shape) ** 2
+    return np.where(bound > 1e-12 * total, area / np.where(bound > 0.0, bound, 1.0), 0.0)
+
+
+def damping_matrix(system: MechanicalSystem, speed: float = 0.0) -> np.ndarray:
+    """``C + speed G`` (n, n).
+
+    Raises
+    ------
+    CaseError
+        A speed that is not finite (E-SPEED), a gyroscopic matrix that is not skew-symmetric (E-SYMMETRY).
+    """
+    if not np.isfinite(speed):
+        raise CaseError("the speed is not finite", code="E-SPEED", value=speed)
+    if system.gyroscopic is None or not speed:
+        return np.asarray(system.C)
+    G = system.gyroscopic
+    if G.shape != system.M.shape or np.abs(G + G.T).max() > 1e-9 * np.abs(G).max(initial=0.0):
+        raise CaseError(
+            "the gyroscopic matrix is not skew-symmetric", code="E-SYMMETRY", key="gyroscopic",
+            remedy="put damping into C and springs into K",
+        )  # fmt: skip
+    return system.C + speed * G
+
+
+def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray:
+    """Viscous damping ``M Phi diag(2 zeta omega) Phi^T M`` (n, n) of modal damping ratios.
+
+    Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 3.1: all modes of the system whose columns have
+    the stiffnesses ``mesh_stiffness`` (n_columns,) get ``ratio``, a number or one a mode; rigid ones none.
+    """
+    modes = solve_modes(system, mesh_stiffness, damping_ratio=ratio)
+    carried = system.M @ modes.shape
+    return (carried * (4.0 * np.pi * modes.damping_ratio * modes.frequency)) @ carried.T
+
+
+def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> np.ndarray:
+    """``C`` as given, or of modal ratios."""
+    if damping is None:
+        return still.C
+    array = np.asarray(damping, float)
+    if array.ndim < 2:
+        return modal_damping(still, reference, damping)
+    if array.shape != still.M.shape or not np.all(np.isfinite(array)):
+        raise CaseError(
+            f"a damping matrix of shape {array.shape}", code="E-SHAPE", key="damping",
+            limit=f"{still.M.shape} finite numbers",
+        )  # fmt: skip
+    return array
+
+
 def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+    """``K + W diag(mesh_stiffness) W^T`` (n, n) [N/m], with the flexibility between the meshes, checked."""
     n, meshes = len(system.M), np.asarray(mesh_stiffness, dtype=float)
     shapes = {"M": (n, n), "C": (n, n), "K": (n, n), "W": (n, len(meshes)), "load": (n,)}
     for name, shape in shapes.items():
@@ -183,16 +385,42 @@ def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
         )  # fmt: skip
     carried = np.diag(meshes)
     if system.flexibility is not None:
-        carried = meshes[:, None] * _shared(system, meshes)
+        carried = meshes[:, None] * _spring_share(system, meshes)
     return 0.5 * (system.K + system.K.T) + system.W @ carried @ system.W.T
 
 
 def spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     """Directions (n, n_meshes) whose products with the motions are the deflections of the mesh springs."""
-    return system.W if system.flexibility is None else system.W @ _shared(system, mesh_stiffness).T
+    return system.W if system.flexibility is None else system.W @ _spring_share(system, mesh_stiffness).T
 
 
-def _shared(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+def rigid_basis(system: MechanicalSystem, modes: Modes):
+    """Mass, total stiffness and rigid modes, the first arguments of `pseudo_solve`."""
+    return system.M, total_stiffness(system, modes.mesh_stiffness), modes.shape[:, modes.frequency == 0.0]
+
+
+def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
+    """``K^+ loads``: elastic displacement, mass-orthogonal to the rigid modes, of self-equilibrated loads.
+
+    ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.
+    """
+    from scipy import linalg
+
+    carried = mass @ rigid
+    loads = loads - carried @ (rigid.T @ loads)
+    out = linalg.cho_solve(_held(mass, stiffness, rigid), loads)
+    return out - rigid @ (carried.T @ out)
+
+
+def mass_error() -> ConvergenceError:
+    """The refusal of a mass matrix that is not positive definite (E-MASS)."""
+    return ConvergenceError(
+        "the mass matrix is not positive definite", code="E-MASS",
+        remedy="give every degree of freedom some mass or condense it",
+    )  # fmt: skip
+
+
+def _spring_share(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     """``(I + C k)^-1``: what the springs take of the mesh deflections, the bodies taking the rest."""
     flexibility = system.flexibility
     return np.linalg.inv(np.eye(len(flexibility)) + flexibility * np.asarray(mesh_stiffness, float))
@@ -206,10 +434,7 @@ def _eigen(mass, stiffness, count, max_frequency):
     try:
         factor = np.linalg.cholesky(0.5 * (mass + mass.T))
     except np.linalg.LinAlgError as error:
-        raise ConvergenceError(
-            "the mass matrix is not positive definite", code="E-MASS",
-            remedy="give every degree of freedom some mass or condense it",
-        ) from error  # fmt: skip
+        raise mass_error() from error
     standard = linalg.solve_triangular(factor, stiffness, lower=True)
     standard = linalg.solve_triangular(factor, standard.T, lower=True)
     standard = 0.5 * (standard + standard.T)
@@ -241,7 +466,7 @@ def _eigen(mass, stiffness, count, max_frequency):
 
 def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
     """Which eigenvalues are zero up to rounding of the largest one; refuses negative ones."""
-    threshold = max(1e-12, 10.0 * n * np.finfo(float).eps) * scale
+    threshold = max(_RIGID, 10.0 * n * np.finfo(float).eps) * scale
     if values[0] < -threshold:
         raise ConvergenceError(
             f"the stiffness matrix is negative on some motion: smallest eigenvalue {values[0]:.3e} 1/s^2",
@@ -307,30 +532,13 @@ def _allowed(columns: np.ndarray, rigid: np.ndarray) -> np.ndarray:
     return np.maximum(terms, _RIGID_ROUNDING * largest)
 
 
-def rigid_basis(system: MechanicalSystem, modes: Modes):
-    return system.M, total_stiffness(system, modes.mesh_stiffness), modes.shape[:, modes.frequency == 0.0]
-
-
-def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
-    """``K^+ loads``: elastic displacement, mass-orthogonal to the rigid modes, of self-equilibrated loads.
-
-    ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.
-    """
-    from scipy import linalg
-
-    carried = mass @ rigid
-    loads = loads - carried @ (rigid.T @ loads)
-    out = linalg.cho_solve(_held(mass, stiffness, rigid), loads)
-    return out - rigid @ (carried.T @ out)
-
-
 def _modal_flexibility(left: np.ndarray, right: np.ndarray, omega: np.ndarray) -> np.ndarray:
     """``sum left right^T / omega^2`` over the modes that are not rigid."""
     elastic = omega > 0.0
     return (left[:, elastic] / omega[elastic] ** 2) @ right[:, elastic].T
 
 
-def _damping(system: MechanicalSystem, shape, omega, damping_ratio) -> np.ndarray:
+def _damping_ratios(system: MechanicalSystem, shape, omega, damping_ratio) -> np.ndarray:
     if damping_ratio is None:
         modal = shape.T @ system.C @ shape
         off = np.abs(modal - np.diag(np.diag(modal))).max(initial=0.0)
@@ -359,184 +567,6 @@ def _damping(system: MechanicalSystem, shape, omega, damping_ratio) -> np.ndarra
     return np.where(omega > 0.0, ratio, 0.0)
 
 
-# Eigenvalue of K' over M, relative to the largest, below which a motion has no stiffness.
-_RIGID = 1e-12
-# Pole relative to the largest one that counts as zero or as real.
-_ZERO = 1e-11
-# Condition of the eigenvectors above which the poles are taken for defective.
-_DEFECTIVE = 1e10
-
-
-@dataclass(frozen=True)
-class ComplexModes:
-    """Poles with their right and left vectors.
-
-    Of two conjugate poles the one with positive imaginary part stands for both; real poles stand alone.
-    Rigid motions enter by their velocity, so that free rotation makes a single pole at zero.
-
-    Parameters
-    ----------
-    eigenvalue : (p,) complex array
-        ``lambda`` [1/s], by size; exactly zero for rigid-body modes.
-    shape, drift : (n, p) complex arrays
-        Displacement of the elastic motions and velocity of the rigid ones; the right vector of a pole is
-        ``shape + drift / lambda``.
-    left : (n, p) complex array
-        Left vectors ``y``: ``y^H (2 lambda M + D) x = 1``.
-    paired : (p,) bool array
-        Whether the conjugate pole belongs to it.
-    speed : float
-        That multiplies the gyroscopic matrix [rad/s].
-    dofs : tuple of str
-    """
-
-    eigenvalue: np.ndarray
-    shape: np.ndarray
-    drift: np.ndarray
-    left: np.ndarray
-    paired: np.ndarray
-    speed: float
-    dofs: tuple[str, ...]
-
-    def __post_init__(self):
-        for name in ("eigenvalue", "shape", "drift", "left", "paired"):
-            array = np.array(getattr(self, name))
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-
-    @property
-    def rigid(self) -> np.ndarray:
-        """Poles at zero (p,)."""
-        return self.eigenvalue == 0.0
-
-    @property
-    def right(self) -> np.ndarray:
-        """Right vectors (n, p) with ``x^H M x = 1``; of rigid modes their velocity."""
-        return np.where(
-            self.rigid, self.drift, self.shape + self.drift / np.where(self.rigid, 1.0, self.eigenvalue)
-        )
-
-    @property
-    def frequency(self) -> np.ndarray:
-        """``|lambda| / 2 pi`` (p,) [Hz], the undamped natural frequency where damping is light."""
-        return np.abs(self.eigenvalue) / (2.0 * np.pi)
-
-    @property
-    def damped_frequency(self) -> np.ndarray:
-        """``Im lambda / 2 pi`` (p,) [Hz]; zero for real poles."""
-        return self.eigenvalue.imag / (2.0 * np.pi)
-
-    @property
-    def damping_ratio(self) -> np.ndarray:
-        """``-Re lambda / |lambda|`` (p,): negative where motions grow, +-1 for real poles, 0 if rigid."""
-        return np.where(
-            self.rigid, 0.0, -self.eigenvalue.real / np.where(self.rigid, 1.0, np.abs(self.eigenvalue))
-        )
-
-
-def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.0) -> ComplexModes:
-    """All modes of the damped, rotating system.
-
-    Parameters
-    ----------
-    system : MechanicalSystem
-        M positive definite, M and K symmetric. K may be negative on some motions (centripetal terms).
-    mesh_stiffness : (n_meshes,) array
-        [N/m], not negative.
-    speed : float
-        That multiplies ``system.gyroscopic`` [rad/s].
-
-    Raises
-    ------
-    CaseError
-        Matrices that do not fit, are not symmetric or not finite.
-    ConvergenceError
-        A mass that is not positive definite, or poles that share one vector (E-DEFECTIVE).
-
-    Notes
-    -----
-    State form of the real modes of ``K'`` and ``M`` (L. Meirovitch, Principles and Techniques of Vibrations,
-    1997, sections 4.4 and 4.9); the left vectors are the rows of the inverse of the right ones, so that both
-    are biorthonormal within multiple poles as well.
-    """
-    from scipy import linalg
-
-    square, real, rigid = _real_modes(system, mesh_stiffness)
-    damping = real.T @ damping_matrix(system, speed) @ real
-    m, elastic = int(np.count_nonzero(~rigid)), ~rigid
-    order = np.concatenate([np.flatnonzero(elastic), np.flatnonzero(rigid)])
-    # speeds scaled by a mean frequency keep the state matrix balanced
-    scale = np.exp(0.5 * np.mean(np.log(np.abs(square[elastic])))) if m else 1.0
-    state = np.zeros((m + len(square),) * 2)
-    state[:m, m : 2 * m] = scale * np.eye(m)
-    state[m : 2 * m, :m] = -np.diag(square[elastic]) / scale
-    state[m:, m:] = -damping[np.ix_(order, order)]
-    value, vector = linalg.eig(state)
-    inverse = _inverse(vector)
-    zero = max(_ZERO * np.abs(value).max(), 100.0 * np.finfo(float).eps * np.linalg.norm(state))
-    value = np.where(np.abs(value) <= zero, 0.0, value)
-    value = np.where(np.abs(value.imag) <= _ZERO * np.abs(value), value.real, value)
-    kept = np.flatnonzero(value.imag >= 0.0)
-    kept = kept[np.argsort(np.abs(value[kept]), kind="stable")]
-    modes = ComplexModes(
-        eigenvalue=value[kept], shape=real[:, elastic] @ vector[:m, kept],
-        drift=real[:, rigid] @ vector[2 * m :, kept] * scale,
-        left=(inverse[kept, m:] @ real[:, order].T).conj().T / scale,
-        paired=value[kept].imag > 0.0, speed=float(speed), dofs=system.dofs,
-    )  # fmt: skip
-    return _normalised(modes, system.M)
-
-
-def damping_matrix(system: MechanicalSystem, speed: float = 0.0) -> np.ndarray:
-    """``C + speed G`` (n, n).
-
-    Raises
-    ------
-    CaseError
-        A speed that is not finite (E-SPEED), a gyroscopic matrix that is not skew-symmetric (E-SYMMETRY).
-    """
-    if not np.isfinite(speed):
-        raise CaseError("the speed is not finite", code="E-SPEED", value=speed)
-    if system.gyroscopic is None or not speed:
-        return np.asarray(system.C)
-    G = system.gyroscopic
-    if G.shape != system.M.shape or np.abs(G + G.T).max() > 1e-9 * np.abs(G).max(initial=0.0):
-        raise CaseError(
-            "the gyroscopic matrix is not skew-symmetric", code="E-SYMMETRY", key="gyroscopic",
-            remedy="put damping into C and springs into K",
-        )  # fmt: skip
-    return system.C + speed * G
-
-
-def whirl(shape, mass, planes) -> np.ndarray:
-    """Sense of the orbits of every mode, from -1 (backward) over 0 (straight) to 1 (forward).
-
-    An orbit ``Re((X, Y) exp(i omega t))`` covers area at the rate ``-omega Im(conj(X) Y)``, positive for a
-    counter-clockwise one; the sum over the planes, weighted with their masses, is divided by its bound (G.
-    Genta, Dynamics of Rotating Systems, 2005, section 2.5). In a rotating frame it is the sense seen there.
-
-    Parameters
-    ----------
-    shape : (n, m) complex array
-    mass : (n,) array
-        Diagonal of the mass matrix.
-    planes : (k, 2) int array
-        Rows of x and y, or of radial and tangential, of one body each.
-
-    Returns
-    -------
-    (m,) array
-        Zero where nothing moves in the planes.
-    """
-    shape, mass, planes = np.asarray(shape), np.asarray(mass, float), np.asarray(planes, int).reshape(-1, 2)
-    x, y = shape[planes[:, 0]], shape[planes[:, 1]]
-    weight = np.sqrt(mass[planes[:, 0]] * mass[planes[:, 1]])
-    area = -2.0 * weight @ (x.conj() * y).imag
-    bound = weight @ (np.abs(x) ** 2 + np.abs(y) ** 2)
-    total = mass @ np.abs(shape) ** 2
-    return np.where(bound > 1e-12 * total, area / np.where(bound > 0.0, bound, 1.0), 0.0)
-
-
 def _real_modes(system: MechanicalSystem, mesh_stiffness):
     """``omega^2`` of any sign, mass-normalised shapes and which of them are rigid."""
     from scipy import linalg
@@ -545,10 +575,7 @@ def _real_modes(system: MechanicalSystem, mesh_stiffness):
     try:
         square, shape = linalg.eigh(stiffness, system.M)
     except linalg.LinAlgError as error:
-        raise ConvergenceError(
-            "the mass matrix is not positive definite", code="E-MASS",
-            remedy="give every degree of freedom some mass or condense it",
-        ) from error  # fmt: skip
+        raise mass_error() from error
     limit = max(_RIGID, 10.0 * len(square) * np.finfo(float).eps) * np.abs(square).max()
     return square, shape, np.abs(square) <= limit
 
@@ -577,30 +604,3 @@ def _normalised(modes: ComplexModes, mass: np.ndarray) -> ComplexModes:
     return replace(
         modes, shape=modes.shape * factor, drift=modes.drift * factor, left=modes.left / factor.conj()
     )  # fmt: skip
-
-
-def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray:
-    """Viscous damping ``M Phi diag(2 zeta omega) Phi^T M`` (n, n) of modal damping ratios.
-
-    Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 3.1: all modes of the system whose columns have
-    the stiffnesses ``mesh_stiffness`` (n_columns,) get ``ratio``, a number or one a mode; rigid ones none.
-    """
-
-    modes = solve_modes(system, mesh_stiffness, damping_ratio=ratio)
-    carried = system.M @ modes.shape
-    return (carried * (4.0 * np.pi * modes.damping_ratio * modes.frequency)) @ carried.T
-
-
-def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> np.ndarray:
-    """``C`` as given, or of modal ratios."""
-    if damping is None:
-        return still.C
-    array = np.asarray(damping, float)
-    if array.ndim < 2:
-        return modal_damping(still, reference, damping)
-    if array.shape != still.M.shape or not np.all(np.isfinite(array)):
-        raise CaseError(
-            f"a damping matrix of shape {array.shape}", code="E-SHAPE", key="damping",
-            limit=f"{still.M.shape} finite numbers",
-        )  # fmt: skip
-    return array

@@ -1,8 +1,8 @@
-"""Modes followed over a parameter: assignment by shape and eigenvalue, steps refined where modes veer.
+"""Modes followed over a parameter, where their branches cross or veer, and where their energy sits.
 
-Where branches of modes come close: crossing or veering.
-
-Where the kinetic and the strain energy of modes sit: shares of bodies, meshes and supports.
+Modes are assigned by shape and eigenvalue, and steps are refined where modes veer (`track_modes`). Branches
+that come close cross or veer (`approaches`). The kinetic and the strain energy of modes is shared by bodies,
+meshes and supports (`kinetic_shares`, `strain_shares`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import ComplexModes
+from femgear.system.system import freeze
 
 # Relative distance of eigenvalues that belong to one multiple eigenvalue, whose vectors are free.
 _MULTIPLE = 1e-7
@@ -22,6 +23,8 @@ _MULTIPLE = 1e-7
 _CROSSING = 1e-6
 # Cost of a relative distance of eigenvalues, and its bound, against 1 - MAC.
 _CONTINUITY, _BOUND = 10.0, 0.5
+# Strain energy relative to the sum of the absolute terms below which a motion has none.
+_UNSTRAINED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -52,10 +55,7 @@ class TrackedModes:
     unresolved: tuple[tuple[float, float], ...]
 
     def __post_init__(self):
-        for name in ("value", "given", "eigenvalue", "shape", "agreement"):
-            array = np.array(getattr(self, name))
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        freeze(self, "value", "given", "eigenvalue", "shape", "agreement")
 
     @property
     def frequency(self) -> np.ndarray:
@@ -70,30 +70,32 @@ class TrackedModes:
 
 
 @dataclass(frozen=True)
-class _Point:
-    value: float
-    eigenvalue: np.ndarray
-    vector: np.ndarray
-    slope: np.ndarray | None = None
-
-
-def oscillating(modes: ComplexModes) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues and right vectors of the modes with a frequency: what `track_modes` follows."""
-    return modes.eigenvalue[modes.paired], modes.right[:, modes.paired]
-
-
-def mac(first, second, mass) -> np.ndarray:
-    """Modal assurance criterion (m1, m2) with the mass as weight.
-
-    ``|a^H M b|^2 / (a^H M a) (b^H M b)`` (R. J. Allemang, Sound and Vibration 37(8), 2003, 14-23).
+class Approach:
+    """Two branches at their smallest distance.
 
     Parameters
     ----------
-    first, second : (n, m1), (n, m2) arrays
-    mass : (n, n) array
+    first, second : int
+        Branches.
+    value : float
+        Parameter of the smallest distance.
+    frequency, gap : float
+        Mean frequency and smallest distance there [Hz].
+    exchange : float
+        MAC of the first branch before with the second after: one where they change shapes, zero where each
+        keeps its own.
+    kind : str
+        ``"crossing"`` where the branches pass through each other; ``"veering"`` where they turn away and
+        exchange their shapes; ``"approach"`` where they turn away and mostly keep them.
     """
-    root = np.linalg.cholesky(np.asarray(mass, float)).T
-    return np.abs(_unit(root @ first).conj().T @ _unit(root @ second)) ** 2
+
+    first: int
+    second: int
+    value: float
+    frequency: float
+    gap: float
+    exchange: float
+    kind: str
 
 
 def track_modes(
@@ -163,6 +165,155 @@ def track_modes(
             agreements.append(fits)
             pending.pop()
     return _tracked(points, values, root, agreements, unresolved)
+
+
+def oscillating(modes: ComplexModes) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and right vectors of the modes with a frequency: what `track_modes` follows."""
+    return modes.eigenvalue[modes.paired], modes.right[:, modes.paired]
+
+
+def mac(first, second, mass) -> np.ndarray:
+    """Modal assurance criterion (m1, m2) with the mass as weight.
+
+    ``|a^H M b|^2 / (a^H M a) (b^H M b)`` (R. J. Allemang, Sound and Vibration 37(8), 2003, 14-23).
+
+    Parameters
+    ----------
+    first, second : (n, m1), (n, m2) arrays
+    mass : (n, n) array
+    """
+    root = np.linalg.cholesky(np.asarray(mass, float)).T
+    return np.abs(_unit(root @ first).conj().T @ _unit(root @ second)) ** 2
+
+
+def approaches(tracked: TrackedModes, mass, *, within: float = 0.1) -> tuple[Approach, ...]:
+    """Crossings and veerings of tracked modes, in the order of the parameter.
+
+    Near a veering of two modes the squared distance of their eigenvalues is a parabola in the parameter
+    (N. C. Perkins and C. D. Mote, J. Sound Vib. 106, 1986, 451-463), whose vertex is taken.
+
+    Parameters
+    ----------
+    tracked : TrackedModes
+    mass : (n, n) array
+    within : float
+        Largest distance relative to the frequency.
+    """
+    f = tracked.eigenvalue.imag / (2.0 * np.pi)
+    found = []
+    for first in range(f.shape[1]):
+        for second in range(first + 1, f.shape[1]):
+            found += _between(tracked, f, mass, first, second, within)
+    return tuple(sorted(found, key=lambda one: one.value))
+
+
+def coupling_factor(first, second, mass, stiffness_change, mass_change=None, *, squared) -> float:
+    """How far two modes veer instead of crossing, from derivatives at one parameter value.
+
+    With ``s_ij = phi_i^T (dK - lambda dM) phi_j`` the two eigenvalues change as those of the 2 x 2 matrix of
+    ``s``, so that their smallest distance is this factor times the present one:
+    ``2 |s_12| / sqrt((s_11 - s_22)^2 + 4 s_12^2)``. Zero: they cross. One: they are at their smallest
+    distance. ``s_12`` is the coupling of Perkins and Mote (1986); J. Lin and R. G. Parker (Mech. Struct.
+    Mach. 29, 2001, 411-429) evaluate it for planetary gears.
+
+    Parameters
+    ----------
+    first, second : (n,) arrays
+        Real shapes.
+    mass, stiffness_change : (n, n) arrays
+        M and dK/dp, the meshes included.
+    mass_change : (n, n) array, optional
+        dM/dp.
+    squared : (float, float)
+        ``omega^2`` of both [1/s^2].
+    """
+    mass = np.asarray(mass)
+    pair = np.column_stack([first, second])
+    pair = pair / np.sqrt(np.einsum("im,im->m", pair, mass @ pair))
+    s = pair.T @ stiffness_change @ pair
+    if mass_change is not None:
+        s = s - 0.5 * (squared[0] + squared[1]) * (pair.T @ mass_change @ pair)
+    size = np.hypot(s[0, 0] - s[1, 1], 2.0 * s[0, 1])
+    return float(2.0 * abs(s[0, 1]) / size) if size > 0.0 else 0.0
+
+
+def kinetic_shares(mass, shape, groups: Mapping[str, Sequence[int]]) -> dict[str, np.ndarray]:
+    """Shares (m,) of groups of coordinates in the kinetic energy of every mode.
+
+    ``Re sum_i conj(x_i) (M x)_i / x^H M x`` over the group (Geradin and Rixen, Mechanical Vibrations, 3rd
+    ed., section 2.3). They add up to one.
+
+    Parameters
+    ----------
+    mass : (n, n) array
+    shape : (n, m) array
+        Real or complex; complex ones by their mean over a period.
+    groups : mapping of str to indices
+        Every coordinate in one group; `body_groups` makes them from names.
+
+    Raises
+    ------
+    CaseError
+        Coordinates that are in no group or in two (E-GROUPS).
+    """
+    shape = np.asarray(shape)
+    places = np.concatenate([np.asarray(rows, int) for rows in groups.values()])
+    if not np.array_equal(np.sort(places), np.arange(len(shape))):
+        raise CaseError(
+            f"{len(places)} coordinates in groups, of {len(shape)}", code="E-GROUPS",
+            limit="every coordinate in one group",
+        )  # fmt: skip
+    energy = (shape.conj() * (np.asarray(mass) @ shape)).real
+    total = energy.sum(axis=0)
+    return {name: energy[np.asarray(rows, int)].sum(axis=0) / total for name, rows in groups.items()}
+
+
+def strain_shares(parts: Mapping[str, tuple[np.ndarray, np.ndarray]], shape) -> dict[str, np.ndarray]:
+    """Shares (m,) of springs in the strain energy of every mode.
+
+    ``sum_c k_c |w_c^T x|^2 / total`` of each part. They add up to one; of a motion that strains nothing all
+    are zero.
+
+    Parameters
+    ----------
+    parts : mapping of str to (columns (n, g), stiffness (g,))
+        Springs ``k`` along the columns ``w``: meshes are columns of W, supports unit columns. Together they
+        must be the whole stiffness, which `stiffness_of` gives for comparison.
+    shape : (n, m) array
+        Real or complex; complex ones by their mean over a period.
+    """
+    shape = np.asarray(shape)
+    energy, bound = {}, np.zeros(shape.shape[1])
+    for name, (columns, stiffness) in parts.items():
+        k = np.asarray(stiffness, float)
+        energy[name] = k @ np.abs(columns.T @ shape) ** 2
+        bound += np.abs(k) @ (np.abs(columns).T @ np.abs(shape)) ** 2
+    total = sum(energy.values())
+    strained = np.abs(total) > _UNSTRAINED * bound
+    return {
+        name: np.where(strained, one / np.where(strained, total, 1.0), 0.0) for name, one in energy.items()
+    }
+
+
+def stiffness_of(parts: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """``sum w k w^T`` (n, n) of all parts."""
+    return sum((columns * stiffness) @ columns.T for columns, stiffness in parts.values())
+
+
+def body_groups(dofs: Sequence[str]) -> dict[str, np.ndarray]:
+    """Coordinates of every body, from names such as ``"planet 2: x"``."""
+    groups: dict[str, list[int]] = {}
+    for place, name in enumerate(dofs):
+        groups.setdefault(name.split(":")[0], []).append(place)
+    return {name: np.array(rows) for name, rows in groups.items()}
+
+
+@dataclass(frozen=True)
+class _Point:
+    value: float
+    eigenvalue: np.ndarray
+    vector: np.ndarray
+    slope: np.ndarray | None = None
 
 
 def _tracked(points: list[_Point], values, root, agreements, unresolved) -> TrackedModes:
@@ -264,86 +415,6 @@ def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector, axis=0)
 
 
-@dataclass(frozen=True)
-class Approach:
-    """Two branches at their smallest distance.
-
-    Parameters
-    ----------
-    first, second : int
-        Branches.
-    value : float
-        Parameter of the smallest distance.
-    frequency, gap : float
-        Mean frequency and smallest distance there [Hz].
-    exchange : float
-        MAC of the first branch before with the second after: one where they change shapes, zero where each
-        keeps its own.
-    kind : str
-        ``"crossing"`` where the branches pass through each other; ``"veering"`` where they turn away and
-        exchange their shapes; ``"approach"`` where they turn away and mostly keep them.
-    """
-
-    first: int
-    second: int
-    value: float
-    frequency: float
-    gap: float
-    exchange: float
-    kind: str
-
-
-def approaches(tracked: TrackedModes, mass, *, within: float = 0.1) -> tuple[Approach, ...]:
-    """Crossings and veerings of tracked modes, in the order of the parameter.
-
-    Near a veering of two modes the squared distance of their eigenvalues is a parabola in the parameter
-    (N. C. Perkins and C. D. Mote, J. Sound Vib. 106, 1986, 451-463), whose vertex is taken.
-
-    Parameters
-    ----------
-    tracked : TrackedModes
-    mass : (n, n) array
-    within : float
-        Largest distance relative to the frequency.
-    """
-    f = tracked.eigenvalue.imag / (2.0 * np.pi)
-    found = []
-    for first in range(f.shape[1]):
-        for second in range(first + 1, f.shape[1]):
-            found += _between(tracked, f, mass, first, second, within)
-    return tuple(sorted(found, key=lambda one: one.value))
-
-
-def coupling_factor(first, second, mass, stiffness_change, mass_change=None, *, squared) -> float:
-    """How far two modes veer instead of crossing, from derivatives at one parameter value.
-
-    With ``s_ij = phi_i^T (dK - lambda dM) phi_j`` the two eigenvalues change as those of the 2 x 2 matrix of
-    ``s``, so that their smallest distance is this factor times the present one:
-    ``2 |s_12| / sqrt((s_11 - s_22)^2 + 4 s_12^2)``. Zero: they cross. One: they are at their smallest
-    distance. ``s_12`` is the coupling of Perkins and Mote (1986); J. Lin and R. G. Parker (Mech. Struct.
-    Mach. 29, 2001, 411-429) evaluate it for planetary gears.
-
-    Parameters
-    ----------
-    first, second : (n,) arrays
-        Real shapes.
-    mass, stiffness_change : (n, n) arrays
-        M and dK/dp, the meshes included.
-    mass_change : (n, n) array, optional
-        dM/dp.
-    squared : (float, float)
-        ``omega^2`` of both [1/s^2].
-    """
-    mass = np.asarray(mass)
-    pair = np.column_stack([first, second])
-    pair = pair / np.sqrt(np.einsum("im,im->m", pair, mass @ pair))
-    s = pair.T @ stiffness_change @ pair
-    if mass_change is not None:
-        s = s - 0.5 * (squared[0] + squared[1]) * (pair.T @ mass_change @ pair)
-    size = np.hypot(s[0, 0] - s[1, 1], 2.0 * s[0, 1])
-    return float(2.0 * abs(s[0, 1]) / size) if size > 0.0 else 0.0
-
-
 def _between(tracked: TrackedModes, f, mass, first: int, second: int, within: float) -> list[Approach]:
     """Approaches of two branches."""
     value, difference = tracked.value, f[:, first] - f[:, second]
@@ -386,78 +457,3 @@ def _named(tracked, mass, gap, first, second, at, mean, smallest, left, right) -
     exchange = mac(tracked.shape[left][:, [first]], tracked.shape[right][:, [second]], mass)[0, 0]
     kind = "crossing" if smallest == 0.0 else "veering" if exchange > 0.5 else "approach"
     return Approach(first, second, float(at), float(mean), float(smallest), float(exchange), kind)
-
-
-# Strain energy relative to the sum of the absolute terms below which a motion has none.
-_RIGID = 1e-12
-
-
-def kinetic_shares(mass, shape, groups: Mapping[str, Sequence[int]]) -> dict[str, np.ndarray]:
-    """Shares (m,) of groups of coordinates in the kinetic energy of every mode.
-
-    ``Re sum_i conj(x_i) (M x)_i / x^H M x`` over the group (Geradin and Rixen, Mechanical Vibrations, 3rd
-    ed., section 2.3). They add up to one.
-
-    Parameters
-    ----------
-    mass : (n, n) array
-    shape : (n, m) array
-        Real or complex; complex ones by their mean over a period.
-    groups : mapping of str to indices
-        Every coordinate in one group; `body_groups` makes them from names.
-
-    Raises
-    ------
-    CaseError
-        Coordinates that are in no group or in two (E-GROUPS).
-    """
-    shape = np.asarray(shape)
-    places = np.concatenate([np.asarray(rows, int) for rows in groups.values()])
-    if not np.array_equal(np.sort(places), np.arange(len(shape))):
-        raise CaseError(
-            f"{len(places)} coordinates in groups, of {len(shape)}", code="E-GROUPS",
-            limit="every coordinate in one group",
-        )  # fmt: skip
-    energy = (shape.conj() * (np.asarray(mass) @ shape)).real
-    total = energy.sum(axis=0)
-    return {name: energy[np.asarray(rows, int)].sum(axis=0) / total for name, rows in groups.items()}
-
-
-def strain_shares(parts: Mapping[str, tuple[np.ndarray, np.ndarray]], shape) -> dict[str, np.ndarray]:
-    """Shares (m,) of springs in the strain energy of every mode.
-
-    ``sum_c k_c |w_c^T x|^2 / total`` of each part. They add up to one; of a motion that strains nothing all
-    are zero.
-
-    Parameters
-    ----------
-    parts : mapping of str to (columns (n, g), stiffness (g,))
-        Springs ``k`` along the columns ``w``: meshes are columns of W, supports unit columns. Together they
-        must be the whole stiffness, which `stiffness_of` gives for comparison.
-    shape : (n, m) array
-        Real or complex; complex ones by their mean over a period.
-    """
-    shape = np.asarray(shape)
-    energy, bound = {}, np.zeros(shape.shape[1])
-    for name, (columns, stiffness) in parts.items():
-        k = np.asarray(stiffness, float)
-        energy[name] = k @ np.abs(columns.T @ shape) ** 2
-        bound += np.abs(k) @ (np.abs(columns).T @ np.abs(shape)) ** 2
-    total = sum(energy.values())
-    strained = np.abs(total) > _RIGID * bound
-    return {
-        name: np.where(strained, one / np.where(strained, total, 1.0), 0.0) for name, one in energy.items()
-    }
-
-
-def stiffness_of(parts: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """``sum w k w^T`` (n, n) of all parts."""
-    return sum((columns * stiffness) @ columns.T for columns, stiffness in parts.values())
-
-
-def body_groups(dofs: Sequence[str]) -> dict[str, np.ndarray]:
-    """Coordinates of every body, from names such as ``"planet 2: x"``."""
-    groups: dict[str, list[int]] = {}
-    for place, name in enumerate(dofs):
-        groups.setdefault(name.split(":")[0], []).append(place)
-    return {name: np.array(rows) for name, rows in groups.items()}

@@ -5,18 +5,15 @@ the system whose elements are springs of the reference stiffness, the lines F of
 alternating between frequency and time, and the loads S.
 (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019, chapters 2 and 4.)
 
-Mean loads that no element can carry: a contact that they pull apart, with nothing else to hold it.
+For many lines the derivative is an operator without a matrix of its size (`LineTangent`). One product costs a
+transform forth and back and the receptance of every line. GMRES (Saad and Schultz, SIAM J. Sci. Stat. Comput.
+7 (1986) 856) needs few of them, because the operator is the unit matrix plus the fixed point of the iteration
+with reference springs, whose eigenvalues are small or few.
 
-A periodic motion needs a mean acceleration of zero, so on motions that supports leave free the mean forces
-of the elements balance the constant load (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems,
-2019, section 2.3: line zero of the harmonic equations). A one-sided contact pushes only; where the load asks
-it to pull, its mean deflection grows without end, and so does everything that is measured by it.
-
-The derivative of the harmonic equations as an operator: many lines without a matrix of their size.
-
-One product costs a transform forth and back and the receptance of every line. GMRES (Saad and Schultz,
-SIAM J. Sci. Stat. Comput. 7 (1986) 856) needs few of them, because the operator is the unit matrix plus the
-fixed point of the iteration with reference springs, whose eigenvalues are small or few.
+A periodic motion needs a mean acceleration of zero, so on motions that supports leave free the mean forces of
+the elements balance the constant load (Krack and Gross, section 2.3: line zero of the harmonic equations). A
+one-sided contact pushes only; where the load asks it to pull, with nothing else to hold it, its mean
+deflection grows without end, and so does everything that is measured by it (`uncarried_note`).
 """
 
 from __future__ import annotations
@@ -48,151 +45,15 @@ _BALANCED = 1e-3
 # Stiffness relative to the largest, strain of a column and force beyond reach that count as none.
 _FREE, _UNSTRAINED, _BEYOND = 1e-11, 1e-9, 1e-6
 # Degrees of freedom up to which the free motions are computed to name the cause.
-_MANY = 1500
-
-
-def far(balance: HarmonicBalance) -> float:
-    """Mean deflection [m] beyond which no element takes up more: a size that cannot run away."""
-    return max(_FAR * balance.scale, _LENGTHS * balance.longest)
-
-
-def relative_residual(balance: HarmonicBalance, error, y) -> float:
-    """Largest violation relative to the largest deflection, of which the mean counts up to `far` only.
-
-    Parameters
-    ----------
-    balance : HarmonicBalance
-    error, y : (n_y,) arrays
-        Residual [m] and unknowns.
-    """
-    table = np.abs(np.reshape(y, (len(balance.reduction.reference), -1)))
-    mean = min(float(table[:, 0].max()), far(balance))
-    size = max(mean, float(table[:, 1:].max(initial=0.0)), 1e-9 * balance.scale)
-    # numbers that are not finite must not count as a large deflection
-    return float(np.abs(error).max() / size) if np.all(np.isfinite(y)) else np.inf
-
-
-def uncarried_note(balance: HarmonicBalance, lines, residual, converged: bool) -> str:
-    """Which column's mean load nothing carries; empty where there is no such column.
-
-    Parameters
-    ----------
-    balance : HarmonicBalance
-    lines : (n_columns, L) complex array
-        Deflections [m].
-    residual : callable
-        Without arguments: violation (n_columns, L) of the harmonic equations at the lines [m].
-    converged : bool
-        Converged lines are doubted only where their mean is far away and out of balance.
-    """
-    mean = np.abs(lines[:, 0])
-    finite = bool(np.all(np.isfinite(lines)))
-    away = not finite or mean.max() > max(far(balance), 10.0 * np.abs(lines[:, 1:]).max(initial=0.0))
-    if converged and not away:
-        return ""
-    # first by the forces alone: so far away the residual is the rounding of two large numbers
-    found = _beyond_reach(balance)
-    if found is not None:
-        column, wanted, low, high = found
-        bound = f"no less than {low:.4g} N" if wanted < low else f"no more than {high:.4g} N"
-        why = f"it needs {wanted:.4g} N, the elements there give {bound}"
-    elif away and finite and np.abs(residual()[:, 0]).max() > _BALANCED * balance.scale:
-        column = int(np.argmax(mean))
-        why = f"its mean deflection runs away, {lines[column, 0].real:.3g} m"
-    else:
-        return ""
-    return (
-        f"nothing carries the mean load of column {column + 1}{_named(balance, column)}: {why}; turn the "
-        "load round, give the contact a back side (backlash) or add a support"
-    )
-
-
-def _named(balance: HarmonicBalance, column: int) -> str:
-
-    name = element_name(balance.problem, column)
-    return f" ({name})" if not name.startswith("column") else ""
-
-
-def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] | None:
-    """Column, mean force wanted of it, lowest and highest mean force that its elements have [N].
-
-    None where some forces within the reach of all elements balance the load on the free motions: a linear
-    programme that minimises what is left over. Of several columns the least forces are the wanted ones.
-    """
-    from scipy import optimize
-
-    strain, load = _free_balance(balance)
-    columns = np.flatnonzero(np.abs(strain).max(axis=0, initial=0.0) > _UNSTRAINED)
-    if not len(columns) or not np.any(load):
-        return None
-    wanted = np.linalg.lstsq(strain[:, columns], load, rcond=None)[0]
-    size = np.abs(wanted).max() or 1.0
-    reach = np.array([_reach(balance, int(column)) for column in columns])
-    rows, eye = strain[:, columns], np.eye(len(load))
-    bounds = np.clip(reach / size, -_FAR, _FAR).tolist() + [(0.0, None)] * (2 * len(load))
-    cost = np.concatenate([np.zeros(len(columns)), np.ones(2 * len(load))])
-    left = optimize.linprog(cost, A_eq=np.hstack([rows, eye, -eye]), b_eq=load / size, bounds=bounds)
-    if not left.success or left.fun <= _BEYOND * np.abs(load / size).max():
-        return None
-    worst = int(np.argmax(np.maximum(reach[:, 0] - wanted, wanted - reach[:, 1])))
-    return int(columns[worst]), float(wanted[worst]), *reach[worst].tolist()
-
-
-def _free_balance(balance: HarmonicBalance) -> tuple[np.ndarray, np.ndarray]:
-    """Strain (r, n_columns) of the columns by motions that only elements hold, and the load (r,) on them.
-
-    Rows have unit size; none for systems so large that the motions are not looked for.
-    """
-    from scipy import linalg
-
-    system, reference = balance.problem.system, balance.reduction.reference
-    if len(system.M) > _MANY:
-        return np.zeros((0, len(reference))), np.zeros(0)
-    square, shape = linalg.eigh(0.5 * (system.K + system.K.T), system.M)
-    whole = np.diag(system.K) + np.einsum("ij,j,ij->i", system.W, reference, system.W)
-    free = shape[:, np.abs(square) <= _FREE * np.abs(whole / np.diag(system.M)).max()]
-    steady = sum(force.force.real for force in balance.problem.forces if not any(force.orders))
-    strain, load = free.T @ system.W, free.T @ (system.load + steady)
-    size = np.abs(strain).max(axis=1, initial=0.0)
-    # motions that strain no column carry no load either: the reduction has made sure
-    held = size > _UNSTRAINED * size.max(initial=0.0)
-    return strain[held] / size[held, None], load[held] / size[held]
-
-
-def _reach(balance: HarmonicBalance, column: int) -> tuple[float, float]:
-    """Lowest and highest mean force [N] of a column between far apart and far together."""
-    values = []
-    for sign in (-1.0, 1.0):
-        lines = np.zeros((len(balance.reduction.reference), len(balance.orders)), complex)
-        lines[column, 0] = sign * far(balance)
-        beyond = balance.forces(lines).lines[column, 0].real
-        values.append(float(beyond + balance.reduction.reference[column] * lines[column, 0].real))
-    low, high = sorted(values)
-    # what is left of two large numbers is their rounding
-    rounding = 1e-12 * balance.reduction.reference[column] * far(balance)
-    return (0.0 if abs(low) <= rounding else low), (0.0 if abs(high) <= rounding else high)
-
-
+_MOST_DOFS = 1500
 # Unknowns up to which matrices of their size are cheaper than products with them.
 MANY = 600
 # Stiffness of a column, relative to the largest one, that counts as none.
 _NO_STIFFNESS = 1e-9
-
-
-@dataclass(frozen=True)
-class LineForces:
-    """What the elements do beyond their reference springs.
-
-    Parameters
-    ----------
-    lines : (n_columns, L) complex array
-        [N]
-    products : (n_pairs, L, 2 L - 1) complex array
-        Their derivative by the unknowns of one column, for every coupled pair [N/m].
-    """
-
-    lines: np.ndarray
-    products: np.ndarray
+# Relative accuracy of a Newton step, and products after which the matrix is taken instead.
+_ACCURACY, _PRODUCTS = 1e-3, 60
+# No derivatives are kept with the forces.
+_NONE = np.empty((0, 0, 0))
 
 
 @dataclass(frozen=True)
@@ -249,15 +110,18 @@ class HarmonicBalance:
 
     def forces(self, lines) -> LineForces:
         """What the elements do beyond their reference springs, at lines (n_columns, L)."""
-        reference = self.reduction.reference
-        x = self.grid.values(lines)
+        # one transform for forces and tangents; columns without elements keep their reference spring
+        both = self.grid.transform(np.hstack(self.beyond_reference(lines)))
+        n = len(self.reduction.reference)
+        return LineForces(self.grid.amplitudes(both[:n]), self.grid.products(both[n:]))
+
+    def beyond_reference(self, lines) -> tuple[np.ndarray, np.ndarray]:
+        """Forces (N, n_columns) and tangents (N, n_pairs) less the reference springs, on the grid."""
+        reference, x = self.reduction.reference, self.grid.values(lines)
         force, tangent = forces_on_grid(self.elements, self.pairs, x, self.grid.theta)
         own = self.pairs[:, 0] == self.pairs[:, 1]
         tangent[:, own] -= reference[self.pairs[own, 0]]
-        # one transform for forces and tangents; columns without elements keep their reference spring
-        both = self.grid.transform(np.hstack([force - reference * x, tangent]))
-        n = len(reference)
-        return LineForces(self.grid.amplitudes(both[:n]), self.grid.products(both[n:]))
+        return force - reference * x, tangent
 
     def receptance(self, frequency) -> tuple[np.ndarray, np.ndarray]:
         """Receptance and its derivative (L, n_columns, n_columns + n_loads) at all lines."""
@@ -306,8 +170,6 @@ class HarmonicBalance:
         one; all are computed up to 600 unknowns. Beyond, Arnoldi's method finds it to 1 %.
         """
         if self.size > MANY:
-            # lazily: the module builds on this one
-
             tangent = linearised(self, self.receptance(frequency)[0], np.asarray(y, float))[1]
             found = krylov_radius(tangent)
             if found is not None:
@@ -365,6 +227,22 @@ class HarmonicBalance:
         """``T force - T_load S`` (n_columns, L)."""
         table = np.concatenate([force, -self.source]).T
         return (receptance @ table[..., None])[..., 0].T
+
+
+@dataclass(frozen=True)
+class LineForces:
+    """What the elements do beyond their reference springs.
+
+    Parameters
+    ----------
+    lines : (n_columns, L) complex array
+        [N]
+    products : (n_pairs, L, 2 L - 1) complex array
+        Their derivative by the unknowns of one column, for every coupled pair [N/m].
+    """
+
+    lines: np.ndarray
+    products: np.ndarray
 
 
 def harmonic_balance(
@@ -462,56 +340,6 @@ def element_name(problem: NonlinearSystem, column: int) -> str:
     return f"column {column + 1} of W, on which no element acts,"
 
 
-def _check_harmonics(problem: NonlinearSystem, harmonics: int) -> None:
-    """Refuse fewer harmonics than the harmonic forces name."""
-    for number, force in enumerate(problem.forces):
-        wanted = int(np.abs(force.orders).sum())
-        if wanted > harmonics >= 0:
-            raise CaseError(
-                f"{harmonics} harmonics, but harmonic force {number + 1} has orders {tuple(force.orders)}",
-                code="E-HARMONICS", key="harmonics", value=harmonics, limit=f"{wanted} or more",
-                remedy="raise the number of harmonics",
-            )  # fmt: skip
-
-
-def _typical_deflection(reduction, source) -> float:
-    """Largest static deflection [m] under the loads; zero without them."""
-    loads = reduction.static[:, len(reduction.reference) :]
-    return float(np.abs(loads @ source).max(initial=0.0))
-
-
-def _longest(problem) -> float:
-    """Largest finite length that an element names [m]; zero without one."""
-    names = ("backlash", "clearance", "breaks", "smoothing")
-    lengths = [np.ravel(getattr(e, name)) for e in problem.elements for name in names if hasattr(e, name)]
-    sizes = np.abs(np.concatenate([*lengths, np.zeros(1)]))
-    return float(sizes[np.isfinite(sizes)].max())
-
-
-def largest_modulus(matrix: np.ndarray) -> float:
-    """Largest modulus of the eigenvalues of a real matrix (n, n)."""
-    n = len(matrix)
-    if n <= MANY:
-        return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
-    from scipy.sparse import linalg
-
-    # a fixed start: the same value every time
-    start = np.random.default_rng(0).standard_normal(n)
-    try:
-        values = linalg.eigs(
-            matrix, k=2, ncv=40, v0=start, which="LM", tol=1e-10, maxiter=200, return_eigenvectors=False
-        )
-    except linalg.ArpackError:
-        values = np.linalg.eigvals(matrix)
-    return float(np.abs(values).max())
-
-
-# Relative accuracy of a Newton step, and products after which the matrix is taken instead.
-_ACCURACY, _PRODUCTS = 1e-3, 60
-# No derivatives are kept with the forces.
-_NONE = np.empty((0, 0, 0))
-
-
 @dataclass(frozen=True)
 class LineTangent:
     """``dR/dX`` of the harmonic equations at one deflection.
@@ -551,14 +379,29 @@ class LineTangent:
 
 def linearised(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineTangent]:
     """Residual (n_y,) [m] of the harmonic equations at the unknowns y, and its derivative."""
-    lines, reference = balance.lines(y), balance.reduction.reference
-    x = balance.grid.values(lines)
-    force, stiffness = forces_on_grid(balance.elements, balance.pairs, x, balance.grid.theta)
-    own = balance.pairs[:, 0] == balance.pairs[:, 1]
-    stiffness[:, own] -= reference[balance.pairs[own, 0]]
-    forces = balance.grid.amplitudes(balance.grid.transform(force - reference * x))
+    lines = balance.lines(y)
+    force, stiffness = balance.beyond_reference(lines)
+    forces = balance.grid.amplitudes(balance.grid.transform(force))
     error = balance.unknowns(balance.residual(lines, LineForces(forces, _NONE), receptance))
     return error, LineTangent(balance, receptance, stiffness)
+
+
+def largest_modulus(matrix: np.ndarray) -> float:
+    """Largest modulus of the eigenvalues of a real matrix (n, n)."""
+    n = len(matrix)
+    if n <= MANY:
+        return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
+    from scipy.sparse import linalg
+
+    # a fixed start: the same value every time
+    start = np.random.default_rng(0).standard_normal(n)
+    try:
+        values = linalg.eigs(
+            matrix, k=2, ncv=40, v0=start, which="LM", tol=1e-10, maxiter=200, return_eigenvectors=False
+        )
+    except linalg.ArpackError:
+        values = np.linalg.eigvals(matrix)
+    return float(np.abs(values).max())
 
 
 def krylov_radius(tangent: LineTangent) -> float | None:
@@ -580,3 +423,150 @@ def krylov_radius(tangent: LineTangent) -> float | None:
     except ArpackError:
         return None
     return float(np.abs(values).max())
+
+
+def relative_residual(balance: HarmonicBalance, error, y) -> float:
+    """Largest violation relative to the largest deflection, of which the mean counts up to `far` only.
+
+    Parameters
+    ----------
+    balance : HarmonicBalance
+    error, y : (n_y,) arrays
+        Residual [m] and unknowns.
+    """
+    table = np.abs(np.reshape(y, (len(balance.reduction.reference), -1)))
+    mean = min(float(table[:, 0].max()), far(balance))
+    size = max(mean, float(table[:, 1:].max(initial=0.0)), 1e-9 * balance.scale)
+    # numbers that are not finite must not count as a large deflection
+    return float(np.abs(error).max() / size) if np.all(np.isfinite(y)) else np.inf
+
+
+def far(balance: HarmonicBalance) -> float:
+    """Mean deflection [m] beyond which no element takes up more: a size that cannot run away."""
+    return max(_FAR * balance.scale, _LENGTHS * balance.longest)
+
+
+def uncarried_note(balance: HarmonicBalance, lines, residual, converged: bool) -> str:
+    """Which column's mean load nothing carries; empty where there is no such column.
+
+    Parameters
+    ----------
+    balance : HarmonicBalance
+    lines : (n_columns, L) complex array
+        Deflections [m].
+    residual : callable
+        Without arguments: violation (n_columns, L) of the harmonic equations at the lines [m].
+    converged : bool
+        Converged lines are doubted only where their mean is far away and out of balance.
+    """
+    mean = np.abs(lines[:, 0])
+    finite = bool(np.all(np.isfinite(lines)))
+    away = not finite or mean.max() > max(far(balance), 10.0 * np.abs(lines[:, 1:]).max(initial=0.0))
+    if converged and not away:
+        return ""
+    # first by the forces alone: so far away the residual is the rounding of two large numbers
+    found = _beyond_reach(balance)
+    if found is not None:
+        column, wanted, low, high = found
+        bound = f"no less than {low:.4g} N" if wanted < low else f"no more than {high:.4g} N"
+        why = f"it needs {wanted:.4g} N, the elements there give {bound}"
+    elif away and finite and np.abs(residual()[:, 0]).max() > _BALANCED * balance.scale:
+        column = int(np.argmax(mean))
+        why = f"its mean deflection runs away, {lines[column, 0].real:.3g} m"
+    else:
+        return ""
+    return (
+        f"nothing carries the mean load of column {column + 1}{_named(balance, column)}: {why}; turn the "
+        "load round, give the contact a back side (backlash) or add a support"
+    )
+
+
+def _named(balance: HarmonicBalance, column: int) -> str:
+    name = element_name(balance.problem, column)
+    return f" ({name})" if not name.startswith("column") else ""
+
+
+def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] | None:
+    """Column, mean force wanted of it, lowest and highest mean force that its elements have [N].
+
+    None where some forces within the reach of all elements balance the load on the free motions: a linear
+    programme that minimises what is left over. Of several columns the least forces are the wanted ones.
+    """
+    from scipy import optimize
+
+    strain, load = _free_balance(balance)
+    columns = np.flatnonzero(np.abs(strain).max(axis=0, initial=0.0) > _UNSTRAINED)
+    if not len(columns) or not np.any(load):
+        return None
+    wanted = np.linalg.lstsq(strain[:, columns], load, rcond=None)[0]
+    size = np.abs(wanted).max() or 1.0
+    reach = np.array([_reach(balance, int(column)) for column in columns])
+    rows, eye = strain[:, columns], np.eye(len(load))
+    bounds = np.clip(reach / size, -_FAR, _FAR).tolist() + [(0.0, None)] * (2 * len(load))
+    cost = np.concatenate([np.zeros(len(columns)), np.ones(2 * len(load))])
+    left = optimize.linprog(cost, A_eq=np.hstack([rows, eye, -eye]), b_eq=load / size, bounds=bounds)
+    if not left.success or left.fun <= _BEYOND * np.abs(load / size).max():
+        return None
+    worst = int(np.argmax(np.maximum(reach[:, 0] - wanted, wanted - reach[:, 1])))
+    return int(columns[worst]), float(wanted[worst]), *reach[worst].tolist()
+
+
+def _free_balance(balance: HarmonicBalance) -> tuple[np.ndarray, np.ndarray]:
+    """Strain (r, n_columns) of the columns by motions that only elements hold, and the load (r,) on them.
+
+    Rows have unit size; none for systems so large that the motions are not looked for.
+    """
+    from scipy import linalg
+
+    system, reference = balance.problem.system, balance.reduction.reference
+    if len(system.M) > _MOST_DOFS:
+        return np.zeros((0, len(reference))), np.zeros(0)
+    square, shape = linalg.eigh(0.5 * (system.K + system.K.T), system.M)
+    whole = np.diag(system.K) + np.einsum("ij,j,ij->i", system.W, reference, system.W)
+    free = shape[:, np.abs(square) <= _FREE * np.abs(whole / np.diag(system.M)).max()]
+    steady = sum(force.force.real for force in balance.problem.forces if not any(force.orders))
+    strain, load = free.T @ system.W, free.T @ (system.load + steady)
+    size = np.abs(strain).max(axis=1, initial=0.0)
+    # motions that strain no column carry no load either: the reduction has made sure
+    held = size > _UNSTRAINED * size.max(initial=0.0)
+    return strain[held] / size[held, None], load[held] / size[held]
+
+
+def _reach(balance: HarmonicBalance, column: int) -> tuple[float, float]:
+    """Lowest and highest mean force [N] of a column between far apart and far together."""
+    values = []
+    for sign in (-1.0, 1.0):
+        lines = np.zeros((len(balance.reduction.reference), len(balance.orders)), complex)
+        lines[column, 0] = sign * far(balance)
+        beyond = balance.forces(lines).lines[column, 0].real
+        values.append(float(beyond + balance.reduction.reference[column] * lines[column, 0].real))
+    low, high = sorted(values)
+    # what is left of two large numbers is their rounding
+    rounding = 1e-12 * balance.reduction.reference[column] * far(balance)
+    return (0.0 if abs(low) <= rounding else low), (0.0 if abs(high) <= rounding else high)
+
+
+def _check_harmonics(problem: NonlinearSystem, harmonics: int) -> None:
+    """Refuse fewer harmonics than the harmonic forces name."""
+    for number, force in enumerate(problem.forces):
+        wanted = int(np.abs(force.orders).sum())
+        if wanted > harmonics >= 0:
+            raise CaseError(
+                f"{harmonics} harmonics, but harmonic force {number + 1} has orders {tuple(force.orders)}",
+                code="E-HARMONICS", key="harmonics", value=harmonics, limit=f"{wanted} or more",
+                remedy="raise the number of harmonics",
+            )  # fmt: skip
+
+
+def _typical_deflection(reduction, source) -> float:
+    """Largest static deflection [m] under the loads; zero without them."""
+    loads = reduction.static[:, len(reduction.reference) :]
+    return float(np.abs(loads @ source).max(initial=0.0))
+
+
+def _longest(problem) -> float:
+    """Largest finite length that an element names [m]; zero without one."""
+    names = ("backlash", "clearance", "breaks", "smoothing")
+    lengths = [np.ravel(getattr(e, name)) for e in problem.elements for name in names if hasattr(e, name)]
+    sizes = np.abs(np.concatenate([*lengths, np.zeros(1)]))
+    return float(sizes[np.isfinite(sizes)].max())

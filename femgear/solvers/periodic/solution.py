@@ -1,6 +1,6 @@
-"""Periodic and quasi-periodic solutions as lines of a spectrum.
+"""Periodic and quasi-periodic solutions as lines of a spectrum, and the verdict on their stability.
 
-Verdict on a periodic solution: its Floquet multipliers, whether it is stable, how it is lost.
+The verdict has the Floquet multipliers, whether the solution is stable, and how stability is lost.
 """
 
 from __future__ import annotations
@@ -9,12 +9,90 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-# Multipliers beyond the unit circle by less than this are taken as on it.
-_CIRCLE = 1e-6
+# Multipliers beyond the unit circle by less than this are taken as on it (undamped systems).
+CIRCLE = 1e-6
 # A multiplier is real when its imaginary part is smaller than this share of it.
 _REAL = 1e-7
 # Distance of a real multiplier from one that integration cannot tell.
 _ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class PeriodicSolution:
+    """``x(t) = Re sum_l X_l exp(i (orders_l . omega) t)`` for the deflections of the elements.
+
+    Parameters
+    ----------
+    frequency : (n_bases,) array
+        Base frequencies ``omega`` [rad/s].
+    orders : (L, n_bases) int array
+        Line 0 is the mean; of a line and its mirror image only one is there.
+    deflection : (n_columns, L) complex array
+        ``W^T q`` [m].
+    force : (n_columns, L) complex array
+        Forces of the elements [N].
+    converged : bool
+    residual : float
+        Largest violation of the harmonic equations relative to the largest deflection, of which a mean that
+        runs away counts up to a million times the static one; one where nothing carries the mean load.
+    iterations : int
+    factorisations : int
+        Matrices factorised on the way.
+    tail : float
+        Share of the fluctuating amplitude in the upper half of the lines: a measure of truncation; zero
+        where nothing fluctuates.
+    message : str
+        What happened and, where it did not converge, what to do.
+    history : tuple of float
+        Relative residual at every iteration.
+    spectral_radius : float
+        Of the fixed point ``X <- T_load S - T (F - reference X)`` at the solution: below one the plain
+        iteration converges. It says nothing on stability. NaN where it was not asked for or where there is
+        no such iteration; the message says why.
+    verdict : FloquetVerdict
+        Whether disturbances grow; its message says "not asked for", "not covered" or "not determined" where
+        ``stable`` is None.
+    """
+
+    frequency: np.ndarray
+    orders: np.ndarray
+    deflection: np.ndarray
+    force: np.ndarray
+    converged: bool
+    residual: float
+    iterations: int
+    factorisations: int
+    tail: float
+    message: str
+    history: tuple[float, ...] = field(default=())
+    spectral_radius: float = np.nan
+    verdict: FloquetVerdict = field(default_factory=lambda: open_verdict("not asked for"))
+
+    def __post_init__(self):
+        for name, kind in (
+            ("frequency", float),
+            ("orders", int),
+            ("deflection", complex),
+            ("force", complex),
+        ):
+            array = np.array(getattr(self, name), kind)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether no disturbance grows; None where the verdict is open."""
+        return self.verdict.stable
+
+    @property
+    def line_frequency(self) -> np.ndarray:
+        """Angular frequency of every line, (L,) [rad/s]."""
+        return self.orders @ self.frequency
+
+    def at(self, time) -> np.ndarray:
+        """Deflections (..., n_columns) at the instants ``time`` (...) [s]."""
+        wave = np.exp(1j * np.asarray(time, float)[..., None] * self.line_frequency)
+        return (wave @ self.deflection.T).real
 
 
 @dataclass(frozen=True)
@@ -97,33 +175,19 @@ def verdict_of(
     largest = float(np.abs(multipliers[0])) if len(multipliers) else 0.0
     with np.errstate(divide="ignore"):
         exponents = np.log(multipliers) / period
-    stable: bool | None = largest <= 1.0 + _CIRCLE
+    stable: bool | None = largest <= 1.0 + CIRCLE
     message = f"largest multiplier {largest:.6g}"
-    if error > tolerance and abs(largest - 1.0) <= max(10.0 * error, _CIRCLE):
+    if error > tolerance and abs(largest - 1.0) <= max(10.0 * error, CIRCLE):
         stable = None
         message += f", undecided: error of the monodromy matrix {error:.1e}, aimed at {tolerance:.1e}"
     if stable and border is not None:
         stable = None
-        message += (
-            f", on the border: the multiplier {border.real:+.6g} is on the unit circle to {_CIRCLE:.0e}"
-        )
+        message += f", on the border: the multiplier {border.real:+.6g} is on the unit circle to {CIRCLE:.0e}"
     loss = "" if stable is not False else loss_of(multipliers[0])
-    outside = int(np.sum(np.abs(multipliers) > 1.0 + _CIRCLE))
+    outside = int(np.sum(np.abs(multipliers) > 1.0 + CIRCLE))
     if loss:
         message += f" ({loss}); {outside} outside the unit circle"
     return FloquetVerdict(multipliers, exponents, stable, loss, method, message, error)
-
-
-def _on_border(multipliers: np.ndarray, velocities: int) -> complex | None:
-    """A multiplier that is +1 or -1 to the accuracy of the unit circle, if there is one.
-
-    Multipliers are sorted by their distance from one; of free motions with damping the velocities are among
-    the first, inside the circle by more than rounding.
-    """
-    near = np.minimum(np.abs(multipliers - 1.0), np.abs(multipliers + 1.0)) <= _CIRCLE
-    slow = np.flatnonzero(near & (np.abs(multipliers) < 1.0 - _ROUNDING) & (multipliers.real > 0.0))
-    near[slow[:velocities]] = False
-    return multipliers[np.argmax(near)] if np.any(near) else None
 
 
 def loss_of(multiplier: complex) -> str:
@@ -133,83 +197,13 @@ def loss_of(multiplier: complex) -> str:
     return "fold" if multiplier.real > 0.0 else "flip"
 
 
-def _not_asked() -> FloquetVerdict:
-    return open_verdict("not asked for")
+def _on_border(multipliers: np.ndarray, velocities: int) -> complex | None:
+    """A multiplier that is +1 or -1 to the accuracy of the unit circle, if there is one.
 
-
-@dataclass(frozen=True)
-class PeriodicSolution:
-    """``x(t) = Re sum_l X_l exp(i (orders_l . omega) t)`` for the deflections of the elements.
-
-    Parameters
-    ----------
-    frequency : (n_bases,) array
-        Base frequencies ``omega`` [rad/s].
-    orders : (L, n_bases) int array
-        Line 0 is the mean; of a line and its mirror image only one is there.
-    deflection : (n_columns, L) complex array
-        ``W^T q`` [m].
-    force : (n_columns, L) complex array
-        Forces of the elements [N].
-    converged : bool
-    residual : float
-        Largest violation of the harmonic equations relative to the largest deflection, of which a mean that
-        runs away counts up to a million times the static one; one where nothing carries the mean load.
-    iterations : int
-    factorisations : int
-        Matrices factorised on the way.
-    tail : float
-        Share of the fluctuating amplitude in the upper half of the lines: a measure of truncation; zero
-        where nothing fluctuates.
-    message : str
-        What happened and, where it did not converge, what to do.
-    history : tuple of float
-        Relative residual at every iteration.
-    spectral_radius : float
-        Of the fixed point ``X <- T_load S - T (F - reference X)`` at the solution: below one the plain
-        iteration converges. It says nothing on stability. NaN where it was not asked for or where there is
-        no such iteration; the message says why.
-    verdict : FloquetVerdict
-        Whether disturbances grow; its message says "not asked for", "not covered" or "not determined" where
-        ``stable`` is None.
+    Multipliers are sorted by their distance from one; of free motions with damping the velocities are among
+    the first, inside the circle by more than rounding.
     """
-
-    frequency: np.ndarray
-    orders: np.ndarray
-    deflection: np.ndarray
-    force: np.ndarray
-    converged: bool
-    residual: float
-    iterations: int
-    factorisations: int
-    tail: float
-    message: str
-    history: tuple[float, ...] = field(default=())
-    spectral_radius: float = np.nan
-    verdict: FloquetVerdict = field(default_factory=_not_asked)
-
-    def __post_init__(self):
-        for name, kind in (
-            ("frequency", float),
-            ("orders", int),
-            ("deflection", complex),
-            ("force", complex),
-        ):
-            array = np.array(getattr(self, name), kind)
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-
-    @property
-    def stable(self) -> bool | None:
-        """Whether no disturbance grows; None where the verdict is open."""
-        return self.verdict.stable
-
-    @property
-    def line_frequency(self) -> np.ndarray:
-        """Angular frequency of every line, (L,) [rad/s]."""
-        return self.orders @ self.frequency
-
-    def at(self, time) -> np.ndarray:
-        """Deflections (..., n_columns) at the instants ``time`` (...) [s]."""
-        wave = np.exp(1j * np.asarray(time, float)[..., None] * self.line_frequency)
-        return (wave @ self.deflection.T).real
+    near = np.minimum(np.abs(multipliers - 1.0), np.abs(multipliers + 1.0)) <= CIRCLE
+    slow = np.flatnonzero(near & (np.abs(multipliers) < 1.0 - _ROUNDING) & (multipliers.real > 0.0))
+    near[slow[:velocities]] = False
+    return multipliers[np.argmax(near)] if np.any(near) else None

@@ -1,6 +1,7 @@
 """Periodic response of the gear meshes in the frequency domain, all speeds together.
 
-The harmonic equations of the mesh deflections, ``E + T G E = S``, for many speeds at once.
+The harmonic equations of the mesh deflections, ``E + T G E = S``, are solved for many speeds at once, by a
+fixed point or directly; meshes that repeat others later in time are solved once.
 """
 
 from __future__ import annotations
@@ -15,6 +16,99 @@ from femgear.system.system import MeshExcitation, Modes, Response
 
 # Two signals or receptances closer than this (relative) are equal: identical planets.
 _EQUAL = 1e-9
+# Share of the energy in the upper half of the harmonics above which the message warns. Halving or doubling
+# the harmonics of planetary sets shows a truncation error of the size of this share: 0.1 % of the amplitude.
+_TAIL_ENERGY = 1e-3
+# Fluctuation, relative to the mean, below which there is none.
+_STILL = 1e-12
+# Speeds treated together: their receptances and matrices stay in the cache.
+_BATCH = 40
+
+
+def solve_spectral(
+    modes: Modes,
+    excitation: MeshExcitation,
+    mesh_frequency,
+    *,
+    excitation_harmonics: int | np.ndarray = 6,
+    response_harmonics: int | np.ndarray = 12,
+    tolerance: float = 1e-6,
+    method: str = "auto",
+    max_iterations: int = 100,
+) -> Response:
+    """Periodic response at all mesh frequencies.
+
+    The force of mesh j is ``f_j = F_j + k_j (d_j - s_j)`` (see MeshExcitation) with k, s and F cut to
+    `excitation_harmonics`. With ``k~ = k - mean`` and the receptance T of the system that has the mean
+    stiffnesses, the mesh deflections satisfy for every harmonic h
+
+        ``d_h + T_h (k~ d)_h = S_h = d_load delta_h0 - T_h [F - k s]_h``
+
+    which are Eqs. (7) to (12) of "Vibratory response of planetary gear sets housing by a spectral iterative
+    approach"; its iteration is ``E <- S - T G E`` from ``E = S``.
+
+    Parameters
+    ----------
+    modes : Modes
+        Basis with mesh stiffnesses near the mean of the excitation.
+    excitation : MeshExcitation
+    mesh_frequency : float or (n_speeds,) array
+        [Hz], not negative; zero gives the static response.
+    excitation_harmonics, response_harmonics : int or (n_speeds,) int array
+        Mesh harmonics kept in the data and in the response, of all speeds or one a speed; products are formed
+        without aliasing. The result has as many harmonics as the speed with the most, zeros beyond its own.
+    tolerance : float
+        Relative change at which the fixed point stops; the full equations of a converged solution then hold
+        to ten times that.
+    method : {"auto", "fixed point", "direct"}
+        ``"auto"`` uses the fixed point where its spectral radius promises convergence within
+        `max_iterations` and the direct solution of the same equations elsewhere.
+    max_iterations : int
+        Of the fixed point.
+
+    Returns
+    -------
+    Response
+        Where ``converged`` is False (only with ``method="fixed point"``) the harmonics are NaN.
+
+    Raises
+    ------
+    CaseError
+        Data that cannot be used: not finite, negative frequencies, too few positions.
+    ConvergenceError
+        An undamped resonance, or equations that even the direct solution does not satisfy.
+    """
+    frequency = _checked(modes, excitation, mesh_frequency, method, tolerance, max_iterations)
+    kept = np.stack(np.broadcast_arrays(frequency, excitation_harmonics, response_harmonics)[1:]).astype(int)
+    _check_harmonics(*kept)
+    options = (method, tolerance, max_iterations)
+    top = int(kept[1].max()) * excitation.periods
+    found: list = [None] * len(frequency)
+    for harmonics, lines in np.unique(kept, axis=1).T:
+        data = _Data.build(modes, excitation, int(harmonics), int(lines) * excitation.periods)
+        chosen = np.flatnonzero((kept.T == (harmonics, lines)).all(axis=1))
+        for part in np.array_split(chosen, -(-len(chosen) // _BATCH)):
+            solved = _solve_batch(modes, data, frequency[part] / excitation.periods, options, top)
+            for i, *values in zip(part, *solved, strict=True):
+                found[i] = values
+    deflection, force, modal, residual, iterations, radius, tail, direct = map(np.array, zip(*found))
+    converged = residual <= 10.0 * tolerance
+    if method != "fixed point" and not np.all(converged):
+        worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
+        raise ConvergenceError(
+            f"residual {residual[worst]:.3e} of the harmonic equations at {frequency[worst]:.6g} Hz",
+            code="E-RESONANCE", limit=f"{10.0 * tolerance:.1e}",
+            remedy="the equations are nearly singular there: give the modes more damping or move the speed",
+        )  # fmt: skip
+    for array in (deflection, force, modal):
+        array[~converged] = np.nan
+    tail = np.where(converged, tail, np.nan)
+    return Response(
+        mesh_frequency=frequency, deflection=deflection, force=force, modal=modal, converged=converged,
+        residual=residual, iterations=iterations, spectral_radius=radius, tail=tail,
+        method=tuple("direct" if flag else "fixed point" for flag in direct),
+        message=_message(frequency, converged, direct, radius, tail, force), periods=excitation.periods,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -26,7 +120,7 @@ class HarmonicProblem:
     receptance : (n, n, n_speeds, H + 1) complex array
         ``T_h`` [m/N].
     product : (n, 2 (H + 1), 2 (H + 1)) array
-        Multiplication by the stiffness fluctuation of each mesh, see `system.series.product_matrix` [N/m].
+        Multiplication by the stiffness fluctuation of each mesh, see `series.product_matrix` [N/m].
     source : (n, n_speeds, H + 1) complex array
         ``S_h`` [m].
     """
@@ -190,16 +284,6 @@ def find_twins(signals: tuple[np.ndarray, ...]) -> Twins:
     return Twins(np.array(leaders), group, shift)
 
 
-def _phase(leader: np.ndarray, follower: np.ndarray) -> float:
-    """Time shift, as a fraction of the period, from the first harmonic that is there."""
-    present = np.abs(leader[:, 1:]) > 1e3 * _EQUAL
-    if not np.any(present):
-        return 0.0
-    h = int(np.argmax(np.any(present, axis=0))) + 1
-    signal = int(np.argmax(np.abs(leader[:, h])))
-    return float(-np.angle(follower[signal, h] / leader[signal, h]) / (2.0 * np.pi * h))
-
-
 def reduce_twins(problem: HarmonicProblem, twins: Twins) -> HarmonicProblem | None:
     """The problem of the group leaders alone; ``None`` when the receptances do not share the symmetry."""
     shifted = problem.receptance * twins.shift[None, :, None, :]
@@ -245,107 +329,6 @@ def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7, steps
         hessenberg[:, k + 1, k] = length
         basis[:, k + 1] = image[..., 0] / np.maximum(length, np.finfo(float).tiny)[:, None]
     return np.abs(np.linalg.eigvals(hessenberg[:, :-1])).max(axis=-1)
-
-
-def _rows(harmonics: np.ndarray) -> np.ndarray:
-    """(n, n_speeds, H + 1) harmonics as one interleaved real row a speed."""
-    flat = np.ascontiguousarray(harmonics.transpose(1, 0, 2))
-    return flat.view(float).reshape(len(flat), -1)
-
-
-# Share of the energy in the upper half of the harmonics above which the message warns. Halving or doubling
-# the harmonics of planetary sets shows a truncation error of the size of this share: 0.1 % of the amplitude.
-_TAIL_ENERGY = 1e-3
-# Fluctuation, relative to the mean, below which there is none.
-_STILL = 1e-12
-# Speeds treated together: their receptances and matrices stay in the cache.
-_BATCH = 40
-
-
-def solve_spectral(
-    modes: Modes,
-    excitation: MeshExcitation,
-    mesh_frequency,
-    *,
-    excitation_harmonics: int | np.ndarray = 6,
-    response_harmonics: int | np.ndarray = 12,
-    tolerance: float = 1e-6,
-    method: str = "auto",
-    max_iterations: int = 100,
-) -> Response:
-    """Periodic response at all mesh frequencies.
-
-    The force of mesh j is ``f_j = F_j + k_j (d_j - s_j)`` (see MeshExcitation) with k, s and F cut to
-    `excitation_harmonics`. With ``k~ = k - mean`` and the receptance T of the system that has the mean
-    stiffnesses, the mesh deflections satisfy for every harmonic h
-
-        ``d_h + T_h (k~ d)_h = S_h = d_load delta_h0 - T_h [F - k s]_h``
-
-    which are Eqs. (7) to (12) of "Vibratory response of planetary gear sets housing by a spectral iterative
-    approach"; its iteration is ``E <- S - T G E`` from ``E = S``.
-
-    Parameters
-    ----------
-    modes : Modes
-        Basis with mesh stiffnesses near the mean of the excitation.
-    excitation : MeshExcitation
-    mesh_frequency : float or (n_speeds,) array
-        [Hz], not negative; zero gives the static response.
-    excitation_harmonics, response_harmonics : int or (n_speeds,) int array
-        Mesh harmonics kept in the data and in the response, of all speeds or one a speed; products are formed
-        without aliasing. The result has as many harmonics as the speed with the most, zeros beyond its own.
-    tolerance : float
-        Relative change at which the fixed point stops; the full equations of a converged solution then hold
-        to ten times that.
-    method : {"auto", "fixed point", "direct"}
-        ``"auto"`` uses the fixed point where its spectral radius promises convergence within
-        `max_iterations` and the direct solution of the same equations elsewhere.
-    max_iterations : int
-        Of the fixed point.
-
-    Returns
-    -------
-    Response
-        Where ``converged`` is False (only with ``method="fixed point"``) the harmonics are NaN.
-
-    Raises
-    ------
-    CaseError
-        Data that cannot be used: not finite, negative frequencies, too few positions.
-    ConvergenceError
-        An undamped resonance, or equations that even the direct solution does not satisfy.
-    """
-    frequency = _checked(modes, excitation, mesh_frequency, method, tolerance, max_iterations)
-    kept = np.stack(np.broadcast_arrays(frequency, excitation_harmonics, response_harmonics)[1:]).astype(int)
-    _check_harmonics(*kept)
-    options = (method, tolerance, max_iterations)
-    top = int(kept[1].max()) * excitation.periods
-    found: list = [None] * len(frequency)
-    for harmonics, lines in np.unique(kept, axis=1).T:
-        data = _Data.build(modes, excitation, int(harmonics), int(lines) * excitation.periods)
-        chosen = np.flatnonzero((kept.T == (harmonics, lines)).all(axis=1))
-        for part in np.array_split(chosen, -(-len(chosen) // _BATCH)):
-            solved = _solve_batch(modes, data, frequency[part] / excitation.periods, options, top)
-            for i, *values in zip(part, *solved, strict=True):
-                found[i] = values
-    deflection, force, modal, residual, iterations, radius, tail, direct = map(np.array, zip(*found))
-    converged = residual <= 10.0 * tolerance
-    if method != "fixed point" and not np.all(converged):
-        worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
-        raise ConvergenceError(
-            f"residual {residual[worst]:.3e} of the harmonic equations at {frequency[worst]:.6g} Hz",
-            code="E-RESONANCE", limit=f"{10.0 * tolerance:.1e}",
-            remedy="the equations are nearly singular there: give the modes more damping or move the speed",
-        )  # fmt: skip
-    for array in (deflection, force, modal):
-        array[~converged] = np.nan
-    tail = np.where(converged, tail, np.nan)
-    return Response(
-        mesh_frequency=frequency, deflection=deflection, force=force, modal=modal, converged=converged,
-        residual=residual, iterations=iterations, spectral_radius=radius, tail=tail,
-        method=tuple("direct" if flag else "fixed point" for flag in direct),
-        message=_message(frequency, converged, direct, radius, tail, force), periods=excitation.periods,
-    )  # fmt: skip
 
 
 def _check_harmonics(excitation_harmonics: np.ndarray, response_harmonics: np.ndarray) -> None:
@@ -525,3 +508,19 @@ def _message(frequency, converged, direct, radius, tail, force) -> str:
             "which this linear solution cannot follow."
         )
     return " ".join(parts)
+
+
+def _phase(leader: np.ndarray, follower: np.ndarray) -> float:
+    """Time shift, as a fraction of the period, from the first harmonic that is there."""
+    present = np.abs(leader[:, 1:]) > 1e3 * _EQUAL
+    if not np.any(present):
+        return 0.0
+    h = int(np.argmax(np.any(present, axis=0))) + 1
+    signal = int(np.argmax(np.abs(leader[:, h])))
+    return float(-np.angle(follower[signal, h] / leader[signal, h]) / (2.0 * np.pi * h))
+
+
+def _rows(harmonics: np.ndarray) -> np.ndarray:
+    """(n, n_speeds, H + 1) harmonics as one interleaved real row a speed."""
+    flat = np.ascontiguousarray(harmonics.transpose(1, 0, 2))
+    return flat.view(float).reshape(len(flat), -1)

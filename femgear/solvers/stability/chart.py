@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.periodic.solution import loss_of
+from femgear.solvers.periodic.solution import CIRCLE, loss_of
 from femgear.solvers.stability.floquet import Frame, frame_of, frame_of_modes, passage
 from femgear.system.elements import tangent_jumps
 from femgear.system.entries import checked_numbers, checked_tolerance
@@ -15,8 +15,6 @@ from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.series import FourierSeries, StepSeries, series_of
 from femgear.system.system import MeshExcitation, Modes
 
-# Multipliers beyond the unit circle by less than this are taken as on it.
-_CIRCLE = 1e-6
 # Cells of a chart treated together.
 _BATCH = 64
 
@@ -48,7 +46,7 @@ class StabilityChart:
     @property
     def stable(self) -> np.ndarray:
         """(n_f, n_d) bool: no perturbation grows (modulus at most 1 within 1e-6)."""
-        return np.abs(self.multiplier) <= 1.0 + _CIRCLE
+        return np.abs(self.multiplier) <= 1.0 + CIRCLE
 
 
 def stability_chart(
@@ -91,7 +89,7 @@ def stability_chart(
     f, d = (grid.ravel() for grid in np.meshgrid(frequency, depth, indexing="ij"))
     multiplier, error = _largest(frame, series, breaks, f, d, tolerance)
     shape = (len(frequency), len(depth))
-    loss = [loss_of(value) if abs(value) > 1.0 + _CIRCLE else "" for value in multiplier]
+    loss = [loss_of(value) if abs(value) > 1.0 + CIRCLE else "" for value in multiplier]
     return StabilityChart(
         frequency, depth, multiplier.reshape(shape), np.array(loss).reshape(shape), error.reshape(shape)
     )
@@ -139,18 +137,18 @@ def stability_boundary(
         return float(np.log(np.abs(largest[0])))
 
     ends = np.array([growth(value) for value in between])
-    if np.count_nonzero(ends > _CIRCLE) != 1:
+    if np.count_nonzero(ends > CIRCLE) != 1:
         raise CaseError(
             f"largest multipliers {np.exp(ends).tolist()} at {list(between)}", code="E-CHART", key="between",
             limit="one end stable, the other one not",
         )  # fmt: skip
-    if ends.min() < -_CIRCLE:
+    if ends.min() < -CIRCLE:
         return float(brentq(growth, *between, xtol=1e-14, rtol=1e-13))
     low, high = between
-    unstable_low = ends[0] > _CIRCLE
+    unstable_low = ends[0] > CIRCLE
     while abs(high - low) > 1e-13 * abs(high):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if (growth(middle) > _CIRCLE) == unstable_low else (low, middle)
+        low, high = (middle, high) if (growth(middle) > CIRCLE) == unstable_low else (low, middle)
     return 0.5 * (low + high)
 
 

@@ -1,11 +1,12 @@
-"""Stability of the periodically varying gear meshes: Floquet multipliers.
+"""Stability of periodic motions: Floquet multipliers from the monodromy matrix or by Hill's method.
 
-Small motions about a periodic state: modes with the tangents of the elements, followed through one period.
+Gear meshes with a stiffness that varies with time are judged at many speeds at once (`stability`), periodic
+solutions of nonlinear problems one by one or many of one problem (`floquet_verdicts`). Small motions about a
+periodic state are followed through one period in modes with the tangents of the elements (`frame_of`,
+`passage`),
 
 ``M z'' + (C + speed G) z' + K z + W k(t) W^T z = 0`` in the modes of ``K + W diag(reference) W^T``, for many
 states at once.
-
-Stability of periodic solutions: Floquet multipliers from the monodromy matrix or by Hill's method.
 """
 
 from __future__ import annotations
@@ -16,22 +17,45 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution, open_verdict, verdict_of
+from femgear.solvers.periodic.solution import (
+    CIRCLE,
+    FloquetVerdict,
+    PeriodicSolution,
+    open_verdict,
+    verdict_of,
+)
 from femgear.system.elements import tangent_jumps
 from femgear.system.entries import checked_numbers, checked_tolerance
 from femgear.system.nonlinear import NonlinearSystem, element_forces
 from femgear.system.series import mesh_harmonics, sample
 from femgear.system.system import MeshExcitation, Modes
 
-# Multipliers beyond the unit circle by less than this are taken as on it (undamped systems).
-_CIRCLE = 1e-6
 # Angle [rad] that the fastest mode turns in one step, and steps in a period of the highest harmonic.
-_STEP_ANGLE = 1.0
+_MESH_STEP_ANGLE = 1.0
 _STEPS_PER_HARMONIC = 8
 # Modes that exchange less than this share of their stiffness move independently.
 _UNCOUPLED = 1e-9
 # Speeds treated together.
-_BATCH = 64
+_SPEEDS_TOGETHER = 64
+# Angle [rad] that the fastest mode turns in a step of the first sequence, and sequences of halved steps.
+_FRAME_STEP_ANGLE = 0.7
+_LEVELS = 7
+# Steps in a period beyond which they are not halved again.
+_MOST_HALVED = 320_000
+# Eigenvalues this small relative to the largest one, and rows relative to theirs, are zero.
+_RIGID = 1e-11
+_UNMOVED = 1e-9
+# Damping of a free motion, relative to the largest entry, that is rounding.
+_UNDAMPED = 1e-10
+# Distances of the Gauss points from the middle of a step of unit length.
+_GAUSS = 0.5 / np.sqrt(3.0)
+# States treated together, and instants of a piece at which tangents are compared.
+_STATES_TOGETHER = 32
+_INSIDE = 7
+# Steps of the first sequence over one period beyond which a verdict is not sought, and the most entries of
+# stiffness matrices at these steps that are held at once.
+_MOST_STEPS = 20_000
+_MOST_ENTRIES = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -58,28 +82,7 @@ class Stability:
     @property
     def stable(self) -> np.ndarray:
         """(n_speeds,) bool: no perturbation grows (largest modulus at most 1 within 1e-6)."""
-        return np.abs(self.multiplier) <= 1.0 + _CIRCLE
-
-
-def floquet_multipliers(
-    modes: Modes,
-    excitation: MeshExcitation,
-    mesh_frequency,
-    *,
-    excitation_harmonics: int = 6,
-    steps: int | None = None,
-    frequency_ratio: float = 2.0,
-) -> np.ndarray:
-    """Largest modulus (n_speeds,) of the Floquet multipliers; see :func:`stability`."""
-    verdict = stability(
-        modes,
-        excitation,
-        mesh_frequency,
-        excitation_harmonics=excitation_harmonics,
-        steps=steps,
-        frequency_ratio=frequency_ratio,
-    )
-    return np.abs(verdict.multiplier)
+        return np.abs(self.multiplier) <= 1.0 + CIRCLE
 
 
 def stability(
@@ -149,13 +152,34 @@ def stability(
     taken = np.empty(len(frequency), dtype=int)
     for number in np.unique(kept):
         chosen = np.flatnonzero(kept == number)
-        for part in np.array_split(chosen, -(-len(chosen) // _BATCH)):
+        for part in np.array_split(chosen, -(-len(chosen) // _SPEEDS_TOGETHER)):
             period = excitation.periods / frequency[part]
             fastest = 2.0 * np.pi * modes.frequency[:number].max(initial=0.0) * period.max()
-            taken[part] = steps or int(np.ceil(max(fastest / _STEP_ANGLE, _STEPS_PER_HARMONIC * lines)))
+            taken[part] = steps or int(np.ceil(max(fastest / _MESH_STEP_ANGLE, _STEPS_PER_HARMONIC * lines)))
             multiplier[part] = _largest(modes, stiffness, number, period, int(taken[part[0]]))
     moving = kept - np.searchsorted(modes.frequency, 0.0, side="right")
     return Stability(frequency, multiplier, np.maximum(moving, 0), taken)
+
+
+def floquet_multipliers(
+    modes: Modes,
+    excitation: MeshExcitation,
+    mesh_frequency,
+    *,
+    excitation_harmonics: int = 6,
+    steps: int | None = None,
+    frequency_ratio: float = 2.0,
+) -> np.ndarray:
+    """Largest modulus (n_speeds,) of the Floquet multipliers; see :func:`stability`."""
+    verdict = stability(
+        modes,
+        excitation,
+        mesh_frequency,
+        excitation_harmonics=excitation_harmonics,
+        steps=steps,
+        frequency_ratio=frequency_ratio,
+    )
+    return np.abs(verdict.multiplier)
 
 
 def decisive_harmonics(modes: Modes, excitation: MeshExcitation, kept: int, *, least: int = 6) -> int:
@@ -292,20 +316,6 @@ def _half_step(natural, damping_ratio, duration):
     return decay * (cosine + zeta * sine), decay * sine, -decay * sine, decay * (cosine - zeta * sine)
 
 
-# Angle [rad] that the fastest mode turns in a step of the first sequence, and sequences of halved steps.
-_STEP_ANGLE_variational = 0.7
-_LEVELS = 7
-# Steps in a period beyond which they are not halved again.
-_MOST_HALVED = 320_000
-# Eigenvalues this small relative to the largest one, and rows relative to theirs, are zero.
-_RIGID = 1e-11
-_UNMOVED = 1e-9
-# Damping of a free motion, relative to the largest entry, that is rounding.
-_UNDAMPED = 1e-10
-# Distances of the Gauss points from the middle of a step of unit length.
-_GAUSS = 0.5 / np.sqrt(3.0)
-
-
 @dataclass(frozen=True)
 class Frame:
     """Modal coordinates of small motions.
@@ -346,7 +356,7 @@ class Frame:
 
     def steps(self, period):
         """Steps of the first sequence over a period [s], as floats: they may be beyond all bounds."""
-        return np.ceil(np.maximum(8.0, self.fastest * np.asarray(period, float) / _STEP_ANGLE_variational))
+        return np.ceil(np.maximum(8.0, self.fastest * np.asarray(period, float) / _FRAME_STEP_ANGLE))
 
     @property
     def fastest(self) -> float:
@@ -414,23 +424,6 @@ def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
     if not all_modes:
         residual = _residual(problem, stiffness, shape[:, ~moving], rows, square)
     return Frame(square, damping, rows, reference, residual, positions, drift)
-
-
-def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:
-    """``W^T K^+ W`` without the part of the modes kept; rigid motions that no column feels are held."""
-    from scipy import linalg
-
-    system = problem.system
-    carried = system.M @ rigid
-    weight = np.trace(stiffness) / np.trace(system.M)
-    flexible = linalg.solve(stiffness + weight * (carried @ carried.T), system.W, assume_a="sym")
-    if np.any(square <= 0.0):
-        raise ConvergenceError(
-            "a motion without stiffness moves an element: static flexibilities do not exist",
-            code="E-RESIDUAL", remedy="keep all modes",
-        )  # fmt: skip
-    out = system.W.T @ flexible - (rows / square) @ rows.T
-    return 0.5 * (out + out.T)
 
 
 def frame_of_modes(modes: Modes) -> Frame:
@@ -503,6 +496,23 @@ def passage(
         if not len(open_states) or (level and base << (level + 1) > _MOST_HALVED):
             break
     return out
+
+
+def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:
+    """``W^T K^+ W`` without the part of the modes kept; rigid motions that no column feels are held."""
+    from scipy import linalg
+
+    system = problem.system
+    carried = system.M @ rigid
+    weight = np.trace(stiffness) / np.trace(system.M)
+    flexible = linalg.solve(stiffness + weight * (carried @ carried.T), system.W, assume_a="sym")
+    if np.any(square <= 0.0):
+        raise ConvergenceError(
+            "a motion without stiffness moves an element: static flexibilities do not exist",
+            code="E-RESIDUAL", remedy="keep all modes",
+        )  # fmt: skip
+    out = system.W.T @ flexible - (rows / square) @ rows.T
+    return 0.5 * (out + out.T)
 
 
 def _extrapolated(table, found):
@@ -602,30 +612,6 @@ def _coupled_drift(frame: Frame, scale, durations):
     return move
 
 
-# States treated together, and instants of a piece at which tangents are compared.
-_BATCH_hill = 32
-_INSIDE = 7
-# Steps of the first sequence over one period beyond which a verdict is not sought, and the most entries of
-# stiffness matrices at these steps that are held at once.
-_MOST_STEPS = 20_000
-_MOST_ENTRIES = 4_000_000
-
-
-def floquet_verdict(
-    problem: NonlinearSystem,
-    solution: PeriodicSolution,
-    *,
-    method: str = "monodromy",
-    tolerance: float = 1e-7,
-    harmonics: int | None = None,
-    modes: int = 100,
-) -> FloquetVerdict:
-    """Stability of one periodic solution; see :func:`floquet_verdicts`."""
-    return floquet_verdicts(
-        problem, [solution], method=method, tolerance=tolerance, harmonics=harmonics, modes=modes
-    )[0]
-
-
 def floquet_verdicts(
     problem: NonlinearSystem,
     solutions: Sequence[PeriodicSolution],
@@ -673,8 +659,8 @@ def floquet_verdicts(
     frame = frame_of(problem, modes=modes)
     out = [_not_covered(solution) or _too_long(frame, solution) for solution in solutions]
     covered = [i for i, verdict in enumerate(out) if verdict is None]
-    for first in range(0, len(covered), _BATCH_hill):
-        part = covered[first : first + _BATCH_hill]
+    for first in range(0, len(covered), _STATES_TOGETHER):
+        part = covered[first : first + _STATES_TOGETHER]
         chosen = [solutions[i] for i in part]
         if method == "hill":
             found = [_by_hill(frame, problem, solution, harmonics) for solution in chosen]
@@ -683,6 +669,21 @@ def floquet_verdicts(
         for i, verdict in zip(part, found):
             out[i] = verdict
     return tuple(out)
+
+
+def floquet_verdict(
+    problem: NonlinearSystem,
+    solution: PeriodicSolution,
+    *,
+    method: str = "monodromy",
+    tolerance: float = 1e-7,
+    harmonics: int | None = None,
+    modes: int = 100,
+) -> FloquetVerdict:
+    """Stability of one periodic solution; see :func:`floquet_verdicts`."""
+    return floquet_verdicts(
+        problem, [solution], method=method, tolerance=tolerance, harmonics=harmonics, modes=modes
+    )[0]
 
 
 def judged(
@@ -697,29 +698,6 @@ def judged(
     except ConvergenceError as error:
         verdicts = (open_verdict(f"not determined: {error.message}"),) * len(solutions)
     return tuple(replace(solution, verdict=verdict) for solution, verdict in zip(solutions, verdicts))
-
-
-def _not_covered(solution: PeriodicSolution) -> FloquetVerdict | None:
-    if solution.orders.shape[1] > 1:
-        reason = "not covered: a solution with several base frequencies is not periodic"
-    elif not solution.converged:
-        reason = "not covered: the solution did not converge"
-    elif solution.frequency[0] == 0.0:
-        reason = "not covered: the frequency zero has no period"
-    else:
-        return None
-    return open_verdict(reason)
-
-
-def _too_long(frame: Frame, solution: PeriodicSolution) -> FloquetVerdict | None:
-    with np.errstate(over="ignore"):
-        steps = float(frame.steps(2.0 * np.pi / np.abs(solution.frequency[0])))
-    if steps <= _MOST_STEPS:
-        return None
-    return open_verdict(
-        f"not determined: {steps:.3g} steps in a period at {solution.frequency[0]:.3g} rad/s, "
-        f"at most {_MOST_STEPS}: raise the frequency or keep fewer modes"
-    )
 
 
 def require_period(frequency) -> None:
@@ -757,6 +735,63 @@ def tangents_of(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution])
         return element_forces(problem, x, phase[..., None])[1]
 
     return tangents
+
+
+def hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:
+    """Floquet exponents (2 n,) [1/s] by Hill's method.
+
+    ``z = exp(lambda t) sum_h z_h exp(i h omega t)`` in the first-order form gives the eigenvalues of the
+    block Toeplitz matrix ``A_(h - m) - i h omega``. Of every exponent it holds copies ``lambda + i k omega``;
+    those with the most symmetric eigenvectors are the converged ones (Moore, SIAM J. Numer. Anal. 42, 2005):
+    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each.
+
+    Parameters
+    ----------
+    frame : Frame
+    kappa : (samples, n_c, n_c) array
+        Change of stiffness from the reference over one period [N/m].
+    omega : float
+        Base frequency [rad/s].
+    harmonics : int
+    """
+    n, orders = len(frame.square), np.arange(-harmonics, harmonics + 1)
+    lines = np.fft.fft(kappa, axis=0) / len(kappa)
+    both = np.concatenate([np.ones(n), np.full(n, omega)])
+    change = np.zeros((4 * harmonics + 1, 2 * n, 2 * n), complex)
+    for number in range(-2 * harmonics, 2 * harmonics + 1):
+        change[number, n:, :n] = -frame.rows.T @ lines[number] @ frame.rows
+    change[0] += frame.state_matrices(np.zeros_like(lines[0].real))
+    change *= both / both[:, None]
+    size = 2 * n * len(orders)
+    matrix = change[orders[:, None] - orders].swapaxes(1, 2).reshape(size, size)
+    matrix[range(size), range(size)] -= 1j * omega * np.repeat(orders, 2 * n)
+    values, vectors = np.linalg.eig(matrix)
+    weight = (np.abs(vectors.reshape(len(orders), 2 * n, -1)) ** 2).sum(axis=1)
+    centre = np.abs(orders @ weight) / weight.sum(axis=0)
+    return _one_copy_each(values[np.argsort(centre, kind="stable")], omega, 2 * n)
+
+
+def _not_covered(solution: PeriodicSolution) -> FloquetVerdict | None:
+    if solution.orders.shape[1] > 1:
+        reason = "not covered: a solution with several base frequencies is not periodic"
+    elif not solution.converged:
+        reason = "not covered: the solution did not converge"
+    elif solution.frequency[0] == 0.0:
+        reason = "not covered: the frequency zero has no period"
+    else:
+        return None
+    return open_verdict(reason)
+
+
+def _too_long(frame: Frame, solution: PeriodicSolution) -> FloquetVerdict | None:
+    with np.errstate(over="ignore"):
+        steps = float(frame.steps(2.0 * np.pi / np.abs(solution.frequency[0])))
+    if steps <= _MOST_STEPS:
+        return None
+    return open_verdict(
+        f"not determined: {steps:.3g} steps in a period at {solution.frequency[0]:.3g} rad/s, "
+        f"at most {_MOST_STEPS}: raise the frequency or keep fewer modes"
+    )
 
 
 def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[FloquetVerdict]:
@@ -827,40 +862,6 @@ def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int |
 def _free(frame: Frame) -> dict:
     """What the verdict has to know of free motions."""
     return {"positions": frame.positions, "velocities": frame.positions, "drift": frame.drift}
-
-
-def hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:
-    """Floquet exponents (2 n,) [1/s] by Hill's method.
-
-    ``z = exp(lambda t) sum_h z_h exp(i h omega t)`` in the first-order form gives the eigenvalues of the
-    block Toeplitz matrix ``A_(h - m) - i h omega``. Of every exponent it holds copies ``lambda + i k omega``;
-    those with the most symmetric eigenvectors are the converged ones (Moore, SIAM J. Numer. Anal. 42, 2005):
-    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each.
-
-    Parameters
-    ----------
-    frame : Frame
-    kappa : (samples, n_c, n_c) array
-        Change of stiffness from the reference over one period [N/m].
-    omega : float
-        Base frequency [rad/s].
-    harmonics : int
-    """
-    n, orders = len(frame.square), np.arange(-harmonics, harmonics + 1)
-    lines = np.fft.fft(kappa, axis=0) / len(kappa)
-    both = np.concatenate([np.ones(n), np.full(n, omega)])
-    change = np.zeros((4 * harmonics + 1, 2 * n, 2 * n), complex)
-    for number in range(-2 * harmonics, 2 * harmonics + 1):
-        change[number, n:, :n] = -frame.rows.T @ lines[number] @ frame.rows
-    change[0] += frame.state_matrices(np.zeros_like(lines[0].real))
-    change *= both / both[:, None]
-    size = 2 * n * len(orders)
-    matrix = change[orders[:, None] - orders].swapaxes(1, 2).reshape(size, size)
-    matrix[range(size), range(size)] -= 1j * omega * np.repeat(orders, 2 * n)
-    values, vectors = np.linalg.eig(matrix)
-    weight = (np.abs(vectors.reshape(len(orders), 2 * n, -1)) ** 2).sum(axis=1)
-    centre = np.abs(orders @ weight) / weight.sum(axis=0)
-    return _one_copy_each(values[np.argsort(centre, kind="stable")], omega, 2 * n)
 
 
 def _one_copy_each(values: np.ndarray, omega: float, count: int) -> np.ndarray:

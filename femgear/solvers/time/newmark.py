@@ -1,14 +1,13 @@
-"""Newmark's family and the generalised-alpha method as linear maps of a step.
+"""Steps in time: Newmark's family and the generalised-alpha method, with Newton iterations on the columns.
+
+Every rule is a linear map of the state and of the column forces: ``x_1 = x_free - A g_1`` with x the
+deflections of the columns at the end of the step, ``g = f - c x`` their forces beyond the reference stiffness
+and ``A`` a matrix of n_columns rows that does not change. The linear system is marched exactly or by a rule,
+and only these few equations are iterated (`march`).
 
 N. M. Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94; J. Chung and G. M. Hulbert, J. Appl. Mech. 60 (1993)
 371-375; forces that are not linear averaged as loads are: S. Erlicher, L. Bonaventura and O. S. Bursi,
 Comput. Mech. 28 (2002) 83-104.
-
-Steps in time: a linear system marched exactly or by a rule, its nonlinear columns by Newton iterations.
-
-Every rule is a linear map of the state and of the column forces: ``x_1 = x_free - A g_1`` with x the
-deflections of the columns at the end of the step, ``g = f - c x`` their forces beyond the reference stiffness
-and ``A`` a matrix of n_columns rows that does not change. Only these few equations are iterated.
 """
 
 from __future__ import annotations
@@ -20,8 +19,12 @@ import numpy as np
 from scipy.linalg.lapack import dgesv
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.linear.modal import mass_error
 from femgear.system.nonlinear import Law, NonlinearSystem, external_force, tabulated_law
 from femgear.system.series import phase_of
+
+# Numbers held in the states of one block of steps.
+_BLOCK_NUMBERS = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -109,27 +112,6 @@ def numerical_damping(rule: StepRule, ratio) -> np.ndarray:
     """``-ln |z| / arg z`` of an undamped mode stepped with ``h / T = ratio`` (Hughes 2000, section 9.1)."""
     value = _principal(rule, np.asarray(ratio, float))
     return -np.log(np.abs(value)) / np.abs(np.angle(value))
-
-
-def _principal(rule: StepRule, ratio) -> np.ndarray:
-    """Complex eigenvalue of the amplification matrix of ``a + w^2 q = 0`` in (q, h v, h^2 a)."""
-    square = (2.0 * np.pi * np.atleast_1d(ratio)) ** 2
-    predict, mix = _predictor(rule, 1.0)[:3], _predictor(rule, 1.0)[3:]
-    inertia = 1.0 - rule.mass + (1.0 - rule.force) * rule.beta * square
-    taken = -(mix[2] + square[:, None] * mix[0]) / inertia[:, None]
-    matrix = predict + np.array([rule.beta, rule.gamma, 1.0])[:, None] * taken[:, None, :]
-    values = np.linalg.eigvals(matrix)
-    best = np.argmax(np.where(np.abs(values.imag) > 1e-12, np.abs(values), -1.0), axis=1)
-    found = values[np.arange(len(values)), best]
-    return found.reshape(np.shape(ratio))
-
-
-def _predictor(rule: StepRule, h: float) -> np.ndarray:
-    """Rows on (q, v, a): q, v, a without ``a_1``; then q, v and inertia of the force balance."""
-    predict = np.array([[1.0, h, h * h * (0.5 - rule.beta)], [0.0, 1.0, h * (1.0 - rule.gamma)], [0.0] * 3])
-    weight = rule.force
-    mixed = (1.0 - weight) * predict[:2] + weight * np.eye(3)[:2]
-    return np.vstack([predict, mixed, [0.0, 0.0, rule.mass]])
 
 
 @dataclass(frozen=True)
@@ -223,8 +205,7 @@ def rule_scheme(problem: NonlinearSystem, rule: StepRule, step: float) -> RuleSc
     from scipy import linalg
 
     system, part = problem.system, 1.0 - rule.force
-    stiffness = system.K + (system.W * problem.reference) @ system.W.T
-    damping = problem.damping
+    stiffness, damping = problem.stiffness, problem.damping
     matrix = (1.0 - rule.mass) * system.M + part * step * (
         rule.gamma * damping + rule.beta * step * stiffness
     )
@@ -258,15 +239,8 @@ def highest_frequency(problem: NonlinearSystem, mesh_stiffness) -> float:
     try:
         value = linalg.eigh(total, system.M, eigvals_only=True, subset_by_index=(n - 1, n - 1))[0]
     except linalg.LinAlgError as error:
-        raise ConvergenceError(
-            "the mass matrix is not positive definite", code="E-MASS",
-            remedy="give every degree of freedom some mass or condense it",
-        ) from error  # fmt: skip
+        raise mass_error() from error
     return float(np.sqrt(max(value, 0.0)))
-
-
-# Numbers held in the states of one block of steps.
-_BLOCK_NUMBERS = 2_000_000
 
 
 class Scheme(Protocol):
@@ -314,11 +288,6 @@ class Marched:
     iterations: int
 
 
-def block_length(state) -> int:
-    """Steps that are kept in memory together."""
-    return int(np.clip(_BLOCK_NUMBERS // state.size, 64, 8192))
-
-
 def march(scheme, law: Law, loads, state, g, count, *, tolerance, max_iterations, size=0.0) -> Marched:
     """Take ``count`` steps; stops early where the columns do not converge or the numbers overflow.
 
@@ -358,6 +327,54 @@ def march(scheme, law: Law, loads, state, g, count, *, tolerance, max_iterations
     return Marched(states, excess, count, float(np.sqrt(worst)), total)
 
 
+def march_times(problem: NonlinearSystem, scheme, frequency, state, g, *, begin, step, count, **options):
+    """Blocks of at most `block_length` steps from ``begin`` [s] on: yields (first step, Marched, phases)."""
+    frequency = np.atleast_1d(np.asarray(frequency, float))
+    done, size = 0, 0.0
+    while done < count:
+        number = min(block_length(state), count - done)
+        theta = (begin + step * np.arange(done, done + number + 1))[:, None] * frequency
+        block = march(
+            scheme, tabulated_law(problem, theta), scheme.table(theta), state, g, number, size=size, **options
+        )
+        yield done, block, theta
+        if block.steps < number:
+            return
+        state, g, done = block.states[-1], block.excess[-1], done + number
+        size = max(size, largest_square(scheme.columns(block.states, block.excess, theta)))
+
+
+def block_length(state) -> int:
+    """Steps that are kept in memory together."""
+    return int(np.clip(_BLOCK_NUMBERS // state.size, 64, 8192))
+
+
+def largest_square(x) -> float:
+    """Largest ``|x|^2`` over the instants of x (n, n_c)."""
+    return float(np.square(x).sum(axis=1).max(initial=0.0))
+
+
+def _principal(rule: StepRule, ratio) -> np.ndarray:
+    """Complex eigenvalue of the amplification matrix of ``a + w^2 q = 0`` in (q, h v, h^2 a)."""
+    square = (2.0 * np.pi * np.atleast_1d(ratio)) ** 2
+    predict, mix = _predictor(rule, 1.0)[:3], _predictor(rule, 1.0)[3:]
+    inertia = 1.0 - rule.mass + (1.0 - rule.force) * rule.beta * square
+    taken = -(mix[2] + square[:, None] * mix[0]) / inertia[:, None]
+    matrix = predict + np.array([rule.beta, rule.gamma, 1.0])[:, None] * taken[:, None, :]
+    values = np.linalg.eigvals(matrix)
+    best = np.argmax(np.where(np.abs(values.imag) > 1e-12, np.abs(values), -1.0), axis=1)
+    found = values[np.arange(len(values)), best]
+    return found.reshape(np.shape(ratio))
+
+
+def _predictor(rule: StepRule, h: float) -> np.ndarray:
+    """Rows on (q, v, a): q, v, a without ``a_1``; then q, v and inertia of the force balance."""
+    predict = np.array([[1.0, h, h * h * (0.5 - rule.beta)], [0.0, 1.0, h * (1.0 - rule.gamma)], [0.0] * 3])
+    weight = rule.force
+    mixed = (1.0 - weight) * predict[:2] + weight * np.eye(3)[:2]
+    return np.vstack([predict, mixed, [0.0, 0.0, rule.mass]])
+
+
 def _solve_columns(law, i, flexibility, unit, aim, g, size, options):
     """Solve ``x + A g(x) = aim`` by Newton iterations that are shortened where they do not help.
 
@@ -393,25 +410,3 @@ def _shortened(law, i, flexibility, aim, x, last, before):
         if float(error @ error) < before:
             break
     return x, g, slope
-
-
-def march_times(problem: NonlinearSystem, scheme, frequency, state, g, *, begin, step, count, **options):
-    """Blocks of at most `block_length` steps from ``begin`` [s] on: yields (first step, Marched, phases)."""
-    frequency = np.atleast_1d(np.asarray(frequency, float))
-    done, size = 0, 0.0
-    while done < count:
-        number = min(block_length(state), count - done)
-        theta = (begin + step * np.arange(done, done + number + 1))[:, None] * frequency
-        block = march(
-            scheme, tabulated_law(problem, theta), scheme.table(theta), state, g, number, size=size, **options
-        )
-        yield done, block, theta
-        if block.steps < number:
-            return
-        state, g, done = block.states[-1], block.excess[-1], done + number
-        size = max(size, largest_square(scheme.columns(block.states, block.excess, theta)))
-
-
-def largest_square(x) -> float:
-    """Largest ``|x|^2`` over the instants of x (n, n_c)."""
-    return float(np.square(x).sum(axis=1).max(initial=0.0))

@@ -11,7 +11,7 @@ from femgear.solvers.time.adaptive import checked_start
 from femgear.solvers.time.newmark import Marched, march
 from femgear.solvers.time.transient import fixed_step_scheme, start_state
 from femgear.system.entries import checked_count, checked_numbers
-from femgear.system.nonlinear import Law, NonlinearSystem
+from femgear.system.nonlinear import Law, NonlinearSystem, tabulated_law
 
 # Largest number of steps in a period, and so the memory of its states.
 _MOST_STEPS = 100_000
@@ -80,8 +80,6 @@ def strobe(
     CaseError
         Base frequencies that do not repeat then, steps out of range or beyond the stability limit.
     """
-    from femgear.system.nonlinear import tabulated_law
-
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
     period = common_period(frequency, periods)
     if not 4 <= steps <= _MOST_STEPS:
