@@ -450,4 +450,4 @@ def refuse(key: str, value, unit: str, limit: str, *, code: str, remedy: str | N
 
 
 _refuse_planar = partial(refuse, code="E-PLANAR")
-refuse_helical = _refuse_checks__body = partial(refuse, code="E-HELICAL")
+refuse_helical = partial(refuse, code="E-HELICAL")

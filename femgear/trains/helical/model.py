@@ -49,7 +49,6 @@ from femgear.system.lumped import (
     HelicalSupport,
     PlanarTorque,
     RigidSet,
-    _refuse_checks__body,
     check_angles,
     check_helical_body,
     check_support,
@@ -57,6 +56,7 @@ from femgear.system.lumped import (
     gear_geometry,
     member_radius,
     numbers,
+    refuse_helical,
     torque_load,
 )
 from femgear.system.mode_kinds import SetMotions, body_motions, energy_shares, named_kinds, phase_basis
@@ -77,25 +77,25 @@ def check_set(data: HelicalSet) -> None:
     for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
         value = numbers(name, getattr(data, name), 0)
         if not (math.isfinite(value) and value > 0.0):
-            _refuse_checks__body(name, value, "m", "finite and above 0")
+            refuse_helical(name, value, "m", "finite and above 0")
     if data.ring_radius <= data.planet_radius:
-        _refuse_checks__body(
+        refuse_helical(
             "ring_radius", data.ring_radius, "m", f"above the {data.planet_radius} m of the planets"
         )
     for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
         value = numbers(name, getattr(data, name), 0)
         if not 0.0 < value < 0.5 * math.pi:
-            _refuse_checks__body(name, value, "rad", "between 0 and pi/2", remedy="give radians")
+            refuse_helical(name, value, "rad", "between 0 and pi/2", remedy="give radians")
     if not abs(numbers("base_helix_angle", data.base_helix_angle, 0)) < 0.5 * math.pi:
         allowed = "between -pi/2 and pi/2"
-        _refuse_checks__body("base_helix_angle", data.base_helix_angle, "rad", allowed, remedy="give radians")
+        refuse_helical("base_helix_angle", data.base_helix_angle, "rad", allowed, remedy="give radians")
     for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
         values = getattr(data, name)
         if values.shape != (data.n_planets,):
-            _refuse_checks__body(name, f"{values.size} values", "", f"one number, or {data.n_planets}")
+            refuse_helical(name, f"{values.size} values", "", f"one number, or {data.n_planets}")
         wrong = ~np.isfinite(values) | (values < 0.0)
         if np.any(wrong):
-            _refuse_checks__body(name, values[wrong][0], "N/m", "finite, 0 or more")
+            refuse_helical(name, values[wrong][0], "N/m", "finite, 0 or more")
     check_support("planet_bearing", data.planet_bearing, count=data.n_planets)
     check_angles(data.planet_angles, code="E-HELICAL")
     _check_contact(data)
@@ -104,19 +104,19 @@ def check_set(data: HelicalSet) -> None:
 
 def _check_contact(data: HelicalSet) -> None:
     if data.contact_points not in CONTACT_POINTS:
-        _refuse_checks__body("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
+        refuse_helical("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
     if isinstance(data.slices, bool) or int(data.slices) != data.slices or data.slices < 1:
-        _refuse_checks__body("slices", data.slices, "", "a whole number of 1 or more")
+        refuse_helical("slices", data.slices, "", "a whole number of 1 or more")
     if not (math.isfinite(data.face_width) and data.face_width >= 0.0):
-        _refuse_checks__body("face_width", data.face_width, "m", "finite, 0 or more")
+        refuse_helical("face_width", data.face_width, "m", "finite, 0 or more")
     if data.slices > 1 and not data.face_width:
-        _refuse_checks__body("face_width", data.face_width, "m", "above 0 for several slices")
+        refuse_helical("face_width", data.face_width, "m", "above 0 for several slices")
 
 
 def _check_closure(data: HelicalSet) -> None:
     worst = max(data.closure, key=abs)
     if abs(worst) > LARGEST_CLOSURE:
-        _refuse_checks__body(
+        refuse_helical(
             "centre_distance", data.centre_distance, "m",
             f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {LARGEST_CLOSURE:.0%}",
             remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
