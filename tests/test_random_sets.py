@@ -241,5 +241,5 @@ def test_dynamics_start_from_the_static_solution_with_elastic_members(solved):
         found, expected = state.resampled(name, len(cycle.position)), getattr(cycle, name)
         apart, moving, rounding = found - expected, np.ptp(expected, axis=1).max(), 1e-7 * expected.max()
         assert np.sqrt(np.mean(apart**2, axis=1)).max() < 1e-3 * moving + rounding, name
-        # a bend between positions of the one that the other does not have
-        assert np.abs(apart).max() < 5e-3 * moving + rounding, name
+        # bends and steps of the contact cells between positions of the one that the other does not have
+        assert np.abs(apart).max() < 2e-3 * moving + rounding, name

@@ -30,7 +30,9 @@ SHORTEST = 2.0**-13
 SMOOTHEST = 2.0**-10
 """Mesh periods below which a smooth change is not resolved further."""
 MISSED = 3e-4
-"""Share of a mesh stiffness that straight lines between the positions may miss where it does not jump."""
+"""Share of a mesh stiffness, and of the peak to peak of the deflections, that straight lines between the
+positions may miss where the stiffness does not jump."""
+_STILL = 1e-3  # peak to peak over the mean below which a deflection counts as constant
 STEEP = 0.02
 """Change of a mesh stiffness between neighbouring positions above which there are more between them."""
 
@@ -198,9 +200,11 @@ def _unresolved(record: _Record) -> np.ndarray:
     gap = np.diff(record.position)
     steep = (np.abs(np.diff(k)) > STEEP).any(axis=0)
     other = record.loaded[1:] != record.loaded[:-1]
+    moving = max(np.ptp(record.deflection, axis=1).max(), _STILL * np.abs(record.deflection).max())
+    shown = np.concatenate([k, record.deflection / (moving or 1.0)])
     # what a straight line misses in the middle of a gap, from the curvature at its ends; none across jumps
-    slope = np.diff(k) / gap
-    bend = np.zeros(k.shape)
+    slope = np.diff(shown) / gap
+    bend = np.zeros(shown.shape)
     bend[:, 1:-1] = np.abs(2.0 * np.diff(slope) / (gap[1:] + gap[:-1]))
     jump = np.flatnonzero(steep | other)
     bend[:, np.concatenate([jump, jump + 1])] = 0.0
