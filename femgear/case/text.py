@@ -298,6 +298,23 @@ class ReadCase(BaseModel):
     _notices: tuple[str, ...] = PrivateAttr(default=())
     _profile_files: dict[str, str] = PrivateAttr(default_factory=dict)
 
+    def read_from(self, text: str, lines: str, name: str, *, notices=(), profile_files=None) -> None:
+        """Remember where the values were read.
+
+        Parameters
+        ----------
+        text : str
+            TOML text that gives this case.
+        lines : str
+            Text of the user, for line numbers; empty where he wrote none.
+        name : str
+            Of the file.
+        notices : sequence of str
+        profile_files : dict of str to str, optional
+        """
+        self._source, self._lines, self._name = text, lines, name
+        self._notices, self._profile_files = tuple(notices), dict(profile_files or {})
+
     def __eq__(self, other: object) -> bool:
         """Whether the values agree, from whatever text they came."""
         return isinstance(other, type(self)) and self.model_dump() == other.model_dump()

@@ -19,8 +19,8 @@ from femgear.case.tables import embed_profiles
 from femgear.case.text import text_with_points
 from femgear.errors import CaseError
 from femgear.storage.results import Results, results_of
+from femgear.trains import registry
 from femgear.trains.protocol import Train
-from femgear.trains.registry import TRAINS
 
 
 def read_case(path: str | os.PathLike) -> Any:
@@ -172,7 +172,7 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
     CaseError
         E-MODEL: no train reads files of this model.
     """
-    own = {train.name: train.own_file for train in TRAINS if train.own_file is not None}
+    own = {train.name: train.own_file for train in registry.TRAINS if train.own_file is not None}
     if model is None:
         return every_section().model_json_schema()
     if model not in own:
@@ -187,7 +187,7 @@ def every_section() -> type[Case]:
     """Model of a planetary set with the sections of all trains, for its keys and their descriptions."""
     fields = {
         train.section: (train.model.model_fields[train.section].annotation | None, None)
-        for train in reversed(TRAINS)
+        for train in reversed(registry.TRAINS)
         if train.section
     }
     return create_model("Case", __base__=Case, __doc__=Case.__doc__, **fields)
@@ -195,7 +195,7 @@ def every_section() -> type[Case]:
 
 def _train_of_set(data: dict, lines: str, name: str) -> Train:
     """Train whose section the tables of a planetary set hold; that without one where they hold none."""
-    given = [train for train in reversed(TRAINS) if train.section and train.section in data]
+    given = [train for train in reversed(registry.TRAINS) if train.section and train.section in data]
     if len(given) > 1:
         sections = [train.section for train in given]
         problem = CaseError(
@@ -207,7 +207,7 @@ def _train_of_set(data: dict, lines: str, name: str) -> Train:
             remedy="leave one of them out",
         )
         raise combine([problem], lines, name)
-    return given[0] if given else next(t for t in TRAINS if not t.section and t.own_file is None)
+    return given[0] if given else next(t for t in registry.TRAINS if not t.section and t.own_file is None)
 
 
 def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
@@ -222,7 +222,7 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
             remedy="update femgear",
             file=name,
         )
-    for train in TRAINS:
+    for train in registry.TRAINS:
         if train.own_file is not None and train.own_file.claims(data):
             return train.own_file.build(data, text, name, numbered=numbered)
     lines = text if numbered else ""
@@ -236,8 +236,8 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
         raise combine(translate(error, every_section()), lines, name) from None
     if problems := cross_check(case, train.cross_check(case)):
         raise combine(problems, lines, name)
-    case._source, case._lines, case._name, case._profile_files = text, lines, name, files
-    case._notices = (*notices(data), *train.notices(data), *added_material(case))
+    said = (*notices(data), *train.notices(data), *added_material(case))
+    case.read_from(text, lines, name, notices=said, profile_files=files)
     return with_shafts(case)
 
 

@@ -876,8 +876,7 @@ def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True)
         raise combine(translate(error, DrivetrainCase), lines, name) from None
     if problems := cross_check(case):
         raise combine(problems, lines, name)
-    case._source, case._lines, case._name, case._profile_files = text, lines, name, files
-    case._notices = notices(case)
+    case.read_from(text, lines, name, notices=notices(case), profile_files=files)
     return case
 
 

@@ -1,0 +1,97 @@
+"""Stages of the oscillator: its natural frequency, its receptance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from oscillator.section import OscillatorCase, build
+
+from femgear.report.tables import Block
+from femgear.storage.dataset import dataset
+from femgear.trains.protocol import Figures, OwnFile, Stage, Train
+
+
+@dataclass(frozen=True)
+class ModesResult:
+    """Natural frequency [Hz]."""
+
+    frequency: float
+
+    def dataset(self):
+        """Contents of modes.nc."""
+        return dataset(
+            {"frequency": ((), self.frequency, "Hz", "natural frequency")}, {}, {"title": "oscillator"}
+        )
+
+
+@dataclass(frozen=True)
+class ReceptanceResult:
+    """Receptance (n,) [m/N] over the frequency (n,) [Hz]."""
+
+    frequency: np.ndarray
+    receptance: np.ndarray
+
+    def dataset(self):
+        """Contents of receptance.nc."""
+        return dataset(
+            {"receptance": (("frequency",), self.receptance, "m/N", "amplitude of the displacement")},
+            {"frequency": (("frequency",), self.frequency, "Hz", "frequency of the force")},
+            {"title": "oscillator"},
+        )
+
+
+def solve_modes(case, results, context):
+    """Natural frequency ``sqrt(k/m) / 2 pi``."""
+    given = case.oscillator
+    return ModesResult(float(np.sqrt(given.stiffness / given.mass) / (2 * np.pi)))
+
+
+def solve_receptance(case, results, context):
+    """Receptance ``1 / (k (1 - r^2 + 2 i zeta r))``, r the frequency over the natural one."""
+    ratio = np.linspace(0.0, 3.0, 301)
+    given = case.oscillator
+    factor = 1 - ratio**2 + 2j * given.damping_ratio * ratio
+    frequency = results["modes"].frequency * ratio
+    return ReceptanceResult(frequency, np.abs(1 / (given.stiffness * factor)))
+
+
+def draw(drawn):
+    """Receptance over the frequency."""
+    from femgear.report.style import label, new_figure
+
+    data = drawn.data["receptance"]
+    figure, (ax,) = new_figure()
+    ax.semilogy(data["frequency"], data["receptance"])
+    label(ax, "frequency [Hz]", "receptance [m/N]")
+    return {"receptance": figure}
+
+
+OSCILLATOR = Train(
+    name="oscillator",
+    words="an oscillator",
+    model=OscillatorCase,
+    own_file=OwnFile(lambda data: data.get("model") == "oscillator", build, OscillatorCase.model_json_schema),
+    stages=(
+        Stage(
+            name="modes",
+            title="Modes",
+            solve=solve_modes,
+            verdict=lambda result: {"modes": 1},
+            describe=lambda results: Block(
+                "Modes", ("frequency [Hz]",), ((f"{float(results.modes['frequency']):.3f}",),)
+            ),
+        ),
+        Stage(
+            name="receptance",
+            title="Receptance",
+            solve=solve_receptance,
+            verdict=lambda result: {"points": len(result.frequency)},
+            describe=lambda results: Block(
+                "Receptance", ("largest [m/N]",), ((f"{float(results.receptance['receptance'].max()):.4g}",),)
+            ),
+            figures=lambda: Figures({"receptance": "Displacement of the mass for a unit force."}, draw),
+            needs=lambda case: ("modes",),
+        ),
+    ),
+    describe=lambda case: (Block(case.title), Block("Oscillator"), Block("Warnings", notes=("none",))),
+    warnings=lambda case: (),
+)

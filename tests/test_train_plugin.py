@@ -1,0 +1,62 @@
+"""A train is one folder and one line in the registry: an oscillator with its own case file."""
+
+import json
+
+import pytest
+from oscillator.stages import OSCILLATOR
+
+from femgear import cli, open_results, read_case, with_value
+from femgear.trains import registry
+
+TEXT = """model = "oscillator"
+title = "A mass on a spring"
+
+[oscillator]
+mass = "2 kg"
+stiffness = "0.8 N/um"
+"""
+
+
+@pytest.fixture
+def path(tmp_path, monkeypatch):
+    monkeypatch.setattr(registry, "TRAINS", (OSCILLATOR, *registry.TRAINS))
+    path = tmp_path / "oscillator.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+def test_case_is_read_changed_and_checked(path, capsys):
+    case = read_case(path)
+    assert case.oscillator.stiffness == 8e5 and registry.train_of(case) is OSCILLATOR
+    assert with_value(case, "oscillator.mass", "3 kg").oscillator.mass == 3.0
+    assert cli.main(["check", str(path)]) == 0
+    assert "A mass on a spring" in capsys.readouterr().out
+    path.write_text(TEXT.replace("mass =", "mas ="), encoding="utf-8")
+    assert cli.main(["check", str(path)]) == 2
+    assert (
+        "oscillator.toml:5 oscillator.mas" in (said := capsys.readouterr().err)
+        and "did you mean mass?" in said
+    )
+
+
+def test_schema_is_that_of_its_model(path, capsys):
+    assert cli.main(["schema", "--model", "oscillator"]) == 0
+    assert "OscillatorSection" in json.loads(capsys.readouterr().out)["$defs"]
+    assert cli.main(["schema", "--model", "pendulum"]) == 2
+    assert "oscillator" in capsys.readouterr().err
+
+
+def test_run_writes_stages_figure_and_page(path, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert cli.main(["run", str(path), "-o", str(out)]) == 0
+    assert "100.658" in capsys.readouterr().out
+    results = open_results(out)
+    assert results.stages == ("modes", "receptance") and results.case.title == "A mass on a spring"
+    # 1 / (2 zeta k) at resonance
+    assert float(results["receptance"]["receptance"].max()) == pytest.approx(1 / (0.04 * 8e5), rel=1e-3)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert '<h2 id="receptance">' in page and "Displacement of the mass for a unit force." in page
+    assert "receptance.png" in results.manifest.files
+    assert cli.main(["run", str(path), "-o", str(tmp_path / "one"), "--only", "modes"]) == 0
+    assert cli.main(["run", str(path), "-o", str(tmp_path / "no"), "--only", "housing"]) == 2
+    assert "no stage of an oscillator" in capsys.readouterr().err
