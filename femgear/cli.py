@@ -10,7 +10,7 @@ INTERRUPTED = 130
 
 try:
     from pathlib import Path
-    from typing import Annotated, Literal
+    from typing import Annotated
 
     from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
@@ -140,10 +140,7 @@ def run(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    only: Literal[
-        "static", "stress", "modes", "dynamics", "housing", "branch", "response", "transient", "spectrum"
-    ]
-    | None = None,
+    only: str | None = None,
     pictures: bool = True,
     force: bool = False,
 ) -> int:
@@ -156,8 +153,9 @@ def run(
     output
         Folder of the results.
     only
-        Compute this stage and what it needs, no further; "stress" whatever static.stresses says, "branch" and
-        "response" of planar cases, "transient" and "spectrum" of drivetrains.
+        Compute this stage and what it needs, no further: "static", "stress" (whatever static.stresses says),
+        "modes", "dynamics" or "housing"; "branch" or "response" of planar cases, "transient" or "spectrum" of
+        drivetrains.
     pictures
         Draw figures, fields and report.
     force
@@ -167,8 +165,13 @@ def run(
     from femgear.run import run_case
     from femgear.storage.results import run_folder
     from femgear.trains.reading import open_results, read_case
-    from femgear.trains.registry import check_case, train_of
+    from femgear.trains.registry import TRAINS, check_case, train_of
 
+    known = dict.fromkeys(stage.name for train in TRAINS for stage in train.stages)
+    if only is not None and only not in known:
+        raise CaseError(
+            "no train has this stage", code="E-ARGUMENTS", key="--only", value=only, limit=", ".join(known)
+        )
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
     train = train_of(data)
