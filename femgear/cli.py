@@ -170,7 +170,13 @@ def run(
     known = dict.fromkeys(stage.name for train in TRAINS for stage in train.stages)
     if only is not None and only not in known:
         raise CaseError(
-            "no train has this stage", code="E-ARGUMENTS", key="--only", value=only, limit=", ".join(known)
+            "no train has this stage",
+            code="E-ARGUMENTS",
+            key="--only",
+            value=only,
+            limit=", ".join(known),
+            remedy="femgear run --help",
+            remedy="femgear run --help",
         )
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
