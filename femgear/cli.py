@@ -176,7 +176,6 @@ def run(
             value=only,
             limit=", ".join(known),
             remedy="femgear run --help",
-            remedy="femgear run --help",
         )
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
