@@ -1,3 +1,5 @@
+"""Refusals and warnings of static results: displacements that are not small, doubtful solutions."""
+
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
@@ -38,23 +40,6 @@ def check_motions(cycle: MeshCycle, module: float) -> None:
             )
 
 
-def _deflection_warning(cycle: MeshCycle, moved: float) -> str:
-    """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
-    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(cycle.deflection, 2))
-    if not cycle.member_names:
-        return (
-            f"[W-DEFLECTION] the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: "
-            "small displacements no longer hold"
-        )
-    return (
-        f"[W-DEFLECTION] the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
-        "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
-        "not the deflection of the teeth alone: it contains the motion of the members, up to "
-        f"{moved * 1e6:.0f} um, and between planets and ring that of the ring on its foundation; "
-        'static.members = "fixed" shows the teeth'
-    )
-
-
 def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
     """What is wrong with a static result in an engineer's eyes, in sentences."""
     found = []
@@ -87,3 +72,20 @@ def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
             "[W-BACK] some meshes carry on their back flanks alone: planets work against one another"
         )
     return tuple(found)
+
+
+def _deflection_warning(cycle: MeshCycle, moved: float) -> str:
+    """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(cycle.deflection, 2))
+    if not cycle.member_names:
+        return (
+            f"[W-DEFLECTION] the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: "
+            "small displacements no longer hold"
+        )
+    return (
+        f"[W-DEFLECTION] the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
+        "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
+        "not the deflection of the teeth alone: it contains the motion of the members, up to "
+        f"{moved * 1e6:.0f} um, and between planets and ring that of the ring on its foundation; "
+        'static.members = "fixed" shows the teeth'
+    )

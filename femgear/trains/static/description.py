@@ -1,4 +1,9 @@
-"""What the phases of the meshes do to the harmonics of a set, and tooth numbers nearby, as tables."""
+"""A planetary set in tables: gears, meshes, mesh phasing, operation, and tooth numbers nearby.
+
+The phases of the meshes decide which of their harmonics sun and ring hear, and which kinds of modes these
+excite; neighbouring tooth numbers are listed with what they would change in that. The sentences of
+`set_warnings` hold for any planetary set.
+"""
 
 from __future__ import annotations
 
@@ -26,82 +31,6 @@ HARMONICS = 6
 DISTANCE, TOLERANCE = 3, 0.02
 ROWS = 8
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
-
-
-def describe_phasing(planetary_set: PlanetarySet) -> tuple[Block, ...]:
-    """Phasing of the first harmonics of the mesh frequency, and of neighbouring tooth numbers.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-        Of a case that `femgear.gears.check_set` accepts.
-
-    Returns
-    -------
-    tuple of Block
-    """
-    return _harmonics(planetary_set), _neighbours(planetary_set)
-
-
-def _harmonics(s: PlanetarySet) -> Block:
-    phasing = phasing_of_set(s)
-    table = phasing_table(phasing, range(1, HARMONICS + 1))
-    rows = [
-        (
-            str(h),
-            kind,
-            "-" if k < 0 else str(k),
-            _share(size[:, 0].max()),
-            _share(size[:, 1].max()),
-            ", ".join(modes),
-        )
-        for h, kind, k, size, modes in zip(
-            table.harmonics, table.kind, table.cyclic, table.members, table.excited
-        )
-    ]
-    header = ("harmonic", "planets are", "k", "torque", "lateral force", "can excite modes")
-    common = math.gcd(s.sun.teeth, s.planet.teeth), math.gcd(s.planet.teeth, s.ring.teeth)
-    notes = (
-        "k = mod(h z_sun, N); torque, lateral force: what is left of equal mesh forces on sun, ring, carrier",
-        f"a planet's ring mesh follows its sun mesh by {phasing.lag:.4f} periods",
-        f"common divisors of the teeth: sun and planet {common[0]}, planet and ring {common[1]}",
-    )
-    return Block("Mesh phasing", header, tuple(rows), notes)
-
-
-def _share(value: float) -> str:
-    return "cancelled" if value < ZERO else f"{100.0 * value:.1f} %"
-
-
-def _neighbours(s: PlanetarySet) -> Block:
-    wanted = (s.sun.teeth, s.planet.teeth, s.ring.teeth)
-    closure = max(1, abs(wanted[2] - wanted[0] - 2 * wanted[1]))
-    found = neighbouring_teeth(
-        *wanted, s.n_planets, distance=DISTANCE, ratio_tolerance=TOLERANCE, closure=min(closure, 10)
-    )
-    found = found.only(np.any(found.teeth != np.array(wanted), axis=1))
-    # sets with equal spacing first, each group by its ratio
-    found = found.only(np.argsort(~found.equally_spaced, kind="stable"))
-    rows = tuple(_row(found, i) for i in range(min(len(found), ROWS)))
-    header = ("teeth", "ratio", "change", "spacing", "harmonics 1 to 4", "hunting", "room [modules]")
-    notes = (
-        f"{len(found)} within {DISTANCE} teeth and {100 * TOLERANCE:g} % of the ratio; room: unshifted tips",
-    )
-    return Block("Neighbouring tooth numbers", header, rows, notes)
-
-
-def _row(found: ToothChoices, i: int) -> tuple[str, ...]:
-    kinds = [_SHORT[name] for name in found.kind_names[i]]
-    off = f"off by {math.degrees(found.spacing_error[i]):.2f} deg"
-    return (
-        "/".join(str(z) for z in found.teeth[i]),
-        f"{found.ratio[i]:.4f}",
-        f"{100.0 * found.ratio_change[i]:+.2f} %",
-        "equal" if found.equally_spaced[i] else off,
-        kinds[0] if len(set(kinds)) == 1 else ", ".join(kinds),
-        "yes" if found.hunting[i] else "no",
-        f"{found.room[i]:.2f}",
-    )
 
 
 def describe_case(case: Case, *, model: tuple[Block, ...] = (), warnings: Sequence[str]) -> tuple[Block, ...]:
@@ -142,6 +71,21 @@ def set_warnings(case: Case) -> tuple[str, ...]:
     if case.operation.torque < 0:
         found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
     return tuple(found)
+
+
+def describe_phasing(planetary_set: PlanetarySet) -> tuple[Block, ...]:
+    """Phasing of the first harmonics of the mesh frequency, and of neighbouring tooth numbers.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+        Of a case that `femgear.gears.checks.check_set` accepts.
+
+    Returns
+    -------
+    tuple of Block
+    """
+    return _harmonics(planetary_set), _neighbours(planetary_set)
 
 
 def _gears(s: PlanetarySet) -> Block:
@@ -224,3 +168,64 @@ def _operation(case: Case, s: PlanetarySet) -> Block:
     notes += shaft_lines(case)
     header = ("sun [rpm]", "carrier [rpm]", "ring [rpm]", "planet [rpm]", "mesh frequency [Hz]")
     return Block("Operation", header, tuple(rows), tuple(notes))
+
+
+def _harmonics(s: PlanetarySet) -> Block:
+    phasing = phasing_of_set(s)
+    table = phasing_table(phasing, range(1, HARMONICS + 1))
+    rows = [
+        (
+            str(h),
+            kind,
+            "-" if k < 0 else str(k),
+            _share(size[:, 0].max()),
+            _share(size[:, 1].max()),
+            ", ".join(modes),
+        )
+        for h, kind, k, size, modes in zip(
+            table.harmonics, table.kind, table.cyclic, table.members, table.excited
+        )
+    ]
+    header = ("harmonic", "planets are", "k", "torque", "lateral force", "can excite modes")
+    common = math.gcd(s.sun.teeth, s.planet.teeth), math.gcd(s.planet.teeth, s.ring.teeth)
+    notes = (
+        "k = mod(h z_sun, N); torque, lateral force: what is left of equal mesh forces on sun, ring, carrier",
+        f"a planet's ring mesh follows its sun mesh by {phasing.lag:.4f} periods",
+        f"common divisors of the teeth: sun and planet {common[0]}, planet and ring {common[1]}",
+    )
+    return Block("Mesh phasing", header, tuple(rows), notes)
+
+
+def _share(value: float) -> str:
+    return "cancelled" if value < ZERO else f"{100.0 * value:.1f} %"
+
+
+def _neighbours(s: PlanetarySet) -> Block:
+    wanted = (s.sun.teeth, s.planet.teeth, s.ring.teeth)
+    closure = max(1, abs(wanted[2] - wanted[0] - 2 * wanted[1]))
+    found = neighbouring_teeth(
+        *wanted, s.n_planets, distance=DISTANCE, ratio_tolerance=TOLERANCE, closure=min(closure, 10)
+    )
+    found = found.only(np.any(found.teeth != np.array(wanted), axis=1))
+    # sets with equal spacing first, each group by its ratio
+    found = found.only(np.argsort(~found.equally_spaced, kind="stable"))
+    rows = tuple(_row(found, i) for i in range(min(len(found), ROWS)))
+    header = ("teeth", "ratio", "change", "spacing", "harmonics 1 to 4", "hunting", "room [modules]")
+    notes = (
+        f"{len(found)} within {DISTANCE} teeth and {100 * TOLERANCE:g} % of the ratio; room: unshifted tips",
+    )
+    return Block("Neighbouring tooth numbers", header, rows, notes)
+
+
+def _row(found: ToothChoices, i: int) -> tuple[str, ...]:
+    kinds = [_SHORT[name] for name in found.kind_names[i]]
+    off = f"off by {math.degrees(found.spacing_error[i]):.2f} deg"
+    return (
+        "/".join(str(z) for z in found.teeth[i]),
+        f"{found.ratio[i]:.4f}",
+        f"{100.0 * found.ratio_change[i]:+.2f} %",
+        "equal" if found.equally_spaced[i] else off,
+        kinds[0] if len(set(kinds)) == 1 else ", ".join(kinds),
+        "yes" if found.hunting[i] else "no",
+        f"{found.room[i]:.2f}",
+    )

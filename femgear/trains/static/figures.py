@@ -1,10 +1,14 @@
-"""Figures of static.nc: what the gears themselves do over one mesh period.
+"""Figures of gears, their phasing and their static results: deviations, transmission errors, tooth stresses.
 
-Figures of stress.nc: one tooth on its way through the mesh, along its roots, pressures, load spectra.
+By what they show:
 
-Figures of deviations as measuring machines draw them: profiles over roll angle, pitches over teeth.
+- static.nc: what the gears themselves do over one mesh period, errors, stiffnesses, loads, and the deformed
+  set;
+- stress.nc: one tooth on its way through the mesh, along its roots, with pressures and load spectra;
+- deviations as measuring machines draw them: profiles over the roll angle, pitches over the teeth;
+- mesh phasing: phases round the carrier, what they cancel and excite, spectra of the mesh forces.
 
-Figures of mesh phasing: phases round the carrier, what they cancel and excite, mesh-force spectra.
+`STATIC`, `STRESSES` and `DEVIATIONS` at the end tie the pictures of the report to their captions.
 """
 
 from __future__ import annotations
@@ -48,6 +52,18 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 POSITION = "position in the mesh period [1]"
+
+TENSION, COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
+# tangent of the critical section after ISO 6336-3, external and internal gears
+CRITICAL_SLOPE = {False: 30.0, True: 60.0}
+KINDS = ("sun-planet", "planet-ring")
+
+_CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 121))
+_MARKS = {"rotational": ("o", BLUE), "translational": ("^", VERMILION), "planet": ("s", BLACK)}
+
+# pictures need no converged stresses: a sector of some thousand nodes keeps the files small
+PICTURE_FLANK_ELEMENTS = 6
+PICTURE_REFINE = 0.35
 
 
 def static_transmission_error(static: xr.Dataset) -> Figure:
@@ -193,12 +209,6 @@ def tooth_loads(static: xr.Dataset) -> Figure:
 
 def _equal(rows) -> bool:
     return bool(np.abs(rows - rows[0]).max() <= 1e-6 * np.abs(rows).max(initial=0.0))
-
-
-TENSION, COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
-# tangent of the critical section after ISO 6336-3, external and internal gears
-CRITICAL_SLOPE = {False: 30.0, True: 60.0}
-KINDS = ("sun-planet", "planet-ring")
 
 
 def root_stress_history(stress: xr.Dataset) -> Figure:
@@ -560,10 +570,6 @@ def _degrees(gear: Gear, roll):
     return np.degrees(np.asarray(roll) / gear.base_radius)
 
 
-_CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 121))
-_MARKS = {"rotational": ("o", BLUE), "translational": ("^", VERMILION), "planet": ("s", BLACK)}
-
-
 def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 4)) -> Figure:
     """Phases of sun and ring meshes as hands of a dial at every planet, one picture a harmonic.
 
@@ -725,11 +731,6 @@ def _xy(points):
     return np.real(points), np.imag(points)
 
 
-# pictures need no converged stresses: a sector of some thousand nodes keeps the files small
-PICTURE_FLANK_ELEMENTS = 6
-PICTURE_REFINE = 0.35
-
-
 def _static_figures(drawn: Drawn) -> dict[str, Figure]:
     static = drawn.data["static"]
     return {
@@ -738,17 +739,6 @@ def _static_figures(drawn: Drawn) -> dict[str, Figure]:
         "load_sharing": load_sharing(static),
         "tooth_loads": tooth_loads(static),
     }
-
-
-def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
-    """Charts of profiles and pitches; none of a kind that the set does not have."""
-    gears, deviations = planetary_set(drawn.case), set_deviations(drawn.case)
-    figures = {}
-    if has_profiles(deviations, gears):
-        figures["profile_deviations"] = profile_chart(deviations, gears)
-    if has_pitches(deviations):
-        figures["pitch_deviations"] = pitch_chart(deviations, gears)
-    return figures
 
 
 def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
@@ -763,6 +753,17 @@ def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
         figures["contact_pressure"] = contact_pressure(stress)
     if "planet_root_stress" in stress:
         figures["planet_bending"] = planet_bending(stress)
+    return figures
+
+
+def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
+    """Charts of profiles and pitches; none of a kind that the set does not have."""
+    gears, deviations = planetary_set(drawn.case), set_deviations(drawn.case)
+    figures = {}
+    if has_profiles(deviations, gears):
+        figures["profile_deviations"] = profile_chart(deviations, gears)
+    if has_pitches(deviations):
+        figures["pitch_deviations"] = pitch_chart(deviations, gears)
     return figures
 
 
@@ -822,6 +823,30 @@ def _reflected(body):
     )
 
 
+STATIC = Figures(
+    {
+        "static_transmission_error": (
+            "Static transmission error over one mesh period: every mesh along its line of action, and from "
+            "sun to ring. Sun and planets held at their bores, ring at its outer surface."
+        ),
+        "mesh_stiffness": (
+            "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (thick) and secant F/δ "
+            "(thin)."
+        ),
+        "load_sharing": "Share of every planet in the torque of the sun.",
+        "tooth_loads": "Load of one tooth pair from its first to its last contact.",
+        "profile_deviations": (
+            "Deviations of the loaded flanks from the involute over the roll angle, positive with more "
+            "material."
+        ),
+        "pitch_deviations": "Cumulative pitch deviations of the loaded flanks over the tooth number.",
+        "deformed_set": "Deformed set under the static load, magnified; at rest in grey.",
+    },
+    draw=_static_figures,
+    write=(_write_deformed_set,),
+)
+
+
 STRESSES = Figures(
     {
         "contact_pressure": (
@@ -848,26 +873,6 @@ STRESSES = Figures(
     },
     draw=_stress_figures,
 )
-STATIC = Figures(
-    {
-        "static_transmission_error": (
-            "Static transmission error over one mesh period: every mesh along its line of action, and from "
-            "sun to ring. Sun and planets held at their bores, ring at its outer surface."
-        ),
-        "mesh_stiffness": (
-            "Mesh stiffness over one mesh period: tangent dF/dδ of the loaded mesh (thick) and secant F/δ "
-            "(thin)."
-        ),
-        "load_sharing": "Share of every planet in the torque of the sun.",
-        "tooth_loads": "Load of one tooth pair from its first to its last contact.",
-        "profile_deviations": (
-            "Deviations of the loaded flanks from the involute over the roll angle, positive with more "
-            "material."
-        ),
-        "pitch_deviations": "Cumulative pitch deviations of the loaded flanks over the tooth number.",
-        "deformed_set": "Deformed set under the static load, magnified; at rest in grey.",
-    },
-    draw=_static_figures,
-    write=(_write_deformed_set,),
-)
+
+
 DEVIATIONS = Figures({}, draw=_deviation_figures)

@@ -1,6 +1,7 @@
-"""Contents of stress.nc: root stresses, pressures and load spectra, every variable with its units.
+"""Results of the stages "static" and "stress": static.nc, stress.nc, and their tables.
 
-The table of stresses: finite elements beside ISO 6336.
+Every variable of a file carries its units. The table of stresses sets those of finite elements beside the
+nominal stresses of ISO 6336.
 """
 
 from __future__ import annotations
@@ -25,6 +26,11 @@ if TYPE_CHECKING:
     from femgear.contact.load_spectrum import LoadSpectrum, RootRange
     from femgear.contact.root_stress import RootStresses
     from femgear.gears.planetary import PlanetarySet
+
+COUNTING = (
+    "one load cycle an engagement, from zero to the largest load of the tooth (peak counting between "
+    "crossings of zero, ASTM E1049)"
+)
 
 
 @dataclass(frozen=True)
@@ -202,12 +208,6 @@ def static_dataset(result: StaticResult) -> xr.Dataset:
     )
 
 
-COUNTING = (
-    "one load cycle an engagement, from zero to the largest load of the tooth (peak counting between "
-    "crossings of zero, ASTM E1049)"
-)
-
-
 def stress_dataset(result: StressResult) -> xr.Dataset:
     """Contents of stress.nc: `root_stress_dataset`, and the rest of a `StressResult`."""
     cycle, edges = result.cycle, result.spectrum.edges
@@ -238,6 +238,54 @@ def stress_dataset(result: StressResult) -> xr.Dataset:
         "iso": result.nominal.message,
     }
     return data.assign_coords(coordinates).assign_attrs(attributes)
+
+
+def root_stress_dataset(roots: tuple[RootCycle, ...], mesh_names) -> xr.Dataset:
+    """Root stresses as they are stored and drawn.
+
+    Parameters
+    ----------
+    roots : tuple of RootCycle
+        As `root_stress_cycle` gives them.
+    mesh_names : sequence of str
+        Label of each mesh.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``root_tension`` and ``root_compression`` (mesh, gear, step) [Pa]: extremes along the root of the
+        loaded and of the back flank of one tooth on its way through the mesh, with ``root_path`` [1] and
+        ``root_load`` [N]; ``root_profile`` (mesh, gear, root, point) [Pa] along both roots when the tension
+        is largest, with ``root_arc`` [m] and ``root_slope`` [rad] (mesh, gear, point). The tooth is the one
+        with the largest stress. Points that a root does not have are NaN.
+    """
+    import xarray as xr
+
+    variables = {
+        "root_tension": ("mesh gear step", "Pa", "largest stress in the root of the loaded flank"),
+        "root_compression": ("mesh gear step", "Pa", "lowest stress in the root of the back flank"),
+        "root_path": ("mesh gear step", "1", "path from the pitch point in base pitches"),
+        "root_load": ("mesh gear step", "N", "load of the tooth pair"),
+        "root_profile": ("mesh gear root point", "Pa", "stress along the root at the largest tension"),
+        "root_arc": ("mesh gear point", "m", "arc length from the end of the flank"),
+        "root_slope": ("mesh gear point", "rad", "angle of the root to the centreline of the tooth"),
+    }
+    points = max(len(root.arc) for root in roots)
+    rows = [_row(root, points) for root in roots]
+    data = {}
+    for name, (dims, units, words) in variables.items():
+        values = np.array([row[name] for row in rows])
+        values = values.reshape(len(mesh_names), 2, *values.shape[1:])
+        data[name] = (tuple(dims.split()), values, {"units": units, "long_name": words})
+    return xr.Dataset(
+        data,
+        coords={
+            "mesh": ("mesh", list(mesh_names), {"units": "1", "long_name": "gear mesh"}),
+            "gear": ("gear", ["first", "second"], {"units": "1", "long_name": "gear of the mesh"}),
+            "root": ("root", ["loaded", "back"], {"units": "1", "long_name": "flank above the root"}),
+        },
+        attrs={"title": "root stresses over the mesh cycle"},
+    )
 
 
 def _load_entries(spectrum: LoadSpectrum) -> dict:
@@ -362,54 +410,6 @@ def _pressure_entries(cycle) -> dict:
     }
 
 
-def root_stress_dataset(roots: tuple[RootCycle, ...], mesh_names) -> xr.Dataset:
-    """Root stresses as they are stored and drawn.
-
-    Parameters
-    ----------
-    roots : tuple of RootCycle
-        As `root_stress_cycle` gives them.
-    mesh_names : sequence of str
-        Label of each mesh.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``root_tension`` and ``root_compression`` (mesh, gear, step) [Pa]: extremes along the root of the
-        loaded and of the back flank of one tooth on its way through the mesh, with ``root_path`` [1] and
-        ``root_load`` [N]; ``root_profile`` (mesh, gear, root, point) [Pa] along both roots when the tension
-        is largest, with ``root_arc`` [m] and ``root_slope`` [rad] (mesh, gear, point). The tooth is the one
-        with the largest stress. Points that a root does not have are NaN.
-    """
-    import xarray as xr
-
-    variables = {
-        "root_tension": ("mesh gear step", "Pa", "largest stress in the root of the loaded flank"),
-        "root_compression": ("mesh gear step", "Pa", "lowest stress in the root of the back flank"),
-        "root_path": ("mesh gear step", "1", "path from the pitch point in base pitches"),
-        "root_load": ("mesh gear step", "N", "load of the tooth pair"),
-        "root_profile": ("mesh gear root point", "Pa", "stress along the root at the largest tension"),
-        "root_arc": ("mesh gear point", "m", "arc length from the end of the flank"),
-        "root_slope": ("mesh gear point", "rad", "angle of the root to the centreline of the tooth"),
-    }
-    points = max(len(root.arc) for root in roots)
-    rows = [_row(root, points) for root in roots]
-    data = {}
-    for name, (dims, units, words) in variables.items():
-        values = np.array([row[name] for row in rows])
-        values = values.reshape(len(mesh_names), 2, *values.shape[1:])
-        data[name] = (tuple(dims.split()), values, {"units": units, "long_name": words})
-    return xr.Dataset(
-        data,
-        coords={
-            "mesh": ("mesh", list(mesh_names), {"units": "1", "long_name": "gear mesh"}),
-            "gear": ("gear", ["first", "second"], {"units": "1", "long_name": "gear of the mesh"}),
-            "root": ("root", ["loaded", "back"], {"units": "1", "long_name": "flank above the root"}),
-        },
-        attrs={"title": "root stresses over the mesh cycle"},
-    )
-
-
 def _row(root: RootCycle, points: int) -> dict[str, np.ndarray]:
     """Variables of one gear of one mesh, points padded with NaN."""
     slot, position, _ = root.worst
@@ -428,6 +428,56 @@ def _row(root: RootCycle, points: int) -> dict[str, np.ndarray]:
         "root_arc": padded(root.arc),
         "root_slope": padded(root.slope),
     }
+
+
+def describe_static(data: xr.Dataset) -> Block:
+    """Transmission errors, stiffnesses and load sharing of static.nc."""
+    rows = []
+    for mesh in data.mesh.values:
+        one = data.sel(mesh=mesh)
+        ste = one.ste.values
+        rows.append(
+            (
+                str(mesh),
+                f"{ste.mean() * 1e6:.4f}",
+                f"{np.ptp(ste) * 1e6:.4f}",
+                f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
+                f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
+                f"{one.mesh_force.values.mean():.3f}",
+                f"{one.max_pressure.values.max() / 1e6:.1f}" if one.max_pressure.values.any() else "-",
+            )
+        )
+    share = data.load_share.values
+    header = (
+        "mesh",
+        "STE mean [um]",
+        "STE p-p [um]",
+        "k mean [N/um]",
+        "k p-p [N/um]",
+        "force [N]",
+        "p max [MPa]",
+    )
+    notes = [
+        f"load share of a planet {share.min():.4f} to {share.max():.4f} "
+        f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
+    ]
+    notes += _stiffness_notes(elastic=data.sizes.get("member", 0) > 0)
+    if data.attrs.get("mesh_periods", 1) > 1:
+        notes.append(str(data.attrs["period"]))
+    if warnings := str(data.attrs.get("warnings", "")):
+        notes += [f"[{text.strip()}" for text in warnings.split("[") if text]
+    return Block("Static", header, tuple(rows), tuple(notes))
+
+
+def _stiffness_notes(*, elastic: bool) -> list[str]:
+    """What the columns k and STE of the static table contain."""
+    held = "k: tangent stiffness dF/dx of teeth and bodies"
+    if not elastic:
+        return [f"{held}, held at their bores and at the outer surface of the ring"]
+    return [
+        f"{held}; of planet-ring with the ring on its foundation in series, so that it is no",
+        "stiffness of the teeth alone; the STE contains that and the motion of the members",
+    ]
 
 
 def describe_stress(data: xr.Dataset) -> Block:
@@ -513,53 +563,3 @@ def _compared(found: float, nominal: float) -> tuple[str, str, str]:
     known = np.isfinite(nominal)
     ratio = f"{found / nominal:.2f}" if known and nominal else "-"
     return f"{found * 1e-6:.1f}", f"{nominal * 1e-6:.1f}" if known else "-", ratio
-
-
-def describe_static(data: xr.Dataset) -> Block:
-    """Transmission errors, stiffnesses and load sharing of static.nc."""
-    rows = []
-    for mesh in data.mesh.values:
-        one = data.sel(mesh=mesh)
-        ste = one.ste.values
-        rows.append(
-            (
-                str(mesh),
-                f"{ste.mean() * 1e6:.4f}",
-                f"{np.ptp(ste) * 1e6:.4f}",
-                f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
-                f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
-                f"{one.mesh_force.values.mean():.3f}",
-                f"{one.max_pressure.values.max() / 1e6:.1f}" if one.max_pressure.values.any() else "-",
-            )
-        )
-    share = data.load_share.values
-    header = (
-        "mesh",
-        "STE mean [um]",
-        "STE p-p [um]",
-        "k mean [N/um]",
-        "k p-p [N/um]",
-        "force [N]",
-        "p max [MPa]",
-    )
-    notes = [
-        f"load share of a planet {share.min():.4f} to {share.max():.4f} "
-        f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
-    ]
-    notes += _stiffness_notes(elastic=data.sizes.get("member", 0) > 0)
-    if data.attrs.get("mesh_periods", 1) > 1:
-        notes.append(str(data.attrs["period"]))
-    if warnings := str(data.attrs.get("warnings", "")):
-        notes += [f"[{text.strip()}" for text in warnings.split("[") if text]
-    return Block("Static", header, tuple(rows), tuple(notes))
-
-
-def _stiffness_notes(*, elastic: bool) -> list[str]:
-    """What the columns k and STE of the static table contain."""
-    held = "k: tangent stiffness dF/dx of teeth and bodies"
-    if not elastic:
-        return [f"{held}, held at their bores and at the outer surface of the ring"]
-    return [
-        f"{held}; of planet-ring with the ring on its foundation in series, so that it is no",
-        "stiffness of the teeth alone; the STE contains that and the motion of the members",
-    ]

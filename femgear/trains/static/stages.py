@@ -1,4 +1,9 @@
-"""Stage "stress": root stresses, contact pressures, load spectra and nominal stresses of a static result."""
+"""Stages "static" and "stress": what the teeth of a planetary set carry over one mesh period.
+
+"static" solves the FE contact of all meshes for transmission error, load sharing and mesh stiffness; "stress"
+finds root stresses, contact pressures, load spectra and nominal stresses of that solution. Both stages,
+`STATIC` and `STRESS` at the end, stand in the tables of the trains that compute with FE contact.
+"""
 
 from __future__ import annotations
 
@@ -29,6 +34,12 @@ if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
     from femgear.contact.root_stress import RootStresses
     from femgear.gears.planetary import PlanetarySet
+
+# beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
+# would take a quarter of a gigabyte for three planets
+WHOLE_RECORD = 16
+# longer than any record: the true common period of a set
+UNLIMITED = 10**12
 
 
 @one_blas_thread()
@@ -78,45 +89,6 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
     return StaticResult(gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message)
 
 
-def _ring_foundation(case: Case, sector):
-    """Elastic foundation of one sector of the ring [N/m]."""
-    from femgear.fe.elasticity import foundation
-
-    ring, width = case.ring, sector.gear.face_width
-    return foundation(sector.grid, "rim", ring.foundation_radial, ring.foundation_tangential, thickness=width)
-
-
-def _supports(case: Case):
-    """Supports of the static problem: rigid, or those of the case's bodies."""
-    from femgear.contact.supports import RIGID
-
-    return RIGID if case.static.members == "fixed" else _supports_of(case)
-
-
-def _supports_of(case: Case):
-    """Supports of the case's bodies."""
-    from femgear.contact.supports import Supports
-
-    return Supports(
-        sun=case.sun.support_stiffness,
-        carrier=case.carrier.support_stiffness,
-        planet=case.planet.bearing_stiffness,
-        planet_clearance=case.planet.bearing_clearance,
-    )
-
-
-def _backlash(gears: PlanetarySet) -> np.ndarray:
-    n = gears.n_planets
-    return np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], n)
-
-
-# beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
-# would take a quarter of a gigabyte for three planets
-WHOLE_RECORD = 16
-# longer than any record: the true common period of a set
-UNLIMITED = 10**12
-
-
 @one_blas_thread()
 def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None = None) -> StressResult:
     """Root stresses of every gear in every mesh, stress ranges over a turn, load spectra, nominal stresses.
@@ -163,6 +135,83 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None 
         sun_torque=static.sun_torque,
         closes=closes,
     )
+
+
+def nominal_stresses(
+    planetary_set: PlanetarySet, sun_torque: float, youngs_modulus: float, poisson_ratio: float
+) -> NominalStresses:
+    """sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    sun_torque : float
+        Of either sign [N m].
+    youngs_modulus, poisson_ratio : float
+        [Pa, 1]
+    """
+    from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
+
+    s = planetary_set
+    # torque over reference radius: the same at all three gears
+    force = abs(sun_torque) / (s.n_planets * s.sun.reference_radius)
+    contact, root, messages = np.full(2, math.nan), np.full((2, 2), math.nan), []
+    meshes = (
+        (s.sun, s.planet, s.working_pressure_angle_sun_planet, s.contact_ratio_sun_planet),
+        (s.planet, s.ring, s.working_pressure_angle_planet_ring, s.contact_ratio_planet_ring),
+    )
+    for i, (one, two, angle, ratio) in enumerate(meshes):
+        small, large = (one, two) if two.internal or one.teeth <= two.teeth else (two, one)
+        try:
+            contact[i] = nominal_contact_stress(
+                small,
+                large,
+                working_angle=angle,
+                contact_ratio=ratio,
+                tangential_force=force,
+                youngs_modulus=youngs_modulus,
+                poisson_ratio=poisson_ratio,
+            ).stress
+        except GeometryError as error:
+            messages.append(f"{one.name}-{two.name}: {error.message}")
+        for j, gear in enumerate((one, two)):
+            try:
+                root[i, j] = nominal_root_stress(gear, contact_ratio=ratio, tangential_force=force).stress
+            except GeometryError as error:
+                messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
+    return NominalStresses(contact, root, "; ".join(dict.fromkeys(messages)))
+
+
+def _ring_foundation(case: Case, sector):
+    """Elastic foundation of one sector of the ring [N/m]."""
+    from femgear.fe.elasticity import foundation
+
+    ring, width = case.ring, sector.gear.face_width
+    return foundation(sector.grid, "rim", ring.foundation_radial, ring.foundation_tangential, thickness=width)
+
+
+def _supports(case: Case):
+    """Supports of the static problem: rigid, or those of the case's bodies."""
+    from femgear.contact.supports import RIGID
+
+    return RIGID if case.static.members == "fixed" else _supports_of(case)
+
+
+def _supports_of(case: Case):
+    """Supports of the case's bodies."""
+    from femgear.contact.supports import Supports
+
+    return Supports(
+        sun=case.sun.support_stiffness,
+        carrier=case.carrier.support_stiffness,
+        planet=case.planet.bearing_stiffness,
+        planet_clearance=case.planet.bearing_clearance,
+    )
+
+
+def _backlash(gears: PlanetarySet) -> np.ndarray:
+    n = gears.n_planets
+    return np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], n)
 
 
 def _influences(case: Case, static: StaticResult) -> RootStresses:
@@ -217,51 +266,6 @@ def _excerpt(cycle: MeshCycle, start: int, length: int) -> MeshCycle:
     return replace(cycle, position=np.arange(len(take)) / each, periods=length, **parts)
 
 
-def nominal_stresses(
-    planetary_set: PlanetarySet, sun_torque: float, youngs_modulus: float, poisson_ratio: float
-) -> NominalStresses:
-    """sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    sun_torque : float
-        Of either sign [N m].
-    youngs_modulus, poisson_ratio : float
-        [Pa, 1]
-    """
-    from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
-
-    s = planetary_set
-    # torque over reference radius: the same at all three gears
-    force = abs(sun_torque) / (s.n_planets * s.sun.reference_radius)
-    contact, root, messages = np.full(2, math.nan), np.full((2, 2), math.nan), []
-    meshes = (
-        (s.sun, s.planet, s.working_pressure_angle_sun_planet, s.contact_ratio_sun_planet),
-        (s.planet, s.ring, s.working_pressure_angle_planet_ring, s.contact_ratio_planet_ring),
-    )
-    for i, (one, two, angle, ratio) in enumerate(meshes):
-        small, large = (one, two) if two.internal or one.teeth <= two.teeth else (two, one)
-        try:
-            contact[i] = nominal_contact_stress(
-                small,
-                large,
-                working_angle=angle,
-                contact_ratio=ratio,
-                tangential_force=force,
-                youngs_modulus=youngs_modulus,
-                poisson_ratio=poisson_ratio,
-            ).stress
-        except GeometryError as error:
-            messages.append(f"{one.name}-{two.name}: {error.message}")
-        for j, gear in enumerate((one, two)):
-            try:
-                root[i, j] = nominal_root_stress(gear, contact_ratio=ratio, tangential_force=force).stress
-            except GeometryError as error:
-                messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
-    return NominalStresses(contact, root, "; ".join(dict.fromkeys(messages)))
-
-
 def static_verdict(result: StaticResult) -> dict:
     """Residual, message and kind of contact of a static solution, for the manifest."""
     cycle = result.cycle
@@ -306,6 +310,8 @@ STATIC = Stage(
     figures=_static_figures,
     check=planetary_set,
 )
+
+
 STRESS = Stage(
     name="stress",
     title="Stresses",
