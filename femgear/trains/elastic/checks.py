@@ -1,6 +1,7 @@
-"""What the pipeline refuses before it computes, and what it warns of afterwards.
+"""Refusals and warnings of a case with an elastic ring, and how far up its excitation reaches.
 
-How far up the excitation of a periodic response reaches, and what the housing would feel beyond.
+Before anything is computed the case is refused where modes, dynamics or housing cannot represent it;
+afterwards a warning says what the housing would feel beyond the excitation.
 
 Mesh stiffness jumps where tooth pairs begin and cease to carry: its harmonics fall like one over their order,
 while the acceleration of the housing grows towards the modes in which meshes are the springs. A fixed number
@@ -49,159 +50,6 @@ NOTICEABLE = 1.0
 """Change of the level that is worth a warning [dB]."""
 MOST_WINDING = 1.0
 """Angle between the ends of a coupling that is worth a warning [rad]."""
-
-
-@dataclass(frozen=True)
-class FrequencyLimit:
-    """Harmonics of excitation and response at every speed, (n_speeds,) integer arrays.
-
-    Parameters
-    ----------
-    frequency : (n_speeds,) array
-        Highest excitation frequency [Hz].
-    """
-
-    excitation: np.ndarray
-    response: np.ndarray
-    frequency: np.ndarray
-
-
-def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
-    """Frequency to which the excitation reaches unless the case says less [Hz].
-
-    Parameters
-    ----------
-    case : Case
-    mesh_mode : float
-        Highest natural frequency of the rigid gears on their meshes [Hz].
-    mesh_frequency : float
-        Of the fastest speed [Hz].
-    """
-    lowest = STEP * math.ceil(max(LOWEST, ABOVE_MESHES * mesh_mode, 3 * mesh_frequency) / STEP)
-    given = max((case.dynamics.mesh_harmonics or 0) * mesh_frequency, case.dynamics.up_to or 0.0)
-    return max(min(lowest, 0.5 * HIGHEST_RESPONSE), given)
-
-
-def limited(
-    case: Case, gears: PlanetarySet, mesh_frequency, up_to: float, *, given: int | None = None
-) -> FrequencyLimit:
-    """Harmonics up to a frequency, or a given number of them.
-
-    Parameters
-    ----------
-    case : Case
-    gears : PlanetarySet
-    mesh_frequency : (n_speeds,) array
-        [Hz]
-    up_to : float
-        [Hz]; less at the lowest of so many speeds that their lines would fill the memory.
-    given : int, optional
-        Mesh harmonics of the excitation at all speeds.
-    """
-    frequency = np.asarray(mesh_frequency, float)
-    if given is None:
-        # lines of the sensor with their signal, modes, ring field and meshes, a harmonic of all speeds
-        size = len(frequency) * (144 * gears.ring.teeth + 8000 + 96 * gears.n_planets)
-        most = min(HARMONICS, max(int(MEMORY / size), 18))
-        excitation = np.clip(np.floor(up_to / frequency * (1 + 1e-12)), 1, most).astype(int)
-    else:
-        excitation = np.full(len(frequency), given)
-    # products with the low harmonics of the stiffness reach beyond the excitation
-    beyond = excitation + 2 * np.minimum(excitation, 6)
-    response = np.maximum(case.dynamics.response_harmonics or beyond, excitation)
-    return FrequencyLimit(excitation, response, excitation * frequency)
-
-
-def checked_speeds(count: int) -> np.ndarray:
-    """Numbers of the speeds at which the level is computed again: all of a few, the ends of many."""
-    return np.unique(np.linspace(0, count - 1, min(count, CHECKED)).round().astype(int))
-
-
-def levels_below(lines, frequency) -> np.ndarray:
-    """Level of the lines of a sensor at one speed up to each of the frequencies, over that of all lines.
-
-    Harmonics of a stiffness that jumps fall as one over their order, so that lines of a slower speed are
-    weaker and closer by the same factor: the share of the level below a frequency depends little on the
-    speed (within 1 dB from 250 to 60 rpm of the reference set).
-
-    Parameters
-    ----------
-    lines : SensorLines
-        Of one speed.
-    frequency : (n,) array
-        [Hz]
-    """
-    power = np.cumsum(np.abs(lines.acceleration) ** 2)
-    place = np.searchsorted(lines.frequency, frequency, side="right") - 1
-    return np.sqrt(power[place] / power[-1])
-
-
-def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[str, ...]:
-    """Warning where the level of the housing would change by `NOTICEABLE` or more.
-
-    Parameters
-    ----------
-    rpm, level_change, limit : (n_speeds,) arrays
-        Speeds of the input [rpm], change of the level [dB], nan where it was not computed, and highest
-        excitation frequencies [Hz].
-    compared_to : float
-        Frequency to which the excitation reached in the comparison [Hz].
-    """
-    known = np.where(np.isfinite(level_change), np.abs(level_change), 0.0)
-    if known.max(initial=0.0) < NOTICEABLE:
-        return ()
-    worst = int(known.argmax())
-    return (
-        f"[W-EXCITATION] at {rpm[worst]:.6g} rpm the excitation ends at {limit[worst]:.4g} Hz; up to "
-        f"{compared_to:.4g} Hz the level of the housing changes by {level_change[worst]:+.1f} dB. It does by "
-        f"{NOTICEABLE:g} dB or more at {int((known >= NOTICEABLE).sum())} of the "
-        f"{int(np.isfinite(level_change).sum())} speeds looked at: raise dynamics.up_to or "
-        "dynamics.mesh_harmonics, or leave the slowest speeds out, before levels are compared",
-    )
-
-
-def max_nodal_diameter(case: Case) -> int:
-    """Largest nodal diameter of the ring model; beyond half the teeth there are none."""
-    from femgear.trains.elastic.model import MAX_DIAMETER
-
-    return max(min(MAX_DIAMETER, case.ring.teeth // 2 - 1), 2)
-
-
-def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
-    """Mesh frequency of the fastest speed [Hz].
-
-    Raises
-    ------
-    CaseError
-        When the response reaches beyond what a plane model of the ring means anything for.
-    """
-    from femgear.gears.kinematics import speeds
-
-    fastest = speeds(gears, input=case.operation.input, fixed="ring", speed=max(case.operation.speeds))
-    harmonics = case.response_harmonics or 3
-    response = max(harmonics * fastest.mesh_frequency, case.dynamics.up_to or 0.0)
-    up_to = case.dynamics.up_to
-    if up_to is not None and up_to < fastest.mesh_frequency:
-        raise CaseError(
-            f"the excitation ends at {up_to:.6g} Hz, below the mesh frequency of the fastest speed: "
-            "nothing would excite the set there",
-            code="E-RANGE",
-            key="dynamics.up_to",
-            value=f"{up_to:.6g} Hz",
-            limit=f"{fastest.mesh_frequency:.6g} Hz or more",
-            remedy="raise it, or leave the highest speeds out",
-        )
-    if response > HIGHEST_RESPONSE:
-        allowed = max(case.operation.speeds) * HIGHEST_RESPONSE / response
-        raise CaseError(
-            f"{harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
-            code="E-FREQUENCY",
-            key="operation.speeds",
-            value=f"{max(case.operation.speeds) * 30 / np.pi:.6g} rpm",
-            limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed * 30 / np.pi:.4g} rpm here",
-            remedy="leave the highest speeds out, or fewer dynamics.response_harmonics",
-        )
-    return fastest.mesh_frequency
 
 
 def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
@@ -343,3 +191,156 @@ def _wound_up(case: Case) -> Iterator[str]:
                 f"torque turn the coupling by {math.degrees(angle):.4g} deg; couplings stand a few degrees, "
                 "elastic ones twenty"
             )
+
+
+def max_nodal_diameter(case: Case) -> int:
+    """Largest nodal diameter of the ring model; beyond half the teeth there are none."""
+    from femgear.trains.elastic.model import MAX_DIAMETER
+
+    return max(min(MAX_DIAMETER, case.ring.teeth // 2 - 1), 2)
+
+
+def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
+    """Mesh frequency of the fastest speed [Hz].
+
+    Raises
+    ------
+    CaseError
+        When the response reaches beyond what a plane model of the ring means anything for.
+    """
+    from femgear.gears.kinematics import speeds
+
+    fastest = speeds(gears, input=case.operation.input, fixed="ring", speed=max(case.operation.speeds))
+    harmonics = case.response_harmonics or 3
+    response = max(harmonics * fastest.mesh_frequency, case.dynamics.up_to or 0.0)
+    up_to = case.dynamics.up_to
+    if up_to is not None and up_to < fastest.mesh_frequency:
+        raise CaseError(
+            f"the excitation ends at {up_to:.6g} Hz, below the mesh frequency of the fastest speed: "
+            "nothing would excite the set there",
+            code="E-RANGE",
+            key="dynamics.up_to",
+            value=f"{up_to:.6g} Hz",
+            limit=f"{fastest.mesh_frequency:.6g} Hz or more",
+            remedy="raise it, or leave the highest speeds out",
+        )
+    if response > HIGHEST_RESPONSE:
+        allowed = max(case.operation.speeds) * HIGHEST_RESPONSE / response
+        raise CaseError(
+            f"{harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
+            code="E-FREQUENCY",
+            key="operation.speeds",
+            value=f"{max(case.operation.speeds) * 30 / np.pi:.6g} rpm",
+            limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed * 30 / np.pi:.4g} rpm here",
+            remedy="leave the highest speeds out, or fewer dynamics.response_harmonics",
+        )
+    return fastest.mesh_frequency
+
+
+@dataclass(frozen=True)
+class FrequencyLimit:
+    """Harmonics of excitation and response at every speed, (n_speeds,) integer arrays.
+
+    Parameters
+    ----------
+    frequency : (n_speeds,) array
+        Highest excitation frequency [Hz].
+    """
+
+    excitation: np.ndarray
+    response: np.ndarray
+    frequency: np.ndarray
+
+
+def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
+    """Frequency to which the excitation reaches unless the case says less [Hz].
+
+    Parameters
+    ----------
+    case : Case
+    mesh_mode : float
+        Highest natural frequency of the rigid gears on their meshes [Hz].
+    mesh_frequency : float
+        Of the fastest speed [Hz].
+    """
+    lowest = STEP * math.ceil(max(LOWEST, ABOVE_MESHES * mesh_mode, 3 * mesh_frequency) / STEP)
+    given = max((case.dynamics.mesh_harmonics or 0) * mesh_frequency, case.dynamics.up_to or 0.0)
+    return max(min(lowest, 0.5 * HIGHEST_RESPONSE), given)
+
+
+def limited(
+    case: Case, gears: PlanetarySet, mesh_frequency, up_to: float, *, given: int | None = None
+) -> FrequencyLimit:
+    """Harmonics up to a frequency, or a given number of them.
+
+    Parameters
+    ----------
+    case : Case
+    gears : PlanetarySet
+    mesh_frequency : (n_speeds,) array
+        [Hz]
+    up_to : float
+        [Hz]; less at the lowest of so many speeds that their lines would fill the memory.
+    given : int, optional
+        Mesh harmonics of the excitation at all speeds.
+    """
+    frequency = np.asarray(mesh_frequency, float)
+    if given is None:
+        # lines of the sensor with their signal, modes, ring field and meshes, a harmonic of all speeds
+        size = len(frequency) * (144 * gears.ring.teeth + 8000 + 96 * gears.n_planets)
+        most = min(HARMONICS, max(int(MEMORY / size), 18))
+        excitation = np.clip(np.floor(up_to / frequency * (1 + 1e-12)), 1, most).astype(int)
+    else:
+        excitation = np.full(len(frequency), given)
+    # products with the low harmonics of the stiffness reach beyond the excitation
+    beyond = excitation + 2 * np.minimum(excitation, 6)
+    response = np.maximum(case.dynamics.response_harmonics or beyond, excitation)
+    return FrequencyLimit(excitation, response, excitation * frequency)
+
+
+def checked_speeds(count: int) -> np.ndarray:
+    """Numbers of the speeds at which the level is computed again: all of a few, the ends of many."""
+    return np.unique(np.linspace(0, count - 1, min(count, CHECKED)).round().astype(int))
+
+
+def levels_below(lines, frequency) -> np.ndarray:
+    """Level of the lines of a sensor at one speed up to each of the frequencies, over that of all lines.
+
+    Harmonics of a stiffness that jumps fall as one over their order, so that lines of a slower speed are
+    weaker and closer by the same factor: the share of the level below a frequency depends little on the
+    speed (within 1 dB from 250 to 60 rpm of the reference set).
+
+    Parameters
+    ----------
+    lines : SensorLines
+        Of one speed.
+    frequency : (n,) array
+        [Hz]
+    """
+    power = np.cumsum(np.abs(lines.acceleration) ** 2)
+    place = np.searchsorted(lines.frequency, frequency, side="right") - 1
+    return np.sqrt(power[place] / power[-1])
+
+
+def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[str, ...]:
+    """Warning where the level of the housing would change by `NOTICEABLE` or more.
+
+    Parameters
+    ----------
+    rpm, level_change, limit : (n_speeds,) arrays
+        Speeds of the input [rpm], change of the level [dB], nan where it was not computed, and highest
+        excitation frequencies [Hz].
+    compared_to : float
+        Frequency to which the excitation reached in the comparison [Hz].
+    """
+    known = np.where(np.isfinite(level_change), np.abs(level_change), 0.0)
+    if known.max(initial=0.0) < NOTICEABLE:
+        return ()
+    worst = int(known.argmax())
+    return (
+        f"[W-EXCITATION] at {rpm[worst]:.6g} rpm the excitation ends at {limit[worst]:.4g} Hz; up to "
+        f"{compared_to:.4g} Hz the level of the housing changes by {level_change[worst]:+.1f} dB. It does by "
+        f"{NOTICEABLE:g} dB or more at {int((known >= NOTICEABLE).sum())} of the "
+        f"{int(np.isfinite(level_change).sum())} speeds looked at: raise dynamics.up_to or "
+        "dynamics.mesh_harmonics, or leave the slowest speeds out, before levels are compared",
+    )

@@ -1,8 +1,13 @@
-"""Figures of dynamics.nc: dynamic transmission error and mean deflection of the ring.
+"""Figures of a case with an elastic ring: modes.nc, dynamics.nc and housing.nc.
 
-Figures of modes.nc: mode shapes and natural frequencies.
+By stage:
 
-Figures of housing.nc: what a sensor fixed to the housing hears during one carrier revolution.
+- modes.nc: natural frequencies by kind and nodal diameter, and modes of the ring as fields and pictures;
+- dynamics.nc: dynamic transmission error and mean deflection of the ring, its motion as an animation;
+- housing.nc: what a sensor fixed to the housing hears during one carrier revolution, its orders and
+  modulation.
+
+`FIGURES` at the end ties the pictures of the report to their captions.
 """
 
 from __future__ import annotations
@@ -58,6 +63,56 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 _BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
+
+_MARKERS = "osD^vPX*"
+
+# share of the height below the strongest line that a letter above it takes
+_ROOM = 0.068
+# numbers along an axis, and lines of a spectrum that can be told apart, at most
+_TICKS, _STEMS = 20, 4000
+_LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Fourier"
+ACCELERATION = "acceleration [m/s²]"
+
+
+def natural_frequencies(modes: xr.Dataset, *, mesh_frequencies: Sequence[tuple[str, float]] = ()) -> Figure:
+    """Natural frequencies over the nodal diameters of the ring, by kind of mode.
+
+    Parameters
+    ----------
+    modes : xarray.Dataset
+        With ``frequency`` [Hz], ``kind`` and ``nodal_diameter``.
+    mesh_frequencies : sequence of (str, float)
+        Legend text and frequency [Hz] of excitations to draw as horizontal lines.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, (ax,) = new_figure(height=5.0)
+    kinds = np.array([str(kind) for kind in modes["kind"].values])
+    frequency, diameter = modes["frequency"].values, modes["nodal_diameter"].values
+    for i, kind in enumerate(dict.fromkeys(kinds)):
+        rows = kinds == kind
+        ax.plot(
+            diameter[rows],
+            frequency[rows] * 1e-3,
+            _MARKERS[i % len(_MARKERS)],
+            color=COLOURS[i % len(COLOURS)],
+            markersize=6,
+            markerfacecolor="none",
+            markeredgewidth=1.6,
+            label=f"{kind} ({np.count_nonzero(rows)})",
+        )
+    for i, (text, value) in enumerate(mesh_frequencies):
+        dash = (0, (4, 2 + 2 * i))
+        ax.axhline(value * 1e-3, color=(GREY, ORANGE)[i % 2], linewidth=1.0, linestyle=dash, label=text)
+    ticks = np.unique(diameter)
+    if len(ticks) <= 25:
+        ax.set_xticks(ticks, ["none" if n < 0 else str(n) for n in ticks])
+    ax.set_ylim(bottom=0)
+    label(ax, "nodal diameters of the ring [1]", "natural frequency [kHz]")
+    legend_below(figure, columns=4)
+    return figure
 
 
 def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = None) -> Figure:
@@ -160,58 +215,6 @@ def _free_angle(angles) -> float:
     return float(np.degrees(sorted_angles[widest] + gaps[widest] / 2))
 
 
-_MARKERS = "osD^vPX*"
-
-
-def natural_frequencies(modes: xr.Dataset, *, mesh_frequencies: Sequence[tuple[str, float]] = ()) -> Figure:
-    """Natural frequencies over the nodal diameters of the ring, by kind of mode.
-
-    Parameters
-    ----------
-    modes : xarray.Dataset
-        With ``frequency`` [Hz], ``kind`` and ``nodal_diameter``.
-    mesh_frequencies : sequence of (str, float)
-        Legend text and frequency [Hz] of excitations to draw as horizontal lines.
-
-    Returns
-    -------
-    Figure
-    """
-    figure, (ax,) = new_figure(height=5.0)
-    kinds = np.array([str(kind) for kind in modes["kind"].values])
-    frequency, diameter = modes["frequency"].values, modes["nodal_diameter"].values
-    for i, kind in enumerate(dict.fromkeys(kinds)):
-        rows = kinds == kind
-        ax.plot(
-            diameter[rows],
-            frequency[rows] * 1e-3,
-            _MARKERS[i % len(_MARKERS)],
-            color=COLOURS[i % len(COLOURS)],
-            markersize=6,
-            markerfacecolor="none",
-            markeredgewidth=1.6,
-            label=f"{kind} ({np.count_nonzero(rows)})",
-        )
-    for i, (text, value) in enumerate(mesh_frequencies):
-        dash = (0, (4, 2 + 2 * i))
-        ax.axhline(value * 1e-3, color=(GREY, ORANGE)[i % 2], linewidth=1.0, linestyle=dash, label=text)
-    ticks = np.unique(diameter)
-    if len(ticks) <= 25:
-        ax.set_xticks(ticks, ["none" if n < 0 else str(n) for n in ticks])
-    ax.set_ylim(bottom=0)
-    label(ax, "nodal diameters of the ring [1]", "natural frequency [kHz]")
-    legend_below(figure, columns=4)
-    return figure
-
-
-# share of the height below the strongest line that a letter above it takes
-_ROOM = 0.068
-# numbers along an axis, and lines of a spectrum that can be told apart, at most
-_TICKS, _STEMS = 20, 4000
-_LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Fourier"
-ACCELERATION = "acceleration [m/s²]"
-
-
 def strongest_harmonic(housing: xr.Dataset, *, speed_index: int, ring_teeth: int) -> int:
     """Mesh harmonic whose band holds the strongest line at one speed."""
     order, amplitude = housing["order"].values, housing["order_amplitude"].values[speed_index]
@@ -220,7 +223,7 @@ def strongest_harmonic(housing: xr.Dataset, *, speed_index: int, ring_teeth: int
 
 
 def band(housing: xr.Dataset, *, speed_index: int, ring_teeth: int, harmonic: int) -> BandAnalysis:
-    """Lines, signal, envelope and lobes around one mesh harmonic; see `housing.orders.analyse_band`."""
+    """Lines, signal, envelope and lobes around one mesh harmonic; see `analyse_band`."""
     spectrum = _spectrum(housing["acceleration"].values[speed_index])
     return analyse_band(spectrum, ring_teeth, harmonic)
 
@@ -504,37 +507,6 @@ def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
     }
 
 
-def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
-    dynamics, data = drawn.data["dynamics"], drawn.data
-    figures = {
-        "dynamic_spectrum": transmission_error_spectrum(dynamics),
-        "dynamic_transmission_error": transmission_error_period(
-            dynamics, _on_supports(data.get("modes"), data.get("static"))
-        ),
-        "ring_static_deflection": ring_mean_deflection(dynamics, planetary_set(drawn.case)),
-    }
-    if dynamics.sizes["speed"] > MANY_SPEEDS:
-        figures["speed_sweep"] = speed_sweep(dynamics)
-    return figures
-
-
-def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Dataset | None:
-    """Static transmission errors that the dynamics start from, else those of static.nc."""
-    if modes is None or "supported_ste" not in modes:
-        return static
-    return modes[["supported_ste"]].rename(supported_ste="ste", supported_position="position")
-
-
-def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
-    figures, housing, teeth = {}, drawn.data["housing"], planetary_set(drawn.case).ring.teeth
-    drawings = (("housing_signal", housing_signal), ("order_spectrum", order_spectrum))
-    for s in shown_speeds(housing):
-        rpm = round(float(housing["speed"][s]))
-        for name, draw in (*drawings, ("modulation", modulation_polar)):
-            figures[f"{name}_{rpm}_rpm"] = draw(housing, speed_index=s, ring_teeth=teeth)
-    return figures
-
-
 def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     """Modes of the toothed ring on its foundation for 0 to 6 nodal diameters, as VTU and picture."""
     from femgear.contact.bodies import active_flank_load, make_sectors
@@ -587,6 +559,27 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     return ["ring_modes.vtu", "ring_mode.png"]
 
 
+def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
+    dynamics, data = drawn.data["dynamics"], drawn.data
+    figures = {
+        "dynamic_spectrum": transmission_error_spectrum(dynamics),
+        "dynamic_transmission_error": transmission_error_period(
+            dynamics, _on_supports(data.get("modes"), data.get("static"))
+        ),
+        "ring_static_deflection": ring_mean_deflection(dynamics, planetary_set(drawn.case)),
+    }
+    if dynamics.sizes["speed"] > MANY_SPEEDS:
+        figures["speed_sweep"] = speed_sweep(dynamics)
+    return figures
+
+
+def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Dataset | None:
+    """Static transmission errors that the dynamics start from, else those of static.nc."""
+    if modes is None or "supported_ste" not in modes:
+        return static
+    return modes[["supported_ste"]].rename(supported_ste="ste", supported_position="position")
+
+
 def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
     """The ring's operating deflection while the carrier turns, at the last speed."""
     from femgear.report.scene import animate_operating_deflection
@@ -607,6 +600,16 @@ def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
         title=f"{case.operation.input} at {rpm:.0f} rpm",
     )
     return ["operating_deflection.gif"]
+
+
+def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
+    figures, housing, teeth = {}, drawn.data["housing"], planetary_set(drawn.case).ring.teeth
+    drawings = (("housing_signal", housing_signal), ("order_spectrum", order_spectrum))
+    for s in shown_speeds(housing):
+        rpm = round(float(housing["speed"][s]))
+        for name, draw in (*drawings, ("modulation", modulation_polar)):
+            figures[f"{name}_{rpm}_rpm"] = draw(housing, speed_index=s, ring_teeth=teeth)
+    return figures
 
 
 FIGURES = {

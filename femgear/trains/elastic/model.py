@@ -1,14 +1,12 @@
 """Planetary set with an elastic toothed ring: rigid sun, planets and carrier, FE ring on a foundation.
 
-All bodies move in the plane; coordinates are those of the carrier frame, in which the mean motion is
-removed. `elastic_set`, and with it the dynamics, leaves the gyroscopic and convective terms of that frame
-out; `turning_system` adds them, to see what they do to the natural frequencies.
+All bodies move in the plane; coordinates are those of the carrier frame, in which the mean motion is removed.
+`elastic_set`, and with it the dynamics, leaves the gyroscopic and convective terms of that frame out;
+`turning_system` adds them, to see what they do to the natural frequencies.
 
-The toothed ring as the dynamic model sees it: cyclic modes on a foundation, loaded at its flanks.
-
-In the carrier frame the teeth pass under a load that stands still. The ring is therefore represented by
-its cyclic components with a load spread over the active flank of one tooth; what the passing teeth add
-is part of the mesh stiffness, not of the ring.
+In the carrier frame the teeth of the ring pass under a load that stands still. `ring_model` therefore
+represents the ring by its cyclic modes on the foundation, with a load spread over the active flank of one
+tooth; what the passing teeth add is part of the mesh stiffness, not of the ring.
 """
 
 from __future__ import annotations
@@ -25,6 +23,10 @@ if TYPE_CHECKING:
     from femgear.fe.grid import Grid
     from femgear.fe.reduction import CyclicModes
     from femgear.gears.planetary import PlanetarySet
+
+RADIAL, TANGENTIAL = 0, 1
+# nodal diameters of the ring model: their amplitudes fall fast, and 54 points of the housing resolve them
+MAX_DIAMETER = 26
 
 
 @dataclass(frozen=True)
@@ -462,11 +464,6 @@ def ring_wave_shares(model: ElasticSet, shape) -> np.ndarray:
     for row in (largest + n[alone], largest - n[alone]):
         np.add.at(shares, row, 0.5 * np.abs(ring[alone]) ** 2)
     return shares / total
-
-
-RADIAL, TANGENTIAL = 0, 1
-# nodal diameters of the ring model: their amplitudes fall fast, and 54 points of the housing resolve them
-MAX_DIAMETER = 26
 
 
 @dataclass(frozen=True)

@@ -1,3 +1,9 @@
+"""Results of a case with an elastic ring: modes.nc, dynamics.nc, housing.nc, and the tables of the housing.
+
+Every variable of a file carries its units; complex harmonics are stored as real and imaginary parts and
+belong to real motions by ``x(t) = Re sum_h X_h exp(i h omega t)``.
+"""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -20,6 +26,9 @@ if TYPE_CHECKING:
     from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
     from femgear.trains.elastic.model import ElasticSet, RingModel
+
+_FEW = 4
+_FIRST, _STRONGEST = 6, 4  # bands that are listed
 
 
 @dataclass(frozen=True)
@@ -299,10 +308,6 @@ def describe_housing(data: xr.Dataset) -> Block:
     form = data.attrs["form"]
     note = f"form of the signal: {form}" + (f", {data.attrs['points']} points" if form == "linear" else "")
     return Block("Housing", header, tuple(rows), (note,))
-
-
-_FEW = 4
-_FIRST, _STRONGEST = 6, 4  # bands that are listed
 
 
 def mesh_bands(results: Results) -> Block:

@@ -1,7 +1,8 @@
-"""The pipeline: static -> modes -> dynamics -> housing. Read this first.
+"""The pipeline with an elastic ring: static, stress -> modes -> dynamics -> housing. Read this first.
 
-Each stage takes the case and what came before, and returns a frozen result whose ``dataset()`` is what
-goes to disk.
+Each stage takes the case and what came before, and returns a frozen result whose ``dataset()`` is what goes
+to disk. `ELASTIC` at the end is the train: the table of its stages, with what the report says and draws of
+each.
 """
 
 from __future__ import annotations
