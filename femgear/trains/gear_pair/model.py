@@ -1,30 +1,24 @@
-"""A gear pair with backlash in dimensionless form: rotations, or rotations and two bearings.
+"""Gear pair with backlash: with inertias and radii, in dimensionless form, and the contact of its flanks.
 
-Lengths are counted in half backlashes b, forces in k b with the mean mesh stiffness k, times in 1 / omega_n,
-omega_n = sqrt(k / m_e), with the equivalent mass ``m_e = 1 / (r_1^2 / I_1 + r_2^2 / I_2)`` (A. Kahraman and
-R. Singh, J. Sound Vib. 142 (1990) 49-75, rotations; 146 (1991) 135-156, with bearings and k(t)). With the
-dynamic approach ``u = r_1 theta_1 - r_2 theta_2``, the displacements y_1, y_2 of the gears along the line of
-action and the error e(t), the relative deflection of the mesh is
+Rotations on rigid shafts after A. Kahraman and R. Singh, Non-linear dynamics of a spur gear pair, J. Sound
+Vib. 142 (1990) 49-75, Eqs. (1) to (4): the deflection along the line of action is ``r_1 theta_1 - r_2
+theta_2``, and with the equivalent mass ``m_e = 1 / (r_1^2 / I_1 + r_2^2 / I_2) = I_1 I_2 / (r_1^2 I_2 + r_2^2
+I_1)`` it obeys ``m_e x'' + c x' + f(x, t) = T_1 / r_1``.
+
+In the dimensionless form lengths are counted in half backlashes b, forces in k b with the mean mesh stiffness
+k, times in 1 / omega_n, omega_n = sqrt(k / m_e); bearings and k(t) are those of Kahraman and Singh, J. Sound
+Vib. 146 (1991) 135-156. With the dynamic approach ``u = r_1 theta_1 - r_2 theta_2``, the displacements y_1,
+y_2 of the gears along the line of action and the error e(t), the relative deflection of the mesh is
 
 ``x = u + y_1 - y_2 - e(t)``
 
-drive flanks touch above x = 1, back flanks below x = -1. In the coordinates (y_1, y_2, x) the error acts
+and drive flanks touch above x = 1, back flanks below x = -1. In the coordinates (y_1, y_2, x) the error acts
 through the inertia of ``u = x + e - y_1 + y_2`` alone: ``x'' + 2 zeta x' + k(t) f(x) = F - e''`` without
-bearings. Time is scaled once more so that the tooth frequency is one for every frequency ratio Omega,
-``theta = Omega t``: M and C carry Omega^2 and Omega, and branches over Omega are branches over a parameter.
+bearings. Time is scaled once more so that the tooth frequency is one for every frequency ratio Omega, ``theta
+= Omega t``: M and C carry Omega^2 and Omega, and branches over Omega are branches over a parameter.
 
-Frequency ratios at which a branch of the dimensionless pair begins or ends to have impacts.
-
-A pair of gears on rigid shafts: two rotations and one mesh.
-
-A. Kahraman and R. Singh, Non-linear dynamics of a spur gear pair, J. Sound Vib. 142 (1990) 49-75, Eqs. (1) to
-(4): the deflection along the line of action is ``x = r_1 theta_1 - r_2 theta_2``, and with the mass
-``m_e = I_1 I_2 / (r_1^2 I_2 + r_2^2 I_1)`` it obeys ``m_e x'' + c x' + f(x, t) = T_1 / r_1``.
-
-Contact of meshes with backlash in a motion: always closed, impact on one flank, impact on both.
-
-A. Kahraman and R. Singh, J. Sound Vib. 142 (1990) 49-75, tell no impact, single-sided and double-sided impact
-apart by the range of the relative deflection.
+No impact, single-sided and double-sided impact are told apart, as in the paper of 1990, by the range of the
+relative deflection.
 """
 
 from __future__ import annotations
@@ -47,6 +41,80 @@ from femgear.system.system import MechanicalSystem
 
 # deflections of drive and back contact in half backlashes
 DRIVE, BACK = 1.0, -1.0
+
+# instants of a period, and a step of the ratio within which interpolation along the branch will do
+_SAMPLES = 2048
+_SHORT = 1e-3
+
+NORMAL, ONE_SIDED, TWO_SIDED, UNKNOWN = 0, 1, 2, 3
+STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
+
+
+def gear_pair(
+    inertia: tuple[float, float],
+    base_radius: tuple[float, float],
+    *,
+    torque: float = 0.0,
+    mesh_damping: float = 0.0,
+) -> MechanicalSystem:
+    """Driving gear 1 and driven gear 2; give it one `GearMeshes` on column 0.
+
+    The rotation of both gears in their ratio is free; the torque on gear 2 balances that on gear 1.
+
+    Parameters
+    ----------
+    inertia : (2,) sequence
+        Polar moments of inertia [kg m^2].
+    base_radius : (2,) sequence
+        [m]
+    torque : float
+        On gear 1 [N m]; positive presses the drive flanks together.
+    mesh_damping : float
+        Viscous damping along the line of action [N s/m]. It acts on ``x'``; where the mesh has a deflection
+        (transmission error) the publication lets it act on the motion beyond that.
+
+    Returns
+    -------
+    MechanicalSystem
+        Rotations ``theta_1``, ``theta_2`` [rad], opposite senses positive, and the column of the mesh.
+
+    Raises
+    ------
+    CaseError
+        Inertias or radii that are not positive, a damping that is negative, numbers that are not finite.
+    """
+    inertia, radius = (
+        checked_numbers(pair, name, code="E-GEAR-PAIR", unit=unit).copy()
+        for pair, name, unit in ((inertia, "inertia", "kg m^2"), (base_radius, "base_radius", "m"))
+    )
+    torque = checked_numbers(torque, "torque", code="E-GEAR-PAIR", unit="N m").item()
+    mesh_damping = checked_numbers(mesh_damping, "mesh_damping", code="E-GEAR-PAIR", unit="N s/m").item()
+    for name, pair, unit in (("inertia", inertia, "kg m^2"), ("base_radius", radius, "m")):
+        if pair.shape != (2,) or not np.all(np.isfinite(pair)) or np.any(pair <= 0.0):
+            raise CaseError(
+                f"{name} of a gear pair: {pair.tolist()} {unit}", code="E-GEAR-PAIR", key=name,
+                limit="two positive numbers",
+            )  # fmt: skip
+    if not np.isfinite(torque):
+        raise CaseError(f"a torque of {torque} N m", code="E-GEAR-PAIR", key="torque", limit="finite")
+    if not (np.isfinite(mesh_damping) and mesh_damping >= 0.0):
+        raise CaseError(
+            f"a mesh damping of {mesh_damping} N s/m",
+            code="E-GEAR-PAIR",
+            key="mesh_damping",
+            limit="0 or more",
+        )
+    column = np.array([[radius[0]], [-radius[1]]])
+    return MechanicalSystem(
+        M=np.diag(inertia), C=mesh_damping * (column @ column.T), K=np.zeros((2, 2)), W=column,
+        load=torque / radius[0] * column[:, 0], dofs=("theta_1", "theta_2"),
+    )  # fmt: skip
+
+
+def equivalent_mass(inertia: tuple[float, float], base_radius: tuple[float, float]) -> float:
+    """Mass ``m_e`` [kg] that moves along the line of action; ``sqrt(k / m_e)`` is the natural frequency."""
+    (one, other), (first, second) = inertia, base_radius
+    return one * other / (first**2 * other + second**2 * one)
 
 
 @dataclass(frozen=True)
@@ -262,28 +330,6 @@ def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tup
     return tuple(float(value) for value in np.sort(np.sqrt(real[real > 0.0])))
 
 
-def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
-    return tuple(order if place == base else 0 for place in range(count))
-
-
-def _number(key: str, value, code: str = "E-PAIR") -> float:
-    """One finite number."""
-    number = checked_numbers(value, key, code=code, unit="")
-    if number.ndim or not np.isfinite(number):
-        raise CaseError(f"a {key} of {number.tolist()}", code=code, key=key, limit="one finite number")
-    return float(number)
-
-
-def _not_negative(name: str, value: float) -> None:
-    if _number(name, value) < 0.0:
-        raise CaseError(f"{name} {value}", code="E-PAIR", limit="0 or more")
-
-
-# instants of a period, and a step of the ratio within which interpolation along the branch will do
-_SAMPLES = 2048
-_SHORT = 1e-3
-
-
 def lowest_deflection(solution) -> float:
     """Smallest deflection of a solution in scaled time, over 2048 phases."""
     return float(solution.at(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES).min())
@@ -329,77 +375,6 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
 
         borders.append(brentq(lowest, *ends, xtol=1e-6))
     return np.array(borders)
-
-
-def gear_pair(
-    inertia: tuple[float, float],
-    base_radius: tuple[float, float],
-    *,
-    torque: float = 0.0,
-    mesh_damping: float = 0.0,
-) -> MechanicalSystem:
-    """Driving gear 1 and driven gear 2; give it one `GearMeshes` on column 0.
-
-    The rotation of both gears in their ratio is free; the torque on gear 2 balances that on gear 1.
-
-    Parameters
-    ----------
-    inertia : (2,) sequence
-        Polar moments of inertia [kg m^2].
-    base_radius : (2,) sequence
-        [m]
-    torque : float
-        On gear 1 [N m]; positive presses the drive flanks together.
-    mesh_damping : float
-        Viscous damping along the line of action [N s/m]. It acts on ``x'``; where the mesh has a deflection
-        (transmission error) the publication lets it act on the motion beyond that.
-
-    Returns
-    -------
-    MechanicalSystem
-        Rotations ``theta_1``, ``theta_2`` [rad], opposite senses positive, and the column of the mesh.
-
-    Raises
-    ------
-    CaseError
-        Inertias or radii that are not positive, a damping that is negative, numbers that are not finite.
-    """
-    inertia, radius = (
-        checked_numbers(pair, name, code="E-GEAR-PAIR", unit=unit).copy()
-        for pair, name, unit in ((inertia, "inertia", "kg m^2"), (base_radius, "base_radius", "m"))
-    )
-    torque = checked_numbers(torque, "torque", code="E-GEAR-PAIR", unit="N m").item()
-    mesh_damping = checked_numbers(mesh_damping, "mesh_damping", code="E-GEAR-PAIR", unit="N s/m").item()
-    for name, pair, unit in (("inertia", inertia, "kg m^2"), ("base_radius", radius, "m")):
-        if pair.shape != (2,) or not np.all(np.isfinite(pair)) or np.any(pair <= 0.0):
-            raise CaseError(
-                f"{name} of a gear pair: {pair.tolist()} {unit}", code="E-GEAR-PAIR", key=name,
-                limit="two positive numbers",
-            )  # fmt: skip
-    if not np.isfinite(torque):
-        raise CaseError(f"a torque of {torque} N m", code="E-GEAR-PAIR", key="torque", limit="finite")
-    if not (np.isfinite(mesh_damping) and mesh_damping >= 0.0):
-        raise CaseError(
-            f"a mesh damping of {mesh_damping} N s/m",
-            code="E-GEAR-PAIR",
-            key="mesh_damping",
-            limit="0 or more",
-        )
-    column = np.array([[radius[0]], [-radius[1]]])
-    return MechanicalSystem(
-        M=np.diag(inertia), C=mesh_damping * (column @ column.T), K=np.zeros((2, 2)), W=column,
-        load=torque / radius[0] * column[:, 0], dofs=("theta_1", "theta_2"),
-    )  # fmt: skip
-
-
-def equivalent_mass(inertia: tuple[float, float], base_radius: tuple[float, float]) -> float:
-    """Mass ``m_e`` [kg] that moves along the line of action; ``sqrt(k / m_e)`` is the natural frequency."""
-    (one, other), (first, second) = inertia, base_radius
-    return one * other / (first**2 * other + second**2 * one)
-
-
-NORMAL, ONE_SIDED, TWO_SIDED, UNKNOWN = 0, 1, 2, 3
-STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
 
 
 @dataclass(frozen=True)
@@ -524,6 +499,23 @@ def level_crossings(parameter, value, level: float) -> np.ndarray:
     i = np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:]))
     share = away[i] / (away[i] - away[i + 1])
     return parameter[i] + share * (parameter[i + 1] - parameter[i])
+
+
+def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
+    return tuple(order if place == base else 0 for place in range(count))
+
+
+def _number(key: str, value, code: str = "E-PAIR") -> float:
+    """One finite number."""
+    number = checked_numbers(value, key, code=code, unit="")
+    if number.ndim or not np.isfinite(number):
+        raise CaseError(f"a {key} of {number.tolist()}", code=code, key=key, limit="one finite number")
+    return float(number)
+
+
+def _not_negative(name: str, value: float) -> None:
+    if _number(name, value) < 0.0:
+        raise CaseError(f"{name} {value}", code="E-PAIR", limit="0 or more")
 
 
 def _refuse(message: str):
