@@ -1,21 +1,17 @@
-"""Planetary stages in series as one mechanical system: every stage in the frame of its own carrier.
+"""Planetary stages in series as one mechanical system: data, speeds and torques, matrices.
 
-The stages are lumped sets (`femgear.system.assembler`), the shafts between members springs or rigid. One
-rotation is the same in all frames, so that torsional couplings are exact at any speed. The centres of two
-members meet in the fixed frame: with ``z = x + i y`` in frames at the angles psi the lateral spring sees
-``z_1 exp(i psi_1) - z_2 exp(i psi_2)``. It is a constant spring where both frames turn at one speed, or
-stand; otherwise its columns stay in ``W`` for the periodic element of `femgear.trains.multistage.model`.
-D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16) couple stages with the same springs.
+The stages are lumped sets (`femgear.system.assembler`), each in the frame of its own carrier; the shafts
+between members are springs or rigid. One rotation is the same in all frames, so that torsional couplings are
+exact at any speed. The centres of two members meet in the fixed frame: with ``z = x + i y`` in frames at the
+angles psi the lateral spring sees ``z_1 exp(i psi_1) - z_2 exp(i psi_2)``. It is a constant spring where both
+frames turn at one speed, or stand; otherwise its columns stay in ``W`` for the periodic element
+`TurningSprings`. D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16) couple stages with the
+same springs.
 
-Data of planetary stages in series: the stages, what couples them, what drives and what is driven.
-
-Speeds and torques of planetary stages in series: Willis for every stage, one linear system for the train.
-
-With the speeds ``w`` of all central members, every stage, coupling, and fixed member is one row of ``A w =
-0``. Ideal torques follow from the same rows: those that the outside gives the members are ``A^T lambda``
-(principle of virtual work), so that speeds and torques balance in power by construction.
-
-Lateral springs between frames that turn against one another.
+Speeds and torques follow from Willis' equation of every stage in one linear system: with the speeds ``w`` of
+all central members, every stage, coupling, and fixed member is one row of ``A w = 0``. Ideal torques follow
+from the same rows: those that the outside gives the members are ``A^T lambda`` (principle of virtual work),
+so that speeds and torques balance in power by construction.
 """
 
 from __future__ import annotations
@@ -50,6 +46,14 @@ if TYPE_CHECKING:
 _RADII = 1e-3
 # largest finite stiffness of a coupling [N m/rad, N/m]; beyond, rounding hides the other springs
 STIFFEST = {"torsional": 1e12, "lateral": 1e15}
+
+# singular values below this share of the largest one count as none
+_RANK = 1e-12
+
+# difference of two carrier speeds, relative to the largest one, that is rounding
+_SAME_SPEED = 1e-12
+# entry of a rigid coupling, relative to its largest one, that is rounding
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, order=True)
@@ -347,10 +351,6 @@ def _refuse(message: str, limit: str):
     raise CaseError(message, code="E-COUPLING", limit=limit)
 
 
-# singular values below this share of the largest one count as none
-_RANK = 1e-12
-
-
 @dataclass(frozen=True, eq=False)
 class TrainSpeeds:
     """Absolute speeds [rad/s] and mesh frequencies [Hz], one a stage.
@@ -573,12 +573,6 @@ def _solved(data: MultistageSet, matrix: np.ndarray, right: np.ndarray) -> np.nd
 def _check_finite(name: str, value: float, unit: str) -> None:
     if not math.isfinite(value):
         raise CaseError(f"a {name} of {value} {unit}", code="E-VALUE", key=name, limit="finite")
-
-
-# difference of two carrier speeds, relative to the largest one, that is rounding
-_SAME_SPEED = 1e-12
-# entry of a rigid coupling, relative to its largest one, that is rounding
-_ROUNDING = 1e-12
 
 
 def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float = 0.0) -> MechanicalSystem:

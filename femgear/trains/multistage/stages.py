@@ -1,6 +1,8 @@
-"""Modes of planetary stages in series: their kinds, and the stage in which each one lives.
+"""Modes and response of planetary stages in series.
 
-Response of planetary stages in series: transmission errors of every stage, and the nonlinear train.
+Modes come with their kinds and the stage in which each one lives; the response is that to transmission errors
+of every stage, by modal summation, or that of the nonlinear train. No case file describes such a train: there
+is no table of stages, and the functions are called from Python.
 """
 
 from __future__ import annotations
