@@ -313,8 +313,8 @@ def multistage_problem(
     Returns
     -------
     NonlinearSystem
-        Its base frequencies are those of `base_frequencies`, its lines those of `harmonic_lines`
-        with as many bases, or any combination of their orders.
+        Its base frequencies are those of `base_frequencies`, its lines those of
+        `femgear.system.series.harmonic_lines` with as many bases, or any combination of their orders.
 
     Raises
     ------

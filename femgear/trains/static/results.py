@@ -89,8 +89,9 @@ class StressResult:
         The static solution that it belongs to.
     influences : RootStresses
     roots : tuple of RootCycle
-        Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on; of records beyond `WHOLE_RECORD` mesh periods
-        those periods in which the worst tooth of that gear passes the mesh.
+        Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on; of records beyond
+        `femgear.trains.static.stages.WHOLE_RECORD` mesh periods those periods in which the worst tooth of
+        that gear passes the mesh.
     first_period : (4N,) int array
         Mesh period of the record with which each of `roots` begins.
     ranges : tuple of RootRange
@@ -246,7 +247,7 @@ def root_stress_dataset(roots: tuple[RootCycle, ...], mesh_names) -> xr.Dataset:
     Parameters
     ----------
     roots : tuple of RootCycle
-        As `root_stress_cycle` gives them.
+        As `femgear.contact.root_stress.root_stress_cycle` gives them.
     mesh_names : sequence of str
         Label of each mesh.
 
