@@ -1,4 +1,4 @@
-"""What the pipeline of a planar case refuses, before it computes and of what it found."""
+"""Refusals of a planar case, before anything is computed and of what was found."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from femgear.case.case import set_deviations
 from femgear.errors import CaseError, ConvergenceError
+from femgear.storage.dataset import RPM
 from femgear.trains.planar.section import PlanarCase
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from femgear.trains.planar.model import MotionLines, PlanarModel
     from femgear.trains.planar.section import BranchSection
 
-RPM = np.pi / 30.0
 # largest motion of a member and largest deflection of a mesh [modules], as in the static stage
 _MODULES = {"motion": 2.0, "approach": 0.5}
 # distance of a line from an undamped natural frequency, relative to it, at which the response has no bound

@@ -1,6 +1,8 @@
-"""Figures of the lumped planetary set: response branches, orbits, bearing forces, tooth contact.
+"""Figures of a planar case: modes.nc, branch.nc, response.nc.
 
-Figures of branch.nc and response.nc, the results of planar cases.
+The first figures take plain curves: response branches, orbits, bearing forces and tooth contact of any lumped
+planetary set. Those after them read the files, and a note tells where too few harmonics make forces and
+contact doubtful. `FIGURES` at the end ties the pictures of the report to their captions.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from femgear.case.case import planetary_set
 from femgear.report.response import mode_shapes, shown_speeds
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure
 from femgear.trains.planar.model import TAIL_LIMIT, merged_folds
+from femgear.trains.planar.results import PHASES
 from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
@@ -22,6 +25,15 @@ if TYPE_CHECKING:
 
 # how parts of a curve are drawn and called, by what is known of them
 STABILITY = {1: ("-", "stable"), 0: ("--", "not stable"), -1: (":", "stability not known")}
+
+_DOUBTFUL = "too few harmonics, not to be trusted (W-TAIL)"
+_PALE = "#F6D48F"
+_AXIS = "frequency of the weight in the carrier frame [Hz]"
+_LABELS = 4
+# difference of two curves, relative to the range they are drawn over, that cannot be seen
+_EQUAL = 5e-3
+# instants of a carrier turn in figures of two frequencies, at most
+_INSTANTS = 20_000
 
 
 def response_branches(curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, quantity: str, x: str = ""):
@@ -183,17 +195,6 @@ def contact_map(frequency, clearance, panels: Sequence[tuple], *, line: tuple | 
     return figure
 
 
-_DOUBTFUL = "too few harmonics, not to be trusted (W-TAIL)"
-_PALE = "#F6D48F"
-_AXIS = "frequency of the weight in the carrier frame [Hz]"
-_PHASES = 721
-_LABELS = 4
-# difference of two curves, relative to the range they are drawn over, that cannot be seen
-_EQUAL = 5e-3
-# instants of a carrier turn in figures of two frequencies, at most
-_INSTANTS = 20_000
-
-
 def branch_figures(branch: xr.Dataset) -> dict[str, Figure]:
     """All figures of a branch, by file name.
 
@@ -286,7 +287,7 @@ def weight_orbits(branch: xr.Dataset) -> Figure:
 def weight_bearing_forces(branch: xr.Dataset, point: int) -> Figure:
     """Sizes of the planet-bearing forces over one turn of the weight against the carrier."""
     lines = (branch["planet_bearing_force_real"] + 1j * branch["planet_bearing_force_imag"]).values[point]
-    phase, wave = np.linspace(0.0, 2.0 * np.pi, _PHASES), _wave(branch)
+    phase, wave = np.linspace(0.0, 2.0 * np.pi, PHASES), _wave(branch)
     curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
     return bearing_forces(phase, curves, title=_top(branch))
 
@@ -458,7 +459,7 @@ def _contact(data: xr.Dataset, x: np.ndarray, words: str, parts) -> Figure:
 
 def _wave(branch: xr.Dataset) -> np.ndarray:
     """``exp(i h phase)`` (n, H) over one turn."""
-    phase = np.linspace(0.0, 2.0 * np.pi, _PHASES)
+    phase = np.linspace(0.0, 2.0 * np.pi, PHASES)
     return np.exp(1j * phase[:, None] * branch["harmonic"].values)
 
 

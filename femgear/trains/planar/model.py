@@ -1,10 +1,9 @@
-"""The lumped planetary set with its mesh stiffness, play, bearing clearance, weight and pin errors.
+"""The lumped planetary set in its plane: mesh stiffness, play, bearings, weight, pin errors, modes, motions.
 
-A bearing between carrier and ring, or carrier and housing, added to a lumped planetary set.
-
-Modes of the lumped planetary set and their kinds.
-
-What a lumped planetary set does in a periodic solution: orbits, forces, contact of its flanks.
+`planar_problem` joins a lumped set with its elements and forces for harmonic balance and time integration;
+`with_bearing` adds a bearing between two central members, or between one and the housing; `planar_modes`
+gives the modes at standstill with their kinds. `PlanarModel` and what follows it tell what the set does in a
+periodic solution: orbits, forces, contact of its flanks.
 """
 
 from __future__ import annotations
@@ -38,6 +37,25 @@ from femgear.system.mode_kinds import energy_shares, named_kinds, planar_motions
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces
 from femgear.system.series import FourierSeries, StepSeries, line_tail, series_of
 from femgear.system.system import Modes
+
+# natural frequencies closer than this, relative to the frequency, count as one
+_SAME = 1e-3
+
+TAIL_LIMIT = 0.05
+"""Share of the amplitude in the upper half of the lines beyond which what they add up to is wrong."""
+# limit points closer than this, relative to the frequency, are one: corners of contact split them
+_SAME_FOLD = 2e-3
+# deflection [m] that counts as much as the whole range of frequencies along a branch
+_SCALE = 2e-3
+# instants of a period; with two base frequencies of either phase
+_SAMPLES = 2880
+_GRID = (256, 48)
+# relative errors of the monodromy matrices, and solutions judged together
+_COARSE, _FINE, _BATCH = 1e-3, 1e-6, 32
+# fluctuation of a force, relative to its mean, below which there is none: residual of the equations
+_STILL = 1e-6
+# what a curve holds of every point
+_ALONG = ("points", "parameter", "tangent", "iterations", "error")
 
 
 @dataclass(frozen=True)
@@ -297,10 +315,6 @@ def _pin_inertia(data: PlanarSet, pins: np.ndarray, carrier_speed: float) -> np.
     return free_motions(data).T @ force.ravel()
 
 
-# natural frequencies closer than this, relative to the frequency, count as one
-_SAME = 1e-3
-
-
 @dataclass(frozen=True)
 class MemberBearing:
     """A radial bearing between two central members, or between one and the housing.
@@ -334,14 +348,14 @@ def with_bearing(problem: NonlinearSystem, data: PlanarSet, bearing: MemberBeari
     Parameters
     ----------
     problem : NonlinearSystem
-        From `femgear.trains.planar.model.planar_problem`.
+        From `planar_problem`.
     data : PlanarSet
     bearing : MemberBearing
 
     Returns
     -------
     NonlinearSystem
-        Its damping is that of ``problem``; see `damping_matrix` for that of the closed bearing.
+        Its damping is that of ``problem``; see `bearing_damping_matrix` for that of the closed bearing.
     """
     columns = np.zeros((3 * (data.n_planets + 3), 2))
     for name, sign in ((bearing.inner, 1.0), (bearing.outer, -1.0)):
@@ -407,7 +421,7 @@ def bearing_damping_matrix(
 
 
 def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float]) -> np.ndarray:
-    """Damping ratio (m,) of every mode from one a natural frequency; see `damping_matrix`."""
+    """Damping ratio (m,) of every mode from one a natural frequency; see `bearing_damping_matrix`."""
     given = np.atleast_1d(np.asarray(ratios, float))
     moving = frequency > 0.0
     steps = np.diff(frequency[moving], prepend=0.0) > _SAME * frequency[moving]
@@ -469,23 +483,6 @@ def class_shares(data: PlanarSet, shape) -> np.ndarray:
     See `femgear.system.mode_kinds.class_energies`, also for unequal spacing.
     """
     return energy_shares(planar_motions(data, shape))
-
-
-TAIL_LIMIT = 0.05
-"""Share of the amplitude in the upper half of the lines beyond which what they add up to is wrong."""
-# limit points closer than this, relative to the frequency, are one: corners of contact split them
-_SAME_FOLD = 2e-3
-# deflection [m] that counts as much as the whole range of frequencies along a branch
-_SCALE = 2e-3
-# instants of a period; with two base frequencies of either phase
-_SAMPLES = 2880
-_GRID = (256, 48)
-# relative errors of the monodromy matrices, and solutions judged together
-_COARSE, _FINE, _BATCH = 1e-3, 1e-6, 32
-# fluctuation of a force, relative to its mean, below which there is none: residual of the equations
-_STILL = 1e-6
-# what a curve holds of every point
-_ALONG = ("points", "parameter", "tangent", "iterations", "error")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,8 @@
-"""Results of a planar case as xarray datasets: modes.nc, branch.nc, response.nc.
+"""Results of a planar case: modes.nc, branch.nc, response.nc, their tables, and remarks on pictures.
 
-What a planar case is, and the numbers of its run.
+Lines of motions and forces belong to the real signals ``x(t) = Re sum_l x_l exp(i (order_l . theta(t)))``;
+every variable of a file carries its units. The tables say what the case is and what was found;
+`tail_warnings` and `planar_verdicts` say what speaks against it.
 """
 
 from __future__ import annotations
@@ -28,6 +30,31 @@ if TYPE_CHECKING:
     from femgear.system.system import Modes
     from femgear.trains.planar.model import MotionLines, PlanarModel
     from femgear.trains.planar.section import PlanarCase
+
+FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
+
+# instants of a turn of the weight at which forces are stored
+PHASES = 721
+
+_MANY = 8
+# distance of a multiplier from 1 at a limit point beyond which harmonics are missing
+_TRUNCATED = 0.2
+# share of the energy in the upper half of the lines beyond which it is said, as in the spectral stage
+_ENERGY = 1e-6
+# smoothing over mean compression that is said: the force is then wrong by (0.05 / 2)^2, 0.06 %
+_SMOOTH = 0.05
+_STABLE = {1: "yes", 0: "no", -1: "not known"}
+
+_BODIES = ("", "mass [kg]", "inertia [kg m^2]", "support [N/m]", "torsional support [N m/rad]")
+
+# Pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces.
+_BY_STABILITY = ("weight_response", "tooth_contact")
+_OF_RESPONSE = (
+    "response_orbit", "response_bearing_forces", "response_mesh_forces", "response_spectrum",
+    "contact_over_speed",
+)  # fmt: skip
+_OF_BRANCH = ("weight_response", "carrier_orbit", "planet_bearing_forces", "wedged_teeth", "tooth_contact")
+_OF_MOTION = ("weight_response", "carrier_orbit", "response_orbit")
 
 
 @dataclass(frozen=True)
@@ -75,13 +102,6 @@ class PlanarResponseResult:
         """Contents of response.nc."""
 
         return response_dataset(self)
-
-
-FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
-
-
-# instants of a turn of the weight at which forces are stored
-PHASES = 721
 
 
 def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
@@ -304,16 +324,6 @@ def _coordinates(gears) -> dict[str, tuple]:
     }
 
 
-_MANY = 8
-# distance of a multiplier from 1 at a limit point beyond which harmonics are missing
-_TRUNCATED = 0.2
-# share of the energy in the upper half of the lines beyond which it is said, as in the spectral stage
-_ENERGY = 1e-6
-# smoothing over mean compression that is said: the force is then wrong by (0.05 / 2)^2, 0.06 %
-_SMOOTH = 0.05
-_STABLE = {1: "yes", 0: "no", -1: "not known"}
-
-
 def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
     """Mesh stiffness, supports, weight and ranges of a planar case."""
     planar = case.planar
@@ -330,9 +340,6 @@ def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
         notes.append(f"weight {planar.gravity.acceleration:.6g} m/s^2; {_sense(case)}")
     notes.append(_smoothing(case, planetary))
     return Block("Planar model", _BODIES, tuple(_bodies(case)), tuple(notes))
-
-
-_BODIES = ("", "mass [kg]", "inertia [kg m^2]", "support [N/m]", "torsional support [N m/rad]")
 
 
 def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
@@ -577,16 +584,6 @@ def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
         )
     header = ("kind", "published [Hz]", "nearest here [Hz]", "difference [%]", "source")
     return Block("Published natural frequencies", header, tuple(rows))
-
-
-# Pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces.
-_BY_STABILITY = ("weight_response", "tooth_contact")
-_OF_RESPONSE = (
-    "response_orbit", "response_bearing_forces", "response_mesh_forces", "response_spectrum",
-    "contact_over_speed",
-)  # fmt: skip
-_OF_BRANCH = ("weight_response", "carrier_orbit", "planet_bearing_forces", "wedged_teeth", "tooth_contact")
-_OF_MOTION = ("weight_response", "carrier_orbit", "response_orbit")
 
 
 def remarks(results: Results, stem: str) -> Iterator[str]:

@@ -29,7 +29,6 @@ Clearance = Quantity(LENGTH, 0.0, 0.01)
 Torsion = Quantity(TORSION, 0.0, 1e15)
 Ratio = Number(0.0, 1.0, open_high=True)
 
-
 FIGURES = (
     "mode_shapes",
     "weight_response",

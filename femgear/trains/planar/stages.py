@@ -1,4 +1,7 @@
-"""The pipeline of a planar case: static (where no mesh stiffness is given) -> modes -> branch, response."""
+"""The pipeline of a planar case: static (where no mesh stiffness is given) -> modes -> branch, response.
+
+`PLANAR` at the end is the train: the table of its stages, with what the report says and draws of each.
+"""
 
 from __future__ import annotations
 
