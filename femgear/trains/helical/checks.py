@@ -1,4 +1,4 @@
-"""What the pipeline of a helical case refuses before it computes."""
+"""Refusals of a helical case before anything is computed: supports that are missing, torques too large."""
 
 from __future__ import annotations
 

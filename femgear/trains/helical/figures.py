@@ -1,6 +1,7 @@
-"""Figures of the helical planetary set: mode shapes from the front and from the side, mesh-force spectra.
+"""Figures of a helical case: modes from the front and from the side, stiffness of the meshes, mesh forces.
 
-Figures of modes.nc and dynamics.nc of helical cases.
+The first figures take the model and its response; those after them read modes.nc and dynamics.nc. `FIGURES`
+at the end ties the pictures of the report to their captions.
 """
 
 from __future__ import annotations
@@ -60,6 +61,9 @@ _SPLIT = 4
 _FRONT, _SIDE, _MOST = 1.25, 0.4, 1e4
 # widths of lines that lie on each other in the side view
 _WIDTHS = {"carrier": 1.6, "ring": 4.5, "sun": 3.2, "planets": 1.6}
+
+_MARKS = {"in phase": "o", "counter-phased": "s"}
+_COLUMNS, _HARMONICS, _SPEEDS = 4, 4, 4
 
 
 def helical_mode_shapes(
@@ -265,10 +269,6 @@ def _draw_spectra(ax, response: ErrorResponse, force: np.ndarray, meshes, marks)
     ax.set_yscale("log")
 
 
-_MARKS = {"in phase": "o", "counter-phased": "s"}
-_SHOWN_results, _COLUMNS, _HARMONICS, _SPEEDS = 12, 4, 4, 4
-
-
 @dataclass(frozen=True)
 class _Radii:
     """What the drawing of a mode needs of a set."""
@@ -322,7 +322,7 @@ def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float 
         No mode to show (E-MODES).
     """
     frequency = modes["frequency"].values
-    shown = np.flatnonzero(frequency > 0.0)[:_SHOWN_results]
+    shown = np.flatnonzero(frequency > 0.0)[:_SHOWN]
     if not len(shown):
         raise CaseError("no mode to draw", code="E-MODES", limit="a mode that is no rigid-body motion")
     data = _Radii(

@@ -1,32 +1,24 @@
-"""Helical planetary set of rigid bodies that move in space: the model of Kahraman (1994).
+"""Helical planetary set of rigid bodies that move in space: data, matrices, meshes, modes, forced response.
 
-Carrier, ring, sun and N planets have three translations and three rotations each, 6 (N + 3) coordinates.
-A. Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
+Carrier, ring, sun and N planets have three translations and three rotations each, 6 (N + 3) coordinates. A.
+Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
 springs along the tooth normals, supports and planet pins in all directions, without terms of the carrier's
 speed. Here all matrices follow from kinematics: every spring is a column of deflections ``w^T q`` and adds
-``k w w^T``; the meshes stay columns of W.
+``k w w^T``; the meshes stay columns of W. As elements, `helical_problem`, they have a stiffness that changes,
+play and contact loss.
 
-Coordinates: x, y and z of the central members, planets radially outwards, tangentially and along z; tilts
-``w = r phi`` about the same two axes in the plane and ``u = r theta`` about z, all right-handed. r is the
-base radius of the gears and the radius of the circle of planet centres for the carrier.
+Coordinates: x, y and z of the central members, planets radially outwards, tangentially and along z; tilts ``w
+= r phi`` about the same two axes in the plane and ``u = r theta`` about z, all right-handed. r is the base
+radius of the gears and the radius of the circle of planet centres for the carrier.
 
-Refusals of data that no helical planetary set can have.
+The mesh stiffness follows from that of spur teeth. A helical gear is cut across its axis into thin slices,
+each of them a spur gear that is turned by the helix against its neighbour, and the slices carry side by side
+without any coupling between them (thin-slice approximation, J. D. Smith, Gear Noise and Vibration, 2nd ed.,
+2003). It leaves out that loaded slices draw unloaded neighbours along, and that teeth are softer at their
+ends. Each slice has the stiffness of the spur gear of its normal section, per length of the contact line.
 
-Data of the helical planetary set: bodies with six motions, supports, radii, helix, contact points.
-
-Helical planetary set with mesh stiffness that changes, play and contact loss.
-
-Mesh stiffness of helical teeth from that of spur teeth: thin slices that follow each other.
-
-A helical gear is cut across its axis into thin slices, each of them a spur gear that is turned by the helix
-against its neighbour, and the slices carry side by side without any coupling between them (thin-slice
-approximation, J. D. Smith, Gear Noise and Vibration, 2nd ed., 2003). It leaves out that loaded slices draw
-unloaded neighbours along, and that teeth are softer at their ends. Each slice has the stiffness of the spur
-gear of its normal section, per length of the contact line.
-
-Modes of the helical planetary set, their kinds and phasing, and where their energy sits.
-
-Forced response of planetary sets to transmission errors by modal summation: meshes, pins, bearings.
+The forced response to transmission errors is a modal summation, which also gives the loads of meshes, pins
+and bearings.
 """
 
 from __future__ import annotations
@@ -71,56 +63,16 @@ CONTACT_POINTS = ("pitch_point", "base_circles")
 # Rounded numbers miss each other by less than 1 %, other distances or angles than those of the gears by more.
 LARGEST_CLOSURE = 0.1
 
+CENTRAL_AXES = ("x", "y", "z", "tilt x", "tilt y", "u")
+PLANET_AXES = ("radial", "tangential", "z", "tilt radial", "tilt tangential", "u")
 
-def check_set(data: HelicalSet) -> None:
-    """Refuse radii, angles, stiffnesses, slices and contact points (E-HELICAL)."""
-    for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
-        value = numbers(name, getattr(data, name), 0)
-        if not (math.isfinite(value) and value > 0.0):
-            refuse_helical(name, value, "m", "finite and above 0")
-    if data.ring_radius <= data.planet_radius:
-        refuse_helical(
-            "ring_radius", data.ring_radius, "m", f"above the {data.planet_radius} m of the planets"
-        )
-    for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
-        value = numbers(name, getattr(data, name), 0)
-        if not 0.0 < value < 0.5 * math.pi:
-            refuse_helical(name, value, "rad", "between 0 and pi/2", remedy="give radians")
-    if not abs(numbers("base_helix_angle", data.base_helix_angle, 0)) < 0.5 * math.pi:
-        allowed = "between -pi/2 and pi/2"
-        refuse_helical("base_helix_angle", data.base_helix_angle, "rad", allowed, remedy="give radians")
-    for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
-        values = getattr(data, name)
-        if values.shape != (data.n_planets,):
-            refuse_helical(name, f"{values.size} values", "", f"one number, or {data.n_planets}")
-        wrong = ~np.isfinite(values) | (values < 0.0)
-        if np.any(wrong):
-            refuse_helical(name, values[wrong][0], "N/m", "finite, 0 or more")
-    check_support("planet_bearing", data.planet_bearing, count=data.n_planets)
-    check_angles(data.planet_angles, code="E-HELICAL")
-    _check_contact(data)
-    _check_closure(data)
+KINDS = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}
+SPRINGS = ("radial", "axial", "tilt", "torsional")
+# Relative distance of frequencies that rounding alone makes.
+_ONE_FREQUENCY = 1e-9
 
-
-def _check_contact(data: HelicalSet) -> None:
-    if data.contact_points not in CONTACT_POINTS:
-        refuse_helical("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
-    if isinstance(data.slices, bool) or int(data.slices) != data.slices or data.slices < 1:
-        refuse_helical("slices", data.slices, "", "a whole number of 1 or more")
-    if not (math.isfinite(data.face_width) and data.face_width >= 0.0):
-        refuse_helical("face_width", data.face_width, "m", "finite, 0 or more")
-    if data.slices > 1 and not data.face_width:
-        refuse_helical("face_width", data.face_width, "m", "above 0 for several slices")
-
-
-def _check_closure(data: HelicalSet) -> None:
-    worst = max(data.closure, key=abs)
-    if abs(worst) > LARGEST_CLOSURE:
-        refuse_helical(
-            "centre_distance", data.centre_distance, "m",
-            f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {LARGEST_CLOSURE:.0%}",
-            remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
-        )  # fmt: skip
+# Distance to an undamped pole, relative to it, below which the response is infinite.
+_RESONANT = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -292,8 +244,55 @@ def body_masses(data: HelicalSet) -> np.ndarray:
     return np.array([[b.mass] * 3 + [b.diametral_inertia / r**2] * 2 + [b.inertia / r**2] for b, r in bodies])
 
 
-CENTRAL_AXES = ("x", "y", "z", "tilt x", "tilt y", "u")
-PLANET_AXES = ("radial", "tangential", "z", "tilt radial", "tilt tangential", "u")
+def check_set(data: HelicalSet) -> None:
+    """Refuse radii, angles, stiffnesses, slices and contact points (E-HELICAL)."""
+    for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
+        value = numbers(name, getattr(data, name), 0)
+        if not (math.isfinite(value) and value > 0.0):
+            refuse_helical(name, value, "m", "finite and above 0")
+    if data.ring_radius <= data.planet_radius:
+        refuse_helical(
+            "ring_radius", data.ring_radius, "m", f"above the {data.planet_radius} m of the planets"
+        )
+    for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
+        value = numbers(name, getattr(data, name), 0)
+        if not 0.0 < value < 0.5 * math.pi:
+            refuse_helical(name, value, "rad", "between 0 and pi/2", remedy="give radians")
+    if not abs(numbers("base_helix_angle", data.base_helix_angle, 0)) < 0.5 * math.pi:
+        allowed = "between -pi/2 and pi/2"
+        refuse_helical("base_helix_angle", data.base_helix_angle, "rad", allowed, remedy="give radians")
+    for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
+        values = getattr(data, name)
+        if values.shape != (data.n_planets,):
+            refuse_helical(name, f"{values.size} values", "", f"one number, or {data.n_planets}")
+        wrong = ~np.isfinite(values) | (values < 0.0)
+        if np.any(wrong):
+            refuse_helical(name, values[wrong][0], "N/m", "finite, 0 or more")
+    check_support("planet_bearing", data.planet_bearing, count=data.n_planets)
+    check_angles(data.planet_angles, code="E-HELICAL")
+    _check_contact(data)
+    _check_closure(data)
+
+
+def _check_contact(data: HelicalSet) -> None:
+    if data.contact_points not in CONTACT_POINTS:
+        refuse_helical("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
+    if isinstance(data.slices, bool) or int(data.slices) != data.slices or data.slices < 1:
+        refuse_helical("slices", data.slices, "", "a whole number of 1 or more")
+    if not (math.isfinite(data.face_width) and data.face_width >= 0.0):
+        refuse_helical("face_width", data.face_width, "m", "finite, 0 or more")
+    if data.slices > 1 and not data.face_width:
+        refuse_helical("face_width", data.face_width, "m", "above 0 for several slices")
+
+
+def _check_closure(data: HelicalSet) -> None:
+    worst = max(data.closure, key=abs)
+    if abs(worst) > LARGEST_CLOSURE:
+        refuse_helical(
+            "centre_distance", data.centre_distance, "m",
+            f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {LARGEST_CLOSURE:.0%}",
+            remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
+        )  # fmt: skip
 
 
 def helical_dofs(n_planets: int) -> tuple[str, ...]:
@@ -473,7 +472,7 @@ def helical_meshes(
     data : HelicalSet
     stiffness : FourierSeries, StepSeries or MeshExcitation, optional
         Of the 2N S columns [N/m], or their record as from
-        `femgear.trains.helical.model.helical_excitation`; the constant stiffnesses of the set when not
+        `helical_excitation`; the constant stiffnesses of the set when not
         given.
     harmonics, orders
         Of a record, see `femgear.system.elements.gear_meshes`.
@@ -561,12 +560,12 @@ def helical_excitation(
     record : MeshExcitation or MeshCycle
         Of the spur gears of the normal section with the face width `contact_line_width`, all of it loaded as
         the whole helical mesh; stiffnesses and deflections along the tooth normals. Mesh phases are those at
-        mid-face. A `MeshCycle` knows no backlash, which is then zero.
+        mid-face. A `femgear.contact.cycle.MeshCycle` knows no backlash, which is then zero.
     overlap_ratio : float or (n_meshes,) array
         eps_beta, 0 or more.
     slices : int
         Number S of equal slices of the face width; each has a row of its own with its part of stiffness and
-        force, in the order of the columns of `femgear.trains.helical.model.mesh_directions`.
+        force, in the order of the columns of `mesh_directions`.
     hand : {1, -1}
         1 where height +z runs ahead: a right-handed sun that turns counter-clockwise against the carrier, or
         a left-handed one that turns clockwise. Only slices see it.
@@ -644,12 +643,6 @@ def _overlap(overlap_ratio, meshes: int) -> np.ndarray:
             limit=f"one number of 0 or more, or {meshes}", remedy="give b sin|beta| / (pi m_n)",
         )  # fmt: skip
     return np.broadcast_to(overlap, (meshes,))
-
-
-KINDS = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}
-SPRINGS = ("radial", "axial", "tilt", "torsional")
-# Relative distance of frequencies that rounding alone makes.
-_ONE_FREQUENCY = 1e-9
 
 
 def helical_modes(
@@ -791,10 +784,6 @@ def _by_direction(name: str, columns: np.ndarray, stiffness: np.ndarray) -> dict
     }
 
 
-# Distance to an undamped pole, relative to it, below which the response is infinite.
-_RESONANT = 1e-12
-
-
 @dataclass(frozen=True)
 class ErrorResponse:
     """Response of several cases to transmission errors on harmonics of the mesh frequency.
@@ -895,8 +884,8 @@ def spring_loads(springs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[
     Parameters
     ----------
     springs : mapping of str to (columns (n, g), stiffness (g,))
-        From `helical_springs` or `planar_springs`; those of meshes give ``k W^T q`` without the transmission
-        error, whose force is in `ErrorResponse.force`.
+        From `helical_springs` or `femgear.system.assembler.planar_springs`; those of meshes give ``k W^T q``
+        without the transmission error, whose force is in `ErrorResponse.force`.
 
     Returns
     -------

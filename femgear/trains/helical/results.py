@@ -1,6 +1,7 @@
-"""Results of a helical case as xarray datasets: modes.nc, dynamics.nc.
+"""Results of a helical case: modes.nc, dynamics.nc, and the tables of the case and of its stiffness.
 
-What a helical case is, as tables.
+Every variable of a file carries its units; complex harmonics are stored as real and imaginary parts.
+static.nc of a helical case holds spur gears, and its table sets the helical numbers beside theirs.
 """
 
 from __future__ import annotations
@@ -37,6 +38,12 @@ if TYPE_CHECKING:
     from femgear.system.system import MechanicalSystem, Modes, Response
     from femgear.trains.helical.model import HelicalSet
     from femgear.trains.helical.section import HelicalCase
+
+AXES = ("x", "y", "z", "tilt x", "tilt y", "rotation")
+
+_BODIES = (
+    "", "mass [kg]", "polar, diametral inertia [kg m^2]", "radial, axial [N/m]", "tilt, torsional [N m/rad]",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -82,9 +89,6 @@ class HelicalDynamicsResult:
         """Contents of dynamics.nc."""
 
         return helical_dynamics_dataset(self)
-
-
-AXES = ("x", "y", "z", "tilt x", "tilt y", "rotation")
 
 
 def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
@@ -223,11 +227,6 @@ def describe_helical(case: HelicalCase, planetary: PlanetarySet) -> tuple[Block,
     return _teeth(case, planetary), Block(
         "Helical model", _BODIES, tuple(_bodies(case)), _model(case, planetary)
     )
-
-
-_BODIES = (
-    "", "mass [kg]", "polar, diametral inertia [kg m^2]", "radial, axial [N/m]", "tilt, torsional [N m/rad]",
-)  # fmt: skip
 
 
 def _teeth(case: HelicalCase, s: PlanetarySet) -> Block:

@@ -14,13 +14,14 @@ from femgear.case.units import ANGLE, INERTIA, MASS, STIFFNESS, TORSION
 from femgear.errors import CaseError
 
 LARGEST_HELIX = math.radians(45.0)
-# stiffer supports are lost in the rounding of those that mesh springs feel
-Stiffness = Quantity(STIFFNESS, 0.0, 1e14)
-Turning = Quantity(TORSION, 0.0, 1e13)
 MOST_SLICES = 30
 # measured with 8 meshes of 10 to 30 slices: the time of one speed grows with the cube of the columns
 _SECONDS = 2.7e-7
 _LONG = 60.0
+
+# stiffer supports are lost in the rounding of those that mesh springs feel
+Stiffness = Quantity(STIFFNESS, 0.0, 1e14)
+Turning = Quantity(TORSION, 0.0, 1e13)
 Diametral = Quantity(INERTIA, 1e-12, 1e8)
 
 

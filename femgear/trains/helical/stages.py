@@ -1,4 +1,7 @@
-"""The pipeline of a helical case: static (where no mesh stiffness is given) -> modes -> dynamics."""
+"""The pipeline of a helical case: static (where no mesh stiffness is given) -> modes -> dynamics.
+
+`HELICAL` at the end is the train: the table of its stages, with what the report says and draws of each.
+"""
 
 from __future__ import annotations
 
@@ -42,6 +45,8 @@ if TYPE_CHECKING:
     from femgear.storage.results import Results
     from femgear.system.system import MechanicalSystem, Response
     from femgear.trains.helical.model import HelicalSet
+
+_SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "tooth_loads")
 
 
 def solve_helical_static(
@@ -204,9 +209,6 @@ def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarr
         support[:, row] = (meshes - on_pins) * scale.ravel()[row]
     shape = (len(found), -1, 6, found.shape[-1])
     return {"pin": pin.reshape(shape), "support": support.reshape(shape)}
-
-
-_SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "tooth_loads")
 
 
 def _remarks(results: Results, stem: str) -> Iterator[str]:

@@ -1,6 +1,7 @@
-"""What a helical case means for the helical set: bodies, supports, radii, helix, torque.
+"""From a helical case to the helical set, and from spur gears to the stiffness of its teeth.
 
-Stiffness of helical teeth from the static solution of the transverse section, as the normal one has it.
+Bodies, supports, radii, helix and torque are those of the case. Teeth are solved as spur gears of the
+transverse section; those of the normal section, the virtual gears, tell by how much their stiffness differs.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
     from femgear.system.lumped import PlanarTorque
     from femgear.trains.helical.model import HelicalSet
+
+# both sections are solved on the same grid, and only the ratio of their stiffnesses counts
+FLANK_ELEMENTS, POSITIONS = 8, 16
 
 
 def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) -> HelicalSet:
@@ -95,10 +99,6 @@ def torque_of(case: HelicalCase) -> PlanarTorque:
     from femgear.system.lumped import PlanarTorque
 
     return PlanarTorque(case.operation.torque, case.operation.input, output_member(case))
-
-
-# both sections are solved on the same grid, and only the ratio of their stiffnesses counts
-FLANK_ELEMENTS, POSITIONS = 8, 16
 
 
 @dataclass(frozen=True)
