@@ -29,6 +29,7 @@ STABILITY = {1: ("-", "stable"), 0: ("--", "not stable"), -1: (":", "stability n
 _DOUBTFUL = "too few harmonics, not to be trusted (W-TAIL)"
 _PALE = "#F6D48F"
 _AXIS = "frequency of the weight in the carrier frame [Hz]"
+# limit points that are labelled, at most
 _LABELS = 4
 # difference of two curves, relative to the range they are drawn over, that cannot be seen
 _EQUAL = 5e-3

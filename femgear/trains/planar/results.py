@@ -36,6 +36,7 @@ FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
 # instants of a turn of the weight at which forces are stored
 PHASES = 721
 
+# rows of a table of speeds, and speeds in a sentence
 _MANY = 8
 # distance of a multiplier from 1 at a limit point beyond which harmonics are missing
 _TRUNCATED = 0.2
@@ -47,7 +48,7 @@ _STABLE = {1: "yes", 0: "no", -1: "not known"}
 
 _BODIES = ("", "mass [kg]", "inertia [kg m^2]", "support [N/m]", "torsional support [N m/rad]")
 
-# Pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces.
+# pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces
 _BY_STABILITY = ("weight_response", "tooth_contact")
 _OF_RESPONSE = (
     "response_orbit", "response_bearing_forces", "response_mesh_forces", "response_spectrum",
