@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from femgear.system.system import MeshExcitation, Modes, Response
     from femgear.trains.elastic.model import ElasticSet, RingModel
 
+# speeds, and bands at each of them, that are listed
 _FEW = 4
-_FIRST, _STRONGEST = 6, 4  # bands that are listed
+_FIRST, _STRONGEST = 6, 4
 
 
 @dataclass(frozen=True)

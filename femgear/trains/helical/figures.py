@@ -55,15 +55,14 @@ if TYPE_CHECKING:
 
 _CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
 _BODIES = {"carrier": GREEN, "ring": BLACK, "sun": VERMILION, "planets": BLUE}
-_SHOWN = 12
-_SPLIT = 4
+# modes that are shown and that stand in a row, harmonics of mesh forces, speeds
+_SHOWN, _COLUMNS, _HARMONICS, _SPEEDS = 12, 4, 4, 4
 # half heights of the views over the ring's radius, and the largest magnification of small motions
 _FRONT, _SIDE, _MOST = 1.25, 0.4, 1e4
 # widths of lines that lie on each other in the side view
 _WIDTHS = {"carrier": 1.6, "ring": 4.5, "sun": 3.2, "planets": 1.6}
 
 _MARKS = {"in phase": "o", "counter-phased": "s"}
-_COLUMNS, _HARMONICS, _SPEEDS = 4, 4, 4
 
 
 def helical_mode_shapes(
@@ -100,7 +99,7 @@ def helical_mode_shapes(
     if not shown or min(shown) < 0 or max(shown) >= len(modes.frequency):
         raise CaseError(f"modes {shown} to draw", code="E-MODES", limit=f"0 to {len(modes.frequency) - 1}")
     motions, names = _motions(data, modes.shape), phasing(helical_motions(data, modes.shape))
-    columns = min(_SPLIT, len(shown))
+    columns = min(_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
     figure, axes = new_figure(rows=2 * rows, columns=columns, width=2.7 * columns, height=4.3 * rows + 0.6)
     axes[0].get_gridspec().set_height_ratios([_FRONT, _SIDE] * rows)

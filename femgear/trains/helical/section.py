@@ -17,6 +17,7 @@ LARGEST_HELIX = math.radians(45.0)
 MOST_SLICES = 30
 # measured with 8 meshes of 10 to 30 slices: the time of one speed grows with the cube of the columns
 _SECONDS = 2.7e-7
+# time that is worth a notice [s]
 _LONG = 60.0
 
 # stiffer supports are lost in the rounding of those that mesh springs feel

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from femgear.case.sections import Case
     from femgear.gears.planetary import PlanetarySet
 
+# harmonics whose phasing is listed
 HARMONICS = 6
+# neighbouring sets: how far their teeth and ratio may lie away, and how many are listed
 DISTANCE, TOLERANCE = 3, 0.02
 ROWS = 8
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
