@@ -1,8 +1,8 @@
-"""Motions of a drivetrain that nothing holds, whatever the sizes of its springs and inertias.
+"""Checks of a drivetrain: loose motions, frequencies that lie too far apart, and which body drives a stage.
 
-Natural frequencies of a drivetrain case that are too far apart for double precision.
-
-Which body of every gear stage drives under given torques, and with it the loaded flanks.
+A motion that nothing holds is found whatever the sizes of springs and inertias; natural frequencies may not
+lie further apart than double precision resolves beside the free spin. The driver of every gear stage, and
+with it the loaded flanks, follows from statics under the given torques.
 """
 
 from __future__ import annotations
@@ -26,8 +26,14 @@ from femgear.trains.drivetrain.section import DrivetrainCase
 from femgear.trains.drivetrain.time import static_deviations
 
 # Stiffness of a motion over that of its coordinates alone; a chain of 1500 coordinates keeps 1e-10.
-_NOTHING = 1e-12
+_NOT_RESISTED = 1e-12
+# Share of the largest motion that counts as moved, and coordinates that are named.
 _MOVED, _NAMED = 1e-3, 6
+
+# Force of a mesh, over the sum of what the single torques would give, that is rounding.
+_NO_FORCE = 1e-6
+# Torsional stiffness that stands for a rigid shaft, over that of the stiffest mesh.
+_RIGID = 1e3
 
 
 def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tuple[str, ...]]:
@@ -65,7 +71,7 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     # the spin is known, and held
     spin = model.rigid * size
     scaled = stiffness / np.outer(size, size) + np.outer(spin, spin) / (spin @ spin)
-    count = int(np.count_nonzero(linalg.eigvalsh(scaled) < _NOTHING))
+    count = int(np.count_nonzero(linalg.eigvalsh(scaled) < _NOT_RESISTED))
     if not count:
         return 0, ()
     return count, _names(train, model, linalg.eigh(scaled, subset_by_index=(0, count - 1))[1])
@@ -204,12 +210,6 @@ def _softest(train: Drivetrain) -> tuple[float, tuple[str, str], str]:
     return min(found)
 
 
-# Force of a mesh, over the sum of what the single torques would give, that is rounding.
-_NOTHING_drivers = 1e-6
-# Torsional stiffness that stands for a rigid shaft, over that of the stiffest mesh.
-_RIGID = 1e3
-
-
 def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
     """The drivetrain with the driver of every stage that the torques make drive.
 
@@ -286,7 +286,7 @@ def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration:
     total = sums.sum(axis=1)
     # the model's flanks are those of the drivers that are given
     default = [one.flank for one in (*train.planetary, *train.parallel)]
-    return np.where(np.abs(total) > _NOTHING_drivers * np.abs(sums).sum(axis=1), total * default, 0.0)
+    return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)
 
 
 def _elastic(train: Drivetrain) -> Drivetrain:

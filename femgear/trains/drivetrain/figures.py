@@ -1,12 +1,10 @@
-"""Figures of drivetrains: mesh stiffness, deviations, contact forces, spectra, side bands, sensitivity.
+"""Figures of a drivetrain case: modes.nc, transient.nc, spectrum.nc, and the lowest elastic modes in space.
 
-Panels at places given in inches: looking for places takes matplotlib longer than drawing the figure.
-
-Figures of a drivetrain run, from modes.nc, transient.nc and spectrum.nc.
-
-Pictures of a drivetrain run: figures of all stages, and the lowest elastic modes in space.
-
-Where the bodies of a drivetrain stand in space, for drawings of mode shapes.
+The first figures take plain curves: mesh stiffness, signals over time, spectra with named lines, forces with
+contact loss, sensitivity to assumed inputs. Their panels stand at places given in inches: looking for places
+takes matplotlib longer than drawing the figure. Those after them read the files; `drivetrain_layout` places
+the bodies in space for the pictures of modes. `FIGURES` at the end ties the pictures of the report to their
+captions.
 """
 
 from __future__ import annotations
@@ -22,15 +20,15 @@ from matplotlib.figure import Figure
 
 from femgear.report.frequency import campbell
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
+from femgear.storage.dataset import RPM
 from femgear.trains.drivetrain.data import Drivetrain, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel, coordinates_of, free_coordinates
-from femgear.trains.drivetrain.results import _MOST_PANELS, chosen_meshes, symbols
+from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, symbols
 from femgear.trains.drivetrain.time import PASS_BAND
 from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
     import xarray as xr
-
 
 # Inches: beside the panels, below the last, above the first, between two with and without numbers in between.
 _LEFT, _RIGHT, _BOTTOM, _TOP, _GAP, _SHARED = 0.95, 0.2, 0.95, 0.35, 0.75, 0.5
@@ -42,9 +40,22 @@ _PIXELS, _POINTS = 900, 4
 _WIDTHS, _ALPHAS = (0.9, 2.4), (1.0, 0.5)
 # Distance of the names of two lines over the width of the axes.
 _NAME = 0.0165
+# Largest value that is drawn.
 _LARGEST = 1e100
 # Least span of an ordinate that does not reach zero, over its largest value.
 _LEAST = 0.02
+# Harmonics of the mesh lines that are marked, and how far beyond the last of the highest line spectra reach.
+_HARMONICS = 3
+_REACH = 1.04 * _HARMONICS
+# Reach of side bands in turns or planetary mesh lines.
+_TURNS, _BESIDE = 8.0, 1.3
+# Fewer lines are no picture of side bands.
+_LEAST_LINES = 24
+
+# Radius of bodies that carry no gear, and distance of wheels side by side, over the largest gear radius.
+_PLAIN, _WHEEL_GAP = 0.9, 0.45
+# Phi of a shaft that shears and hardly bends: more does not show.
+_SHEAR_ALONE = 1e6
 
 
 def panels(
@@ -370,16 +381,6 @@ def backlash_forces(time, curves: Sequence[tuple], *, title: str = ""):
     return over_time(time, [(title, curves)], unit="mesh force [kN]", factor=1e-3)
 
 
-RPM = np.pi / 30.0
-# Harmonics of the mesh lines that are marked, and how far beyond the last of the highest line spectra reach.
-_HARMONICS = 3
-_REACH = 1.04 * _HARMONICS
-# Reach of side bands in turns or planetary mesh lines.
-_TURNS, _BESIDE = 8.0, 1.3
-# Fewer lines are no picture of side bands.
-_LEAST_LINES = 24
-
-
 def stiffness_figure(model: DrivetrainModel):
     """Series of the mesh stiffness of every stage, and the rectangular wave.
 
@@ -399,7 +400,7 @@ def stiffness_figure(model: DrivetrainModel):
         row += 2 * planets
     waves += [(row + i, stage.mesh) for i, stage in enumerate(train.parallel)]
     curves, steps = [], []
-    for row, wave in waves[:_MOST_PANELS]:
+    for row, wave in waves[:MOST_PANELS]:
         text = names[row]
         curves.append((text, FourierSeries(model.stiffness[row]).at(2.0 * np.pi * phase[:, None])[:, 0]))
         low, high, share = stiffness_levels(wave)
@@ -429,7 +430,7 @@ def transient_figures(data: xr.Dataset) -> dict:
     """Speeds, deviations and mesh forces over time, by name."""
     bodies, names = ([str(name) for name in data[key].values] for key in ("body", "mesh"))
     ends, meshes = sorted({0, len(bodies) - 1}), chosen_meshes(data)
-    shown = [i for i in range(len(bodies)) if i][-_MOST_PANELS:] or [0]
+    shown = [i for i in range(len(bodies)) if i][-MOST_PANELS:] or [0]
     passed = _pass_band(data)
     turned = [f"{bodies[i]}: rotation less the free spin" for i in shown]
     figures = {
@@ -578,49 +579,6 @@ def _side_bands(data, base: int, lines, title: str):
     )  # fmt: skip
 
 
-def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
-    from femgear.trains.drivetrain.setup import case_model
-
-    model = case_model(drawn.case)
-    figures = {"stiffness_series": stiffness_figure(model)} if len(model.meshes) else {}
-    return figures | {"campbell": campbell_figure(drawn.data["modes"])}
-
-
-def _write_modes(drawn: Drawn, folder: Path) -> list[str]:
-    from femgear.trains.drivetrain.setup import case_model
-
-    count = drawn.case.simulation.modes
-    return mode_pictures(folder, case_model(drawn.case), drawn.data["modes"], count)
-
-
-def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
-    """The lowest elastic modes as PNG files; returns their names.
-
-    Modes have the numbers of the table: the free spin, which is not drawn, is the first.
-    """
-    from femgear.trains.drivetrain.scene import ModeView, drivetrain_pictures
-
-    layout = drivetrain_layout(model.train)
-    wheels = [(w.centre, w.radius, w.width, w.body) for w in layout.wheels]
-    kinds, hertz = modes["kind"].values.astype(str), modes["frequency"].values
-    names, views = [], []
-    for mode in np.flatnonzero(kinds != "rigid")[:count].tolist():
-        shape = modes["shape"].values[:, mode]
-        title = f"mode {mode + 1}: {hertz[mode]:.2f} Hz, {kinds[mode]}"
-        names.append(f"drivetrain_mode_{mode + 1}.png")
-        moved = layout_motion(model, layout, shape)
-        views.append(ModeView(folder / names[-1], title, *moved, shaft_lines(model, layout, shape)))
-    if views:
-        drivetrain_pictures(views, wheels=wheels, centres=layout.centre, names=layout.names)
-    return names
-
-
-# Radius of bodies that carry no gear, and distance of wheels side by side, over the largest gear radius.
-_PLAIN, _BESIDE_layout = 0.9, 0.45
-# Phi of a shaft that shears and hardly bends: more does not show.
-_SHEAR_ALONE = 1e6
-
-
 @dataclass(frozen=True)
 class Wheel:
     """A disc: name, centre (3,), radius and width [m]; index of the body's centre in `Layout.centre`."""
@@ -656,7 +614,7 @@ def drivetrain_layout(train: Drivetrain) -> Layout:
     links = [(s.first, s.second, np.array([0.0, 0.0, s.length])) for s in train.shafts]
     for s in train.parallel:
         apart = s.first_radius + s.second_radius
-        beside = _BESIDE_layout * size if any(s.first == other.second for other in train.parallel) else 0.0
+        beside = _WHEEL_GAP * size if any(s.first == other.second for other in train.parallel) else 0.0
         arm = [
             apart * math.cos(s.direction),
             apart * math.sin(s.direction),
@@ -816,6 +774,43 @@ def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
         3.0 * xi**2 - 2.0 * xi**3 + phi * xi,
         -length * (xi**2 * rest + 0.5 * phi * xi * rest),
     ], axis=-1) / (1.0 + phi)  # fmt: skip
+
+
+def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
+    """The lowest elastic modes as PNG files; returns their names.
+
+    Modes have the numbers of the table: the free spin, which is not drawn, is the first.
+    """
+    from femgear.trains.drivetrain.scene import ModeView, drivetrain_pictures
+
+    layout = drivetrain_layout(model.train)
+    wheels = [(w.centre, w.radius, w.width, w.body) for w in layout.wheels]
+    kinds, hertz = modes["kind"].values.astype(str), modes["frequency"].values
+    names, views = [], []
+    for mode in np.flatnonzero(kinds != "rigid")[:count].tolist():
+        shape = modes["shape"].values[:, mode]
+        title = f"mode {mode + 1}: {hertz[mode]:.2f} Hz, {kinds[mode]}"
+        names.append(f"drivetrain_mode_{mode + 1}.png")
+        moved = layout_motion(model, layout, shape)
+        views.append(ModeView(folder / names[-1], title, *moved, shaft_lines(model, layout, shape)))
+    if views:
+        drivetrain_pictures(views, wheels=wheels, centres=layout.centre, names=layout.names)
+    return names
+
+
+def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
+    from femgear.trains.drivetrain.setup import case_model
+
+    model = case_model(drawn.case)
+    figures = {"stiffness_series": stiffness_figure(model)} if len(model.meshes) else {}
+    return figures | {"campbell": campbell_figure(drawn.data["modes"])}
+
+
+def _write_modes(drawn: Drawn, folder: Path) -> list[str]:
+    from femgear.trains.drivetrain.setup import case_model
+
+    count = drawn.case.simulation.modes
+    return mode_pictures(folder, case_model(drawn.case), drawn.data["modes"], count)
 
 
 FIGURES = {

@@ -1,8 +1,8 @@
-"""Results of a drivetrain case as xarray datasets: modes.nc, transient.nc, spectrum.nc.
+"""Results of a drivetrain case: modes.nc, transient.nc, spectrum.nc, their tables and warnings.
 
-What the motion of a drivetrain says against itself.
-
-Tables of drivetrains: the chain of a case, and the numbers of a run.
+Every variable of a file carries its units. `transient_warnings` tells what the motion says against itself;
+`describe_drivetrain` and `drivetrain_warnings` are about the chain of the case, the other tables about the
+numbers of a run.
 """
 
 from __future__ import annotations
@@ -39,28 +39,29 @@ if TYPE_CHECKING:
     from femgear.trains.drivetrain.spectra import AveragedSpectrum, MeshLine
     from femgear.trains.drivetrain.time import DrivetrainRun, SpeedRange
 
-_MOST_PANELS = 6
-
+# Panels of a figure.
+MOST_PANELS = 6
 
 _PLANET = re.compile(r"(?:^|-)planet (\d+)(?: \d+)?(?:-ring of |$)")
 
+# Share of rotations in the kinetic energy above which a mode is torsional; bending below what is left.
+_TORSION = 0.9
 
-def chosen_meshes(data: xr.Dataset) -> list[int]:
-    """One mesh of every kind: of planet 1 of every planetary stage, and of every parallel stage."""
-    numbers = [_PLANET.search(str(name)) for name in data["mesh"].values]
-    return [i for i, found in enumerate(numbers) if found is None or found[1] == "1"][:_MOST_PANELS]
+# The step rule keeps energy and momentum exactly: more is rounding that grew, or a motion that runs away.
+_BALANCE = 1e-6
+# Linear meshes: a free motion that grows by more than this over a run is no longer small.
+GROWN = 10.0
+# The same between any two instants of it.
+_GAINED = 1e3
+# A force that is rounding [N].
+_NOTHING = 1e-6
 
-
-def symbols(data: xr.Dataset) -> list[str]:
-    """Short names of the base frequencies of spectrum.nc: t, or t1 .., turns of carriers; f1 .. meshes."""
-    stages, found, meshes = int(data.attrs["planetary_stages"]), [], 0
-    for base in range(data.sizes["base"]):
-        if base < 2 * stages and base % 2 == 0:
-            found.append("t" if stages == 1 else f"t{base // 2 + 1}")
-        else:
-            meshes += 1
-            found.append(f"f{meshes}")
-    return found
+# Modes of the table.
+_SHOWN = 16
+# A speed that changes by more is worth a remark.
+_CHANGE = 2.0
+# Share by which steps may lower the frequency of a mode that the meshes drive, and a small one.
+_SHIFT, _SMALL_SHIFT = 1e-2, 1e-3
 
 
 @dataclass(frozen=True)
@@ -109,10 +110,6 @@ class SpectrumResult:
         """Contents of spectrum.nc."""
 
         return spectrum_dataset(self)
-
-
-# Share of rotations in the kinetic energy above which a mode is torsional; bending below what is left.
-_TORSION = 0.9
 
 
 def _names(name: str, values, long_name: str) -> tuple:
@@ -316,16 +313,6 @@ def spectrum_dataset(result: SpectrumResult) -> xr.Dataset:
     return dataset(variables, coords, attrs)
 
 
-# The step rule keeps energy and momentum exactly: more is rounding that grew, or a motion that runs away.
-_BALANCE = 1e-6
-# Linear meshes: a free motion that grows by more than this over a run is no longer small.
-GROWN = 10.0
-# The same between any two instants of it.
-_GAINED = 1e3
-# A force that is rounding [N].
-_NOTHING = 1e-6
-
-
 def transient_warnings(data: xr.Dataset) -> Iterator[str]:
     """What transient.nc says against itself."""
     pulling, least = data["pulling"].values, data["least_force"].values
@@ -414,13 +401,6 @@ def largest_gains(data: xr.Dataset) -> dict[str, float]:
 def shown_factor(power: float) -> str:
     """Ten to a power that may be beyond all numbers."""
     return f"{10.0**power:.3g}" if power < 300.0 else f"1e{power:.0f}" if math.isfinite(power) else "1e308"
-
-
-_SHOWN = 16
-# A speed that changes by more is worth a remark.
-_CHANGE = 2.0
-# Share by which steps may lower the frequency of a mode that the meshes drive, and a small one.
-_SHIFT, _SMALL_SHIFT = 1e-2, 1e-3
 
 
 def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
@@ -745,3 +725,21 @@ def _combination(orders, names) -> str:
         size = name if abs(count) == 1 else f"{abs(count)} {name}"
         terms += f" {'-' if count < 0 else '+'} {size}" if terms else size
     return terms
+
+
+def chosen_meshes(data: xr.Dataset) -> list[int]:
+    """One mesh of every kind: of planet 1 of every planetary stage, and of every parallel stage."""
+    numbers = [_PLANET.search(str(name)) for name in data["mesh"].values]
+    return [i for i, found in enumerate(numbers) if found is None or found[1] == "1"][:MOST_PANELS]
+
+
+def symbols(data: xr.Dataset) -> list[str]:
+    """Short names of the base frequencies of spectrum.nc: t, or t1 .., turns of carriers; f1 .. meshes."""
+    stages, found, meshes = int(data.attrs["planetary_stages"]), [], 0
+    for base in range(data.sizes["base"]):
+        if base < 2 * stages and base % 2 == 0:
+            found.append("t" if stages == 1 else f"t{base // 2 + 1}")
+        else:
+            meshes += 1
+            found.append(f"f{meshes}")
+    return found

@@ -1,14 +1,9 @@
 """The sections of a case file with ``model = "drivetrain"``: bodies, and what joins and drives them.
 
-Sizes of the gears of a drivetrain case: radii, teeth, places of the planets.
-
-What a drivetrain case is allowed to say but deserves a look.
-
-What must hold between the entries of a drivetrain case: names, chain, teeth and radii, torques, times.
-
-Torque series: the CSV files that a drivetrain case names, read once and kept inside the case.
-
-Reading of the other kind of case, ``model = "drivetrain"``.
+`build_drivetrain` reads such a case from the tables of a file; a torque series in a CSV file that the case
+names is read once and kept inside the case. `cross_check` refuses what must hold between the entries: names,
+chain, teeth and radii, places of the planets, torques, times. `notices` says what is allowed but deserves a
+look.
 """
 
 from __future__ import annotations
@@ -62,6 +57,25 @@ MOST_POINTS = 20_000
 LARGEST_TORQUE, LATEST, FASTEST_RATE = 1e9, 1e6, 1e7
 RIGID = "rigid"
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
+
+# Ratios of radii and teeth that differ by more belong to no gears; profile shifts explain the rest.
+RATIO_TOLERANCE = 0.01
+# Teeth of a planet that profile shifts may add or take.
+_SHIFTED = 2
+
+# Ratios of radii and teeth that differ by more are worth a remark.
+_REMARK = 1e-4
+
+MOST_STEPS = 1e8
+MOST_VALUES = 2.5e8
+LEAST_RECORDS = 64
+MOST_COORDINATES = 1500
+
+_DIMENSIONS = {"time": TIME, "torque": TORQUE}
+_LIMITS = {"time": (0.0, LATEST), "torque": (-LARGEST_TORQUE, LARGEST_TORQUE)}
+_COLUMNS = "the first line names two columns: time [s] and torque [N m] (or other units)"
+# Times and torques are written into the case with so many digits.
+_DIGITS = ".13g"
 
 
 def _name(value: object) -> str:
@@ -304,179 +318,75 @@ class DrivetrainCase(_Section, ReadCase):
     simulation: SimulationSection
 
 
-# Ratios of radii and teeth that differ by more belong to no gears; profile shifts explain the rest.
-RATIO_TOLERANCE = 0.01
-# Teeth of a planet that profile shifts may add or take.
-_SHIFTED = 2
+def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True) -> DrivetrainCase:
+    """Case of the tables of a TOML text that names a model.
+
+    Parameters
+    ----------
+    data : dict
+        Modified: torque series of files take the place of the files.
+    text, name : str
+        Of the file.
+    numbered : bool
+        Whether messages may name lines.
+
+    Raises
+    ------
+    CaseError
+        Everything that is wrong, at once.
+    """
+    lines = text if numbered else ""
+    if data.get("model") != MODEL:
+        raise combine([_unknown_model(data.get("model"))], lines, name)
+    files = embed_torques(data, name)
+    if files:
+        text = text_with_points(data, name, points="torque series", remedy="give them at fewer points")
+    try:
+        case = DrivetrainCase.model_validate(data)
+    except ValidationError as error:
+        raise combine(translate(error, DrivetrainCase), lines, name) from None
+    if problems := cross_check(case):
+        raise combine(problems, lines, name)
+    case.read_from(text, lines, name, notices=notices(case), profile_files=files)
+    return case
 
 
-def check_sizes(case: DrivetrainCase) -> Iterator[CaseError]:
-    """Radii against teeth, and whether planets assemble beside one another."""
-    for i, stage in enumerate(case.parallel):
-        key, given = f"parallel[{i}]", given_of(stage, ("radii", "base_radii", "module"))
-        if len(given) != 1:
-            yield _one_of(f"{key}.{given[0] if given else 'radii'}", "radii, base_radii or module")
-            continue
-        radii = stage.radii or stage.base_radii
-        if radii and (problem := _mismatch(radii[1] / radii[0], stage.teeth[1] / stage.teeth[0])):
-            yield _unfit(f"{key}.teeth", problem)
-    for i, stage in enumerate(case.planetary):
-        yield from _planetary_sizes(stage, f"planetary[{i}]")
+def is_drivetrain(data: dict) -> bool:
+    """Whether tables name a model, or have bodies, of which planetary sets have none."""
+    return "model" in data or isinstance(data.get("body"), list)
 
 
-def _planetary_sizes(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
-    pitch = given_of(stage, ("sun_radius", "planet_radius"))
-    base = given_of(stage, ("sun_base_radius", "planet_base_radius"))
-    ways = [pitch, base, given_of(stage, ("module",))]
-    if [len(way) for way in ways] not in ([2, 0, 0], [0, 2, 0], [0, 0, 1]):
-        words = "sun_radius and planet_radius, sun_base_radius and planet_base_radius, or module"
-        yield _one_of(f"{key}.{next((way[0] for way in ways if way), 'sun_radius')}", words)
-    elif pitch or base:
-        sun, planet = (getattr(stage, name) for name in (pitch or base))
-        pairs = [("ring_teeth", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)]
-        if stage.planet_teeth is not None:
-            pairs.append(("planet_teeth", planet / sun, stage.planet_teeth / stage.sun_teeth))
-        for name, radii, teeth in pairs:
-            if problem := _mismatch(radii, teeth):
-                yield _unfit(f"{key}.{name}", problem)
-    elif stage.planet_teeth is not None:
-        between = 0.5 * (stage.ring_teeth - stage.sun_teeth)
-        if abs(stage.planet_teeth - between) > _SHIFTED:
-            yield CaseError(
-                "the planet has other teeth than fit between sun and ring", code="E-TEETH",
-                key=f"{key}.planet_teeth", value=stage.planet_teeth,
-                limit=f"{between:g}, or up to {_SHIFTED} more or less with profile shift",
-            )  # fmt: skip
-    if not stage.sun_teeth < stage.ring_teeth:
-        yield CaseError(
-            "the ring has no more teeth than the sun",
-            code="E-TEETH",
-            key=f"{key}.ring_teeth",
-            value=stage.ring_teeth,
-            limit=f"more than {stage.sun_teeth}",
+def _unknown_model(value: object) -> CaseError:
+    if value is None:
+        remedy = f'write model = "{MODEL}" before the first table'
+        return CaseError(
+            "a file with bodies needs its model", code="E-KEY-MISSING", key="model", remedy=remedy
         )
-    yield from _assembly(stage, key)
-
-
-def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
-    both, angles = stage.ring_teeth + stage.sun_teeth, stage.planet_angles
-    if angles is None:
-        if both % stage.planets:
-            yield CaseError(
-                f"{stage.planets} equally spaced planets do not assemble",
-                code="E-ASSEMBLY",
-                key=f"{key}.planets",
-                value=stage.planets,
-                limit=f"a divisor of ring_teeth + sun_teeth = {both}",
-            )
-        yield from _neighbours(stage, key, 2.0 * math.pi / stage.planets)
-        return
-    if any(b <= a for a, b in pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi - 1e-9:
-        yield CaseError(
-            "the planet angles do not ascend within one turn", code="E-RANGE", key=f"{key}.planet_angles"
-        )
-    yield from _neighbours(stage, key, min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi))))
-    steps = [(angle - angles[0]) * both / (2.0 * math.pi) for angle in angles]
-    if any(abs(step - round(step)) > 1e-3 for step in steps):
-        yield CaseError(
-            "the planets do not assemble at these angles",
-            code="E-ASSEMBLY",
-            key=f"{key}.planet_angles",
-            limit=f"whole multiples of 360 deg / {both} from one another",
-        )
-
-
-def _neighbours(stage: PlanetarySection, key: str, apart: float) -> Iterator[CaseError]:
-    """Pitch circles of neighbouring planets must not overlap; sizes by the teeth."""
-    share = (stage.ring_teeth - stage.sun_teeth) / (stage.ring_teeth + stage.sun_teeth)
-    if share > 0.0 and math.sin(0.5 * min(apart, math.pi)) <= share:
-        most = math.degrees(2.0 * math.asin(share))
-        yield CaseError(
-            "neighbouring planets overlap",
-            code="E-NEIGHBOURS",
-            key=f"{key}.{'planets' if stage.planet_angles is None else 'planet_angles'}",
-            value=f"{math.degrees(apart):.4g} deg from one to the next",
-            limit=f"more than {most:.4g} deg",
-            remedy="take fewer planets, or smaller ones",
-        )
-
-
-def given_of(section, names) -> list[str]:
-    """Those of the names that a section gives."""
-    return [name for name in names if getattr(section, name) is not None]
-
-
-def _one_of(key: str, words: str) -> CaseError:
-    return CaseError("the sizes of the gears are needed once", code="E-CHOICE", key=key, limit=words)
-
-
-def _mismatch(radii: float, teeth: float) -> str:
-    if abs(teeth / radii - 1.0) <= RATIO_TOLERANCE:
-        return ""
-    return f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}"
-
-
-def _unfit(key: str, message: str) -> CaseError:
+    if not isinstance(value, str):
+        return CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", key="model", value=value)
+    near = difflib.get_close_matches(value.lower(), [MODEL], n=1, cutoff=0.6)
     return CaseError(
-        message,
-        code="E-TEETH",
-        key=key,
-        limit=f"ratios within {RATIO_TOLERANCE:.0%} of one another",
-        remedy="correct the teeth or the radii, or give module in place of the radii",
+        "there is no such model",
+        code="E-CHOICE",
+        key="model",
+        value=value,
+        limit=f'"{MODEL}"; planetary sets have no entry model',
+        remedy=f"did you mean {near[0]}?" if near else "leave it out",
     )
 
 
-# Ratios of radii and teeth that differ by more are worth a remark.
-_REMARK = 1e-4
-
-
-def notices(case: DrivetrainCase) -> tuple[str, ...]:
-    """Remarks on a case that was checked."""
-    found = []
-    for i, stage in enumerate(case.parallel):
-        radii = stage.radii or stage.base_radii
-        if radii:
-            found.append((f"parallel[{i}]", radii[1] / radii[0], stage.teeth[1] / stage.teeth[0]))
-    for i, stage in enumerate(case.planetary):
-        for sun, planet in (
-            (stage.sun_radius, stage.planet_radius),
-            (stage.sun_base_radius, stage.planet_base_radius),
-        ):
-            if sun is not None:
-                found.append(
-                    (f"planetary[{i}]", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)
-                )
-    said = [
-        f"[W-TEETH] {key}.teeth: the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
-        "the radii, mesh frequencies the teeth of the first gear or of the ring"
-        for key, radii, teeth in found
-        if abs(teeth / radii - 1.0) > _REMARK
-    ]
-    if not case.bearing:
-        said.append("[W-BEARING] there is no [[bearing]]")
-    return (*said, *_open_backs(case))
-
-
-def _open_backs(case: DrivetrainCase) -> Iterator[str]:
-    """Meshes whose teeth part but find no back flank."""
-    if not case.simulation.contact_loss:
-        return
-    meshes = [(f"parallel[{i}].mesh", one.mesh) for i, one in enumerate(case.parallel)]
-    for i, one in enumerate(case.planetary):
-        meshes += [(f"planetary[{i}].sun_mesh", one.sun_mesh), (f"planetary[{i}].ring_mesh", one.ring_mesh)]
-    if bare := [key for key, mesh in meshes if mesh.backlash is None]:
-        yield (
-            f"[W-BACKLASH] {', '.join(bare)}: without backlash given there is no back side: with "
-            "simulation.contact_loss these teeth part and meet no back flank"
+def need_drivetrain(case: object) -> DrivetrainCase:
+    """The case, refused where it is no drivetrain (E-MODEL)."""
+    if not isinstance(case, DrivetrainCase):
+        raise CaseError(
+            "this is no drivetrain",
+            code="E-MODEL",
+            key="model",
+            limit=f'model = "{MODEL}"',
+            remedy="name a case file of a drivetrain",
+            file=getattr(case, "name", None) or None,
         )
-    if not meshes:
-        yield "[W-BACKLASH] simulation.contact_loss: there are no meshes that could part"
-
-
-MOST_STEPS = 1e8
-MOST_VALUES = 2.5e8
-LEAST_RECORDS = 64
-MOST_COORDINATES = 1500
+    return case
 
 
 def cross_check(case: DrivetrainCase) -> list[CaseError]:
@@ -758,14 +668,166 @@ def settle_time(case: DrivetrainCase) -> float:
     return 0.3 * s.duration if s.settle is None else s.settle
 
 
+def check_sizes(case: DrivetrainCase) -> Iterator[CaseError]:
+    """Radii against teeth, and whether planets assemble beside one another."""
+    for i, stage in enumerate(case.parallel):
+        key, given = f"parallel[{i}]", given_of(stage, ("radii", "base_radii", "module"))
+        if len(given) != 1:
+            yield _one_of(f"{key}.{given[0] if given else 'radii'}", "radii, base_radii or module")
+            continue
+        radii = stage.radii or stage.base_radii
+        if radii and (problem := _mismatch(radii[1] / radii[0], stage.teeth[1] / stage.teeth[0])):
+            yield _unfit(f"{key}.teeth", problem)
+    for i, stage in enumerate(case.planetary):
+        yield from _planetary_sizes(stage, f"planetary[{i}]")
+
+
+def _planetary_sizes(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
+    pitch = given_of(stage, ("sun_radius", "planet_radius"))
+    base = given_of(stage, ("sun_base_radius", "planet_base_radius"))
+    ways = [pitch, base, given_of(stage, ("module",))]
+    if [len(way) for way in ways] not in ([2, 0, 0], [0, 2, 0], [0, 0, 1]):
+        words = "sun_radius and planet_radius, sun_base_radius and planet_base_radius, or module"
+        yield _one_of(f"{key}.{next((way[0] for way in ways if way), 'sun_radius')}", words)
+    elif pitch or base:
+        sun, planet = (getattr(stage, name) for name in (pitch or base))
+        pairs = [("ring_teeth", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)]
+        if stage.planet_teeth is not None:
+            pairs.append(("planet_teeth", planet / sun, stage.planet_teeth / stage.sun_teeth))
+        for name, radii, teeth in pairs:
+            if problem := _mismatch(radii, teeth):
+                yield _unfit(f"{key}.{name}", problem)
+    elif stage.planet_teeth is not None:
+        between = 0.5 * (stage.ring_teeth - stage.sun_teeth)
+        if abs(stage.planet_teeth - between) > _SHIFTED:
+            yield CaseError(
+                "the planet has other teeth than fit between sun and ring", code="E-TEETH",
+                key=f"{key}.planet_teeth", value=stage.planet_teeth,
+                limit=f"{between:g}, or up to {_SHIFTED} more or less with profile shift",
+            )  # fmt: skip
+    if not stage.sun_teeth < stage.ring_teeth:
+        yield CaseError(
+            "the ring has no more teeth than the sun",
+            code="E-TEETH",
+            key=f"{key}.ring_teeth",
+            value=stage.ring_teeth,
+            limit=f"more than {stage.sun_teeth}",
+        )
+    yield from _assembly(stage, key)
+
+
+def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
+    both, angles = stage.ring_teeth + stage.sun_teeth, stage.planet_angles
+    if angles is None:
+        if both % stage.planets:
+            yield CaseError(
+                f"{stage.planets} equally spaced planets do not assemble",
+                code="E-ASSEMBLY",
+                key=f"{key}.planets",
+                value=stage.planets,
+                limit=f"a divisor of ring_teeth + sun_teeth = {both}",
+            )
+        yield from _neighbours(stage, key, 2.0 * math.pi / stage.planets)
+        return
+    if any(b <= a for a, b in pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi - 1e-9:
+        yield CaseError(
+            "the planet angles do not ascend within one turn", code="E-RANGE", key=f"{key}.planet_angles"
+        )
+    yield from _neighbours(stage, key, min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi))))
+    steps = [(angle - angles[0]) * both / (2.0 * math.pi) for angle in angles]
+    if any(abs(step - round(step)) > 1e-3 for step in steps):
+        yield CaseError(
+            "the planets do not assemble at these angles",
+            code="E-ASSEMBLY",
+            key=f"{key}.planet_angles",
+            limit=f"whole multiples of 360 deg / {both} from one another",
+        )
+
+
+def _neighbours(stage: PlanetarySection, key: str, apart: float) -> Iterator[CaseError]:
+    """Pitch circles of neighbouring planets must not overlap; sizes by the teeth."""
+    share = (stage.ring_teeth - stage.sun_teeth) / (stage.ring_teeth + stage.sun_teeth)
+    if share > 0.0 and math.sin(0.5 * min(apart, math.pi)) <= share:
+        most = math.degrees(2.0 * math.asin(share))
+        yield CaseError(
+            "neighbouring planets overlap",
+            code="E-NEIGHBOURS",
+            key=f"{key}.{'planets' if stage.planet_angles is None else 'planet_angles'}",
+            value=f"{math.degrees(apart):.4g} deg from one to the next",
+            limit=f"more than {most:.4g} deg",
+            remedy="take fewer planets, or smaller ones",
+        )
+
+
+def given_of(section, names) -> list[str]:
+    """Those of the names that a section gives."""
+    return [name for name in names if getattr(section, name) is not None]
+
+
+def _one_of(key: str, words: str) -> CaseError:
+    return CaseError("the sizes of the gears are needed once", code="E-CHOICE", key=key, limit=words)
+
+
+def _mismatch(radii: float, teeth: float) -> str:
+    if abs(teeth / radii - 1.0) <= RATIO_TOLERANCE:
+        return ""
+    return f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}"
+
+
+def _unfit(key: str, message: str) -> CaseError:
+    return CaseError(
+        message,
+        code="E-TEETH",
+        key=key,
+        limit=f"ratios within {RATIO_TOLERANCE:.0%} of one another",
+        remedy="correct the teeth or the radii, or give module in place of the radii",
+    )
+
+
 _CHECKS = (_bodies, _shafts, check_sizes, _torques, _simulation, _size)
 
 
-_DIMENSIONS = {"time": TIME, "torque": TORQUE}
-_LIMITS = {"time": (0.0, LATEST), "torque": (-LARGEST_TORQUE, LARGEST_TORQUE)}
-_COLUMNS = "the first line names two columns: time [s] and torque [N m] (or other units)"
-# Times and torques are written into the case with so many digits.
-_DIGITS = ".13g"
+def notices(case: DrivetrainCase) -> tuple[str, ...]:
+    """Remarks on a case that was checked."""
+    found = []
+    for i, stage in enumerate(case.parallel):
+        radii = stage.radii or stage.base_radii
+        if radii:
+            found.append((f"parallel[{i}]", radii[1] / radii[0], stage.teeth[1] / stage.teeth[0]))
+    for i, stage in enumerate(case.planetary):
+        for sun, planet in (
+            (stage.sun_radius, stage.planet_radius),
+            (stage.sun_base_radius, stage.planet_base_radius),
+        ):
+            if sun is not None:
+                found.append(
+                    (f"planetary[{i}]", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)
+                )
+    said = [
+        f"[W-TEETH] {key}.teeth: the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
+        "the radii, mesh frequencies the teeth of the first gear or of the ring"
+        for key, radii, teeth in found
+        if abs(teeth / radii - 1.0) > _REMARK
+    ]
+    if not case.bearing:
+        said.append("[W-BEARING] there is no [[bearing]]")
+    return (*said, *_open_backs(case))
+
+
+def _open_backs(case: DrivetrainCase) -> Iterator[str]:
+    """Meshes whose teeth part but find no back flank."""
+    if not case.simulation.contact_loss:
+        return
+    meshes = [(f"parallel[{i}].mesh", one.mesh) for i, one in enumerate(case.parallel)]
+    for i, one in enumerate(case.planetary):
+        meshes += [(f"planetary[{i}].sun_mesh", one.sun_mesh), (f"planetary[{i}].ring_mesh", one.ring_mesh)]
+    if bare := [key for key, mesh in meshes if mesh.backlash is None]:
+        yield (
+            f"[W-BACKLASH] {', '.join(bare)}: without backlash given there is no back side: with "
+            "simulation.contact_loss these teeth part and meet no back flank"
+        )
+    if not meshes:
+        yield "[W-BACKLASH] simulation.contact_loss: there are no meshes that could part"
 
 
 def embed_torques(data: dict, name: str) -> dict[str, str]:
@@ -845,74 +907,3 @@ def _column(found: Columns, key: str) -> list[float]:
                 remedy=f"check the number, and the unit of the column {key} in the heading",
             )  # fmt: skip
     return values
-
-
-def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True) -> DrivetrainCase:
-    """Case of the tables of a TOML text that names a model.
-
-    Parameters
-    ----------
-    data : dict
-        Modified: torque series of files take the place of the files.
-    text, name : str
-        Of the file.
-    numbered : bool
-        Whether messages may name lines.
-
-    Raises
-    ------
-    CaseError
-        Everything that is wrong, at once.
-    """
-    lines = text if numbered else ""
-    if data.get("model") != MODEL:
-        raise combine([_unknown_model(data.get("model"))], lines, name)
-    files = embed_torques(data, name)
-    if files:
-        text = text_with_points(data, name, points="torque series", remedy="give them at fewer points")
-    try:
-        case = DrivetrainCase.model_validate(data)
-    except ValidationError as error:
-        raise combine(translate(error, DrivetrainCase), lines, name) from None
-    if problems := cross_check(case):
-        raise combine(problems, lines, name)
-    case.read_from(text, lines, name, notices=notices(case), profile_files=files)
-    return case
-
-
-def is_drivetrain(data: dict) -> bool:
-    """Whether tables name a model, or have bodies, of which planetary sets have none."""
-    return "model" in data or isinstance(data.get("body"), list)
-
-
-def _unknown_model(value: object) -> CaseError:
-    if value is None:
-        remedy = f'write model = "{MODEL}" before the first table'
-        return CaseError(
-            "a file with bodies needs its model", code="E-KEY-MISSING", key="model", remedy=remedy
-        )
-    if not isinstance(value, str):
-        return CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", key="model", value=value)
-    near = difflib.get_close_matches(value.lower(), [MODEL], n=1, cutoff=0.6)
-    return CaseError(
-        "there is no such model",
-        code="E-CHOICE",
-        key="model",
-        value=value,
-        limit=f'"{MODEL}"; planetary sets have no entry model',
-        remedy=f"did you mean {near[0]}?" if near else "leave it out",
-    )
-
-
-def need_drivetrain(case: object) -> DrivetrainCase:
-    """The case, refused where it is no drivetrain (E-MODEL)."""
-    if not isinstance(case, DrivetrainCase):
-        raise CaseError(
-            "this is no drivetrain",
-            code="E-MODEL",
-            key="model",
-            limit=f'model = "{MODEL}"',
-            remedy="name a case file of a drivetrain",
-            file=getattr(case, "name", None) or None,
-        )
-    return case

@@ -1,4 +1,8 @@
-"""From the entries of a drivetrain case to its model, checked, and its torques over time."""
+"""From the entries of a drivetrain case to its model, checked, and its torques over time.
+
+The loaded flanks of the model are those that the mean torques press together. Runs are refused, by stage,
+whose steps, records or spectra cannot represent the motion.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ import numpy as np
 
 from femgear.case.units import FREQUENCY, SPEED
 from femgear.errors import CaseError
+from femgear.storage.dataset import RPM
 from femgear.system.series import FourierSeries
 from femgear.system.shaft import ShaftSection
 from femgear.trains.drivetrain import section as drivetrain_section
@@ -34,7 +39,6 @@ from femgear.trains.drivetrain.time import (
     speed_range,
 )
 
-RPM = math.pi / 30.0
 BENDING, TORSIONAL = "with bending", "torsional"
 # Slower instants, over the mean speed, would need records of endless length over a turn.
 SLOWEST = 0.05

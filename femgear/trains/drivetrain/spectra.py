@@ -1,6 +1,7 @@
-"""Named lines of drivetrain spectra: mesh harmonics, side bands of the carriers, mixtures of two meshes.
+"""Spectra of drivetrain signals, over frequency and over orders, and their named lines.
 
-Spectra of drivetrain signals: windowed and averaged, over frequency and over orders.
+Spectra are windowed and averaged. Lines are named for what makes them: mesh harmonics, side bands of the
+turning carriers, sums and differences of two meshes.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from femgear.trains.drivetrain.time import PASS_BAND
 HARMONICS, SIDE_BANDS = 3, 3
 # Half width of the main lobe of Hann's window in lines.
 _LOBE = 2.0
+
+# F. J. Harris, Proc. IEEE 66, 1978, 51-83.
+WINDOWS = ("hann", "flattop", "boxcar")
 
 
 @dataclass(frozen=True)
@@ -91,10 +95,6 @@ def line_amplitudes(signal, angle, speed, lines, *, record_rate: float) -> np.nd
         if line.order * np.abs(speed).max() / (2.0 * np.pi) <= 0.5 * PASS_BAND * record_rate:
             found[row] = 2.0 * np.abs((weight * np.exp(-1j * line.order * angle)) @ signal)
     return found
-
-
-# F. J. Harris, Proc. IEEE 66, 1978, 51-83.
-WINDOWS = ("hann", "flattop", "boxcar")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,8 @@
-"""The pipeline of a drivetrain case: modes, transient -> spectrum."""
+"""The pipeline of a drivetrain case: modes, transient -> spectrum.
+
+`DRIVETRAIN` at the end is the train: the table of its stages, with what the report says and draws of each,
+and the case file of its own.
+"""
 
 from __future__ import annotations
 
