@@ -16,17 +16,17 @@ motions are ``S * (k * (S^T * x))``: three convolutions, each sparse, in place o
 856).
 
 Where shafts are soft the mesh forces follow from the torques and hardly alternate, whatever the stiffness k
-does: the motion gives way, by very many lines whose forces cancel. With the mean stiffness k_0, ``r = k_0 / k
-- 1``, the directions S and the receptance G of the chain with k_0 the approaches are ``S^T x = (1 + r) f /
-k_0``, the motions ``x = x_static + G S (r * f)``, and the forces obey ``f + D (r * f) = k_0 S^T x_static``
-with ``D = 1 - k_0 S^T G S``. D is small where the chain gives way, one where its bodies stay at rest, large
-at its resonances; few lines carry forces. GMRES is then preconditioned with every mesh by itself, its
-stiffness varying: blocks of lines that the harmonics of this mesh connect.
+does: the motion gives way, by very many lines whose forces cancel. With the mean stiffness k_0,
+``r = k_0 / k - 1``, the directions S and the receptance G of the chain with k_0 the approaches are
+``S^T x = (1 + r) f / k_0``, the motions ``x = x_static + G S (r * f)``, and the forces obey
+``f + D (r * f) = k_0 S^T x_static`` with ``D = 1 - k_0 S^T G S``. D is small where the chain gives way, one
+where its bodies stay at rest, large at its resonances; few lines carry forces. GMRES is then preconditioned
+with every mesh by itself, its stiffness varying: blocks of lines that the harmonics of this mesh connect.
 
 The search takes in those lines beside the present ones whose estimate matters (`Estimate`). On a line beyond
 those solved for, the mesh forces are ``-D (r * f)`` to first order: one convolution and one pass through the
-chain. Adding what has the largest estimate is the adaptive Galerkin method of A. Cohen, W. Dahmen and R.
-DeVore, Math. Comput. 70 (2001) 27-75: solve, estimate, mark, refine, coarsen.
+chain. Adding what has the largest estimate is the adaptive Galerkin method of A. Cohen, W. Dahmen and
+R. DeVore, Math. Comput. 70 (2001) 27-75: solve, estimate, mark, refine, coarsen.
 """
 
 from __future__ import annotations

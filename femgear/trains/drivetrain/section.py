@@ -1,7 +1,7 @@
 """The sections of a case file with ``model = "drivetrain"``: bodies, and what joins and drives them.
 
 `build_drivetrain` reads such a case from the tables of a file; a torque series in a CSV file that the case
-names is read once and kept inside the case. `cross_check` refuses what must hold between the entries: names,
+names is read once and kept inside the case. `cross_check` refuses entries that contradict one another: names,
 chain, teeth and radii, places of the planets, torques, times. `notices` says what is allowed but deserves a
 look.
 """

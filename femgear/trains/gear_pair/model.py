@@ -1,9 +1,10 @@
 """Gear pair with backlash: with inertias and radii, in dimensionless form, and the contact of its flanks.
 
 Rotations on rigid shafts after A. Kahraman and R. Singh, Non-linear dynamics of a spur gear pair, J. Sound
-Vib. 142 (1990) 49-75, Eqs. (1) to (4): the deflection along the line of action is ``r_1 theta_1 - r_2
-theta_2``, and with the equivalent mass ``m_e = 1 / (r_1^2 / I_1 + r_2^2 / I_2) = I_1 I_2 / (r_1^2 I_2 + r_2^2
-I_1)`` it obeys ``m_e x'' + c x' + f(x, t) = T_1 / r_1``.
+Vib. 142 (1990) 49-75, Eqs. (1) to (4): the deflection along the line of action is
+``r_1 theta_1 - r_2 theta_2``, and with the equivalent mass
+``m_e = 1 / (r_1^2 / I_1 + r_2^2 / I_2) = I_1 I_2 / (r_1^2 I_2 + r_2^2 I_1)`` it obeys
+``m_e x'' + c x' + f(x, t) = T_1 / r_1``.
 
 In the dimensionless form lengths are counted in half backlashes b, forces in k b with the mean mesh stiffness
 k, times in 1 / omega_n, omega_n = sqrt(k / m_e); bearings and k(t) are those of Kahraman and Singh, J. Sound
@@ -14,8 +15,8 @@ y_2 of the gears along the line of action and the error e(t), the relative defle
 
 and drive flanks touch above x = 1, back flanks below x = -1. In the coordinates (y_1, y_2, x) the error acts
 through the inertia of ``u = x + e - y_1 + y_2`` alone: ``x'' + 2 zeta x' + k(t) f(x) = F - e''`` without
-bearings. Time is scaled once more so that the tooth frequency is one for every frequency ratio Omega, ``theta
-= Omega t``: M and C carry Omega^2 and Omega, and branches over Omega are branches over a parameter.
+bearings. Time is scaled once more so that the tooth frequency is one for every frequency ratio Omega,
+``theta = Omega t``: M and C carry Omega^2 and Omega, and branches over Omega are branches over a parameter.
 
 No impact, single-sided and double-sided impact are told apart, as in the paper of 1990, by the range of the
 relative deflection.

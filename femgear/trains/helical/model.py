@@ -1,15 +1,15 @@
 """Helical planetary set of rigid bodies that move in space: data, matrices, meshes, modes, forced response.
 
-Carrier, ring, sun and N planets have three translations and three rotations each, 6 (N + 3) coordinates. A.
-Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
+Carrier, ring, sun and N planets have three translations and three rotations each, 6 (N + 3) coordinates.
+A. Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
 springs along the tooth normals, supports and planet pins in all directions, without terms of the carrier's
 speed. Here all matrices follow from kinematics: every spring is a column of deflections ``w^T q`` and adds
 ``k w w^T``; the meshes stay columns of W. As elements, `helical_problem`, they have a stiffness that changes,
 play and contact loss.
 
-Coordinates: x, y and z of the central members, planets radially outwards, tangentially and along z; tilts ``w
-= r phi`` about the same two axes in the plane and ``u = r theta`` about z, all right-handed. r is the base
-radius of the gears and the radius of the circle of planet centres for the carrier.
+Coordinates: x, y and z of the central members, planets radially outwards, tangentially and along z; tilts
+``w = r phi`` about the same two axes in the plane and ``u = r theta`` about z, all right-handed. r is the
+base radius of the gears and the radius of the circle of planet centres for the carrier.
 
 The mesh stiffness follows from that of spur teeth. A helical gear is cut across its axis into thin slices,
 each of them a spur gear that is turned by the helix against its neighbour, and the slices carry side by side
