@@ -8,9 +8,10 @@ stands.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from femgear.contact.assembly import (
     rotation_approach,
 )
 from femgear.contact.candidates import cell_centres, separation
+from femgear.contact.cycle import ROUGH_STIFFNESS
 from femgear.contact.pivoting import factor
 from femgear.contact.sides import mirrored_set
 from femgear.contact.solve import solve_contact
@@ -258,10 +260,10 @@ def linear_positions(original, bodies, sun_torque, chosen, record, deviations, s
 def _solve(solved, bodies, load, numbers, members, options):
     """Windows wide enough, and the answers of all positions in them."""
     N = solved.n_planets
-    share, nearest = load / N, 3.0 * load / (N * 10e9 * solved.sun.face_width)
     right = np.zeros(N + 1 + int(members.free.sum()))
     right[N] = load
-    for _ in range(8):
+
+    def attempt(share: float, nearest: float):
         setup = mesh_windows(solved, bodies, share=share, nearest=nearest, **options)
         answers, overflow, outside, previous = [], False, False, None
         for p in numbers:
@@ -273,8 +275,31 @@ def _solve(solved, bodies, load, numbers, members, options):
             overflow |= problem.touches_window_end(state.active, setup)
             penetrates = ~setup.near[:, p] & (setup.smallest_gap[:, p] < answers[-1]["deflection"][:, None])
             outside |= options["contact"] == "profile" and bool(penetrates.any())
+        return (setup, answers), overflow, outside
+
+    return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * solved.sun.face_width))
+
+
+def in_windows(attempt: Callable[[float, float], tuple], share: float, nearest: float) -> Any:
+    """What is found in windows that contain the contact; they are enlarged until they do.
+
+    Parameters
+    ----------
+    attempt : callable
+        ``(share, nearest) -> found, overflow, outside``: what is found in these windows, whether the contact
+        reaches the end of one, and whether teeth without a window overlap.
+    share, nearest : float
+        Of the first windows, as `mesh_windows` takes them [N], [m].
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-WINDOW
+    """
+    for _ in range(8):
+        found, overflow, outside = attempt(share, nearest)
         if not overflow and not outside:
-            return setup, answers
+            return found
         share *= 4.0 if overflow else 1.0
         nearest *= 2.0 if outside else 1.0
     raise ContactError(

@@ -20,12 +20,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
-from femgear.contact.cycle import walk_either_flank
+from femgear.contact.cycle import ROUGH_STIFFNESS, walk_either_flank
 from femgear.contact.sides import mirrored_set
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import RIGID, Supports, moving_members
 from femgear.errors import CaseError, ContactError
 from femgear.gears.deviations import SetDeviations, mesh_normals, mirrored_deviations, no_deviations
+from femgear.study.linearised import in_windows
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -153,16 +154,9 @@ def sharing_model(
 def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
     """Path deflections (N,) and compliance between planets (N, N) with the same force in all meshes."""
     N = s.n_planets
-    share, nearest = force, 3.0 * force / (10e9 * bodies.face_width)
-    for _ in range(8):
-        setup = mesh_windows(
-            s,
-            bodies,
-            share=share,
-            cells=36,
-            nearest=nearest,
-            **place,
-        )
+
+    def attempt(share: float, nearest: float):
+        setup = mesh_windows(s, bodies, share=share, cells=36, nearest=nearest, **place)
         # the record of the windows begins at the position
         problem = assemble_contact(setup, bodies, 0)
         mesh = problem.mesh[:, None] == np.arange(2 * N)
@@ -170,17 +164,10 @@ def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
         overflow = problem.touches_window_end(state.active, setup)
         gap = setup.smallest_gap[:, 0]
         outside = ~setup.near[:, 0] & (gap < state.motions[:, None])
-        outside = outside.any() and place["contact"] == "profile"
-        if not overflow and not outside:
-            break
-        share *= 4.0 if overflow else 1.0
-        nearest *= 2.0 if outside else 1.0
-    else:
-        raise ContactError(
-            "the contact windows do not contain the contact after seven enlargements",
-            code="E-CONTACT-WINDOW",
-            remedy="reduce operation.torque or the errors",
-        )
+        return (problem, mesh, state), overflow, outside.any() and place["contact"] == "profile"
+
+    first = 3.0 * force / (ROUGH_STIFFNESS * bodies.face_width)
+    problem, mesh, state = in_windows(attempt, force, first)
     loads = mesh * state.loads[:, None]
     compliance = loads.T @ problem.H @ loads / force**2
     between = compliance.reshape(2, N, 2, N).sum(axis=(0, 2))
