@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,9 +21,9 @@ from femgear.errors import CaseError, ContactError, FemgearError, StorageError
 from femgear.study.objectives import STAGES, Quantity
 from femgear.study.variables import Variable, check_variables
 from femgear.study.variants import Journal, Shared, Variant, open_journal
+from femgear.trains.protocol import Progress
 from femgear.trains.reading import with_values
 
-Progress = Callable[[str, float, float], None]
 Point = tuple[object, ...]
 """Values of the design variables as the case file holds them; empty for the case as it is."""
 OUTSIDE, _REFUSED = 1e6, 1e9

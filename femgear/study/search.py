@@ -21,10 +21,11 @@ from femgear.case.sections import Case
 from femgear.errors import CaseError, ConvergenceError
 from femgear.study.minimax import descend, has_derivatives
 from femgear.study.objectives import Quantity
-from femgear.study.problem import OUTSIDE, Enough, Evaluations, Failure, Problem, Progress, evaluations
+from femgear.study.problem import OUTSIDE, Enough, Evaluations, Failure, Problem, evaluations
 from femgear.study.sensitivity import Tolerance, tolerances
 from femgear.study.variables import start_point
 from femgear.threads import one_blas_thread
+from femgear.trains.protocol import Progress
 
 Method = Literal["auto", "minimax", "global", "simplex", "powell"]
 METHODS = get_args(Method)

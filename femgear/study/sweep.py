@@ -22,10 +22,11 @@ from femgear.errors import CaseError
 from femgear.storage.files import storage_errors, write_text
 from femgear.study.names import named_quantity
 from femgear.study.objectives import Quantity
-from femgear.study.problem import Failure, Progress, open_designs
+from femgear.study.problem import Failure, open_designs
 from femgear.study.variables import Variable, split
 from femgear.study.variants import need_elastic_ring
 from femgear.threads import one_blas_thread
+from femgear.trains.protocol import Progress
 from femgear.trains.reading import with_value
 
 LARGEST = 100_000
