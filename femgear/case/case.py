@@ -1,8 +1,8 @@
-"""The case file: every entry checked, every unit converted, every mistake reported at once.
+"""Gears, deviations and shafts that a case describes; cases are read by `femgear.trains.reading`.
 
-Modifications of a case as forms of the flanks of its gears.
-
-Support stiffness of the members that a case gives a shaft: K = F/X of the shaft by finite elements.
+`planetary_set` closes the gears on their centre distance and checks them, `set_deviations` turns
+modifications and errors into separations of the loaded flanks, `with_shafts` gives members that stand on a
+shaft its support stiffness. Refusals name the entries of the case file, with file and line.
 """
 
 from __future__ import annotations
@@ -40,158 +40,10 @@ from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 
 if TYPE_CHECKING:
     from femgear.case.deviations import ModificationSection
-
-
-def flank_form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
-    """Form of a flank of a gear; planets have one on the side of the sun and one on that of the ring.
-
-    Parameters
-    ----------
-    case : Case
-    gear : Gear
-    side : str
-        Flank of a planet, "sun side" or "ring side"; sun and ring have "both" alike.
-
-    Returns
-    -------
-    FlankForm
-
-    Raises
-    ------
-    GeometryError
-        E-MODIFICATION, with key, file and line: what the flank cannot have.
-    """
-    found = []
-    for i, section in enumerate(getattr(case, gear.name).modifications):
-        if getattr(section, "flank", "both") not in (side, "both"):
-            continue
-        try:
-            found.append(_modification(section, gear))
-            check_form(FlankForm((found[-1],)), gear)
-            if isinstance(found[-1], MeasuredProfile):
-                _check_reach(case, found[-1], gear, f"{gear.name}.modifications[{i}]")
-        except GeometryError as error:
-            error.key = f"{gear.name}.modifications[{i}]"
-            error.file = case.location(error.key)
-            raise
-    return FlankForm(tuple(found))
-
-
-def _modification(section: ModificationSection, gear: Gear) -> Modification:
-    if section.kind == "measured profile":
-        angles, diameters = section.roll_angles or (), section.diameters or ()
-        rolls = [roll_at(gear, roll_angle=a) for a in angles] + [roll_at(gear, diameter=d) for d in diameters]
-        points = sorted(zip(rolls, section.deviations, strict=True))
-        return MeasuredProfile(tuple(r for r, _ in points), tuple(-e for _, e in points))
-    start, end = (
-        roll_at(
-            gear,
-            diameter=getattr(section, f"{name}_diameter"),
-            roll_angle=getattr(section, f"{name}_roll_angle"),
-            length=getattr(section, f"{name}_roll_length"),
-        )
-        for name in ("start", "end")
-    )
-    match section.kind:
-        case "tip relief":
-            return TipRelief(section.amount, start, end, section.exponent)
-        case "root relief":
-            return RootRelief(section.amount, start, end, section.exponent)
-        case "profile slope":
-            return ProfileSlope(section.amount, start, end)
-        case _:
-            return ProfileCrowning(section.amount, start, end)
-
-
-def _check_reach(case: Case, profile: MeasuredProfile, gear: Gear, key: str) -> None:
-    """Refuse a measured profile that lies beside the flank.
-
-    Raises
-    ------
-    GeometryError
-        E-MODIFICATION, with the file of the profile and both ranges.
-    """
-    low, high = sorted((gear.form_roll, gear.tip_roll))
-    if profile.roll[-1] >= low and profile.roll[0] <= high:
-        return
-    source = case.profile_files.get(key)
-    named = f"the measured profile {source}" if source else "the measured profile"
-    raise GeometryError(
-        f"{gear.name}: no part of {named} lies on the flank",
-        code="E-MODIFICATION",
-        key=key,
-        value=_range(gear, *profile.roll[:: len(profile.roll) - 1]),
-        limit=f"points within {_range(gear, low, high)}",
-        remedy="check the unit of its first column and that it belongs to this gear",
-    )
-
-
-def _range(gear: Gear, low: float, high: float) -> str:
-    angles = (math.degrees(roll / gear.base_radius) for roll in (low, high))
-    diameters = (2e3 * math.hypot(roll, gear.base_radius) for roll in (low, high))
-    return "roll angles {:.4g} to {:.4g} deg, diameters {:.6g} to {:.6g} mm".format(*angles, *diameters)
-
+    from femgear.case.sections import CarrierSection
 
 MEMBERS = ("sun", "carrier")
-
-
-def with_shafts(case: Case) -> Case:
-    """The case with the support stiffness of its shafts, held at one end and coupled at the other.
-
-    The member stands on the free end of a stepped cantilever, its face rigidly coupled to the axis, which
-    may tilt: ``K = F/X``, see `femgear.fe.shaft.shaft_support_stiffness`. The shaft is of the material
-    of the gears.
-
-    Raises
-    ------
-    GeometryError
-        Parts that make no shaft (E-SHAFT), with file and line.
-    """
-    found = {}
-    for name in MEMBERS:
-        section = getattr(case, name)
-        if not section.support_shaft:
-            continue
-        parts = tuple((one.length, one.outer_diameter, one.inner_diameter) for one in section.support_shaft)
-        material = case.material
-        try:
-            stiffness = _stiffness(parts, material.youngs_modulus, material.poisson_ratio, material.density)
-        except FemgearError as error:
-            error.key = f"{name}.support_shaft"
-            error.file = case.location(error.key)
-            raise
-        found[name] = section.model_copy(update={"support_stiffness": stiffness})
-    return case.model_copy(update=found) if found else case
-
-
-def shaft_lines(case: Case) -> tuple[str, ...]:
-    """What the shafts of a case hold, in sentences, with the beam of Timoshenko beside."""
-    from femgear.fe.elasticity import Material
-    from femgear.fe.shaft import ShaftStep, timoshenko_flexibility
-
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-    lines = []
-    for name in MEMBERS:
-        section = getattr(case, name)
-        if section.support_shaft:
-            steps = [
-                ShaftStep(one.length, one.outer_diameter, one.inner_diameter) for one in section.support_shaft
-            ]
-            beam = 1.0 / timoshenko_flexibility(steps, material)[0, 0]
-            lines.append(
-                f"support of the {name} from its shaft: {section.support_stiffness * 1e-6:.4g} N/um "
-                f"(as a beam {beam * 1e-6:.4g})"
-            )
-    return tuple(lines)
-
-
-@lru_cache(maxsize=64)
-def _stiffness(parts: tuple, youngs_modulus: float, poisson_ratio: float, density: float) -> float:
-    from femgear.fe.elasticity import Material
-    from femgear.fe.shaft import ShaftStep, shaft_support_stiffness
-
-    steps = [ShaftStep(*part) for part in parts]
-    return shaft_support_stiffness(steps, Material(youngs_modulus, poisson_ratio, density))
+"""Members that may stand on a shaft."""
 
 
 def need_set(case: object) -> None:
@@ -256,6 +108,40 @@ def _closed_set(case: Case) -> PlanetarySet:
     )
 
 
+def _gear(
+    case: Case,
+    section: SunSection | PlanetSection | RingSection,
+    name: str,
+    rim: float,
+    cutter: PinionCutter | None = None,
+) -> Gear:
+    given, module, pressure_angle = section.rack or case.rack, case.sun.module, case.sun.pressure_angle
+    rack = BasicRack(addendum=given.addendum, dedendum=given.dedendum, root_radius=given.root_radius)
+    if case.helix_angle is not None:
+        module, pressure_angle = transverse_tool(module, pressure_angle, case.helix_angle)
+        rack = transverse_rack(rack, case.helix_angle)
+    return Gear(
+        teeth=section.teeth,
+        module=module,
+        pressure_angle=pressure_angle,
+        profile_shift=(section.profile_shift or 0.0) * _normal_modules(case),
+        face_width=case.set.face_width,
+        rim_radius=rim,
+        internal=name == "ring",
+        rack=rack,
+        cutter=cutter,
+        tip_diameter=section.tip_diameter,
+        root_diameter=section.root_diameter,
+        thickness_allowance=0.5 * case.set.backlash,
+        name=name,
+    )
+
+
+def _normal_modules(case: Case) -> float:
+    """Normal modules in the module of the gears' section: cos(beta) of helical teeth, 1 of spur teeth."""
+    return 1.0 if case.helix_angle is None else math.cos(case.helix_angle)
+
+
 def _name_root_radius(error: GeometryError, case: Case) -> None:
     """Let a refusal of the tool's rounding name the largest root radius that can be typed in its place.
 
@@ -294,40 +180,6 @@ def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float 
         middle = (low + high) // 2
         low, high = (middle, high) if fits(middle) else (low, middle)
     return low / 1e4 if low >= 0 else None
-
-
-def _gear(
-    case: Case,
-    section: SunSection | PlanetSection | RingSection,
-    name: str,
-    rim: float,
-    cutter: PinionCutter | None = None,
-) -> Gear:
-    given, module, pressure_angle = section.rack or case.rack, case.sun.module, case.sun.pressure_angle
-    rack = BasicRack(addendum=given.addendum, dedendum=given.dedendum, root_radius=given.root_radius)
-    if case.helix_angle is not None:
-        module, pressure_angle = transverse_tool(module, pressure_angle, case.helix_angle)
-        rack = transverse_rack(rack, case.helix_angle)
-    return Gear(
-        teeth=section.teeth,
-        module=module,
-        pressure_angle=pressure_angle,
-        profile_shift=(section.profile_shift or 0.0) * _normal_modules(case),
-        face_width=case.set.face_width,
-        rim_radius=rim,
-        internal=name == "ring",
-        rack=rack,
-        cutter=cutter,
-        tip_diameter=section.tip_diameter,
-        root_diameter=section.root_diameter,
-        thickness_allowance=0.5 * case.set.backlash,
-        name=name,
-    )
-
-
-def _normal_modules(case: Case) -> float:
-    """Normal modules in the module of the gears' section: cos(beta) of helical teeth, 1 of spur teeth."""
-    return 1.0 if case.helix_angle is None else math.cos(case.helix_angle)
 
 
 def set_deviations(case: Case) -> SetDeviations:
@@ -416,3 +268,159 @@ def _ovality(case: Case) -> Ovality:
     if given is None:
         return Ovality()
     return Ovality(given.nodal_diameter, given.amplitude, given.phase, given.inextensional)
+
+
+def flank_form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
+    """Form of a flank of a gear; planets have one on the side of the sun and one on that of the ring.
+
+    Parameters
+    ----------
+    case : Case
+    gear : Gear
+    side : str
+        Flank of a planet, "sun side" or "ring side"; sun and ring have "both" alike.
+
+    Returns
+    -------
+    FlankForm
+
+    Raises
+    ------
+    GeometryError
+        E-MODIFICATION, with key, file and line: what the flank cannot have.
+    """
+    found = []
+    for i, section in enumerate(getattr(case, gear.name).modifications):
+        if getattr(section, "flank", "both") not in (side, "both"):
+            continue
+        try:
+            found.append(_modification(section, gear))
+            check_form(FlankForm((found[-1],)), gear)
+            if isinstance(found[-1], MeasuredProfile):
+                _check_reach(case, found[-1], gear, f"{gear.name}.modifications[{i}]")
+        except GeometryError as error:
+            error.key = f"{gear.name}.modifications[{i}]"
+            error.file = case.location(error.key)
+            raise
+    return FlankForm(tuple(found))
+
+
+def _modification(section: ModificationSection, gear: Gear) -> Modification:
+    """Form over the roll length [m]; measured deviations are material, which forms count as taken off."""
+    if section.kind == "measured profile":
+        angles, diameters = section.roll_angles or (), section.diameters or ()
+        rolls = [roll_at(gear, roll_angle=a) for a in angles] + [roll_at(gear, diameter=d) for d in diameters]
+        points = sorted(zip(rolls, section.deviations, strict=True))
+        return MeasuredProfile(tuple(r for r, _ in points), tuple(-e for _, e in points))
+    start, end = (
+        roll_at(
+            gear,
+            diameter=getattr(section, f"{name}_diameter"),
+            roll_angle=getattr(section, f"{name}_roll_angle"),
+            length=getattr(section, f"{name}_roll_length"),
+        )
+        for name in ("start", "end")
+    )
+    match section.kind:
+        case "tip relief":
+            return TipRelief(section.amount, start, end, section.exponent)
+        case "root relief":
+            return RootRelief(section.amount, start, end, section.exponent)
+        case "profile slope":
+            return ProfileSlope(section.amount, start, end)
+        case _:
+            return ProfileCrowning(section.amount, start, end)
+
+
+def _check_reach(case: Case, profile: MeasuredProfile, gear: Gear, key: str) -> None:
+    """Refuse a measured profile that lies beside the flank.
+
+    Raises
+    ------
+    GeometryError
+        E-MODIFICATION, with the file of the profile and both ranges.
+    """
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    if profile.roll[-1] >= low and profile.roll[0] <= high:
+        return
+    source = case.profile_files.get(key)
+    named = f"the measured profile {source}" if source else "the measured profile"
+    raise GeometryError(
+        f"{gear.name}: no part of {named} lies on the flank",
+        code="E-MODIFICATION",
+        key=key,
+        value=_range(gear, *profile.roll[:: len(profile.roll) - 1]),
+        limit=f"points within {_range(gear, low, high)}",
+        remedy="check the unit of its first column and that it belongs to this gear",
+    )
+
+
+def _range(gear: Gear, low: float, high: float) -> str:
+    """Two roll lengths as roll angles and diameters, for messages."""
+    angles = (math.degrees(roll / gear.base_radius) for roll in (low, high))
+    diameters = (2e3 * math.hypot(roll, gear.base_radius) for roll in (low, high))
+    return "roll angles {:.4g} to {:.4g} deg, diameters {:.6g} to {:.6g} mm".format(*angles, *diameters)
+
+
+def with_shafts(case: Case) -> Case:
+    """The case with the support stiffness of its shafts, held at one end and coupled at the other.
+
+    The member stands on the free end of a stepped cantilever, its face rigidly coupled to the axis, which
+    may tilt: ``K = F/X``, see `femgear.fe.shaft.shaft_support_stiffness`. The shaft is of the material
+    of the gears.
+
+    Raises
+    ------
+    GeometryError
+        Parts that make no shaft (E-SHAFT), with file and line.
+    """
+    found = {}
+    for name in MEMBERS:
+        section = getattr(case, name)
+        if not section.support_shaft:
+            continue
+        material = case.material
+        try:
+            stiffness = _stiffness(
+                _parts(section), material.youngs_modulus, material.poisson_ratio, material.density
+            )
+        except FemgearError as error:
+            error.key = f"{name}.support_shaft"
+            error.file = case.location(error.key)
+            raise
+        found[name] = section.model_copy(update={"support_stiffness": stiffness})
+    return case.model_copy(update=found) if found else case
+
+
+def shaft_lines(case: Case) -> tuple[str, ...]:
+    """What the shafts of a case hold, in sentences, with the beam of Timoshenko beside."""
+    from femgear.fe.elasticity import Material
+    from femgear.fe.shaft import ShaftStep, timoshenko_flexibility
+
+    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    lines = []
+    for name in MEMBERS:
+        section = getattr(case, name)
+        if section.support_shaft:
+            steps = [ShaftStep(*part) for part in _parts(section)]
+            beam = 1.0 / timoshenko_flexibility(steps, material)[0, 0]
+            lines.append(
+                f"support of the {name} from its shaft: {section.support_stiffness * 1e-6:.4g} N/um "
+                f"(as a beam {beam * 1e-6:.4g})"
+            )
+    return tuple(lines)
+
+
+def _parts(section: SunSection | CarrierSection) -> tuple[tuple[float, float, float], ...]:
+    """Length, outer and inner diameter of every part of a shaft [m]."""
+    return tuple((one.length, one.outer_diameter, one.inner_diameter) for one in section.support_shaft)
+
+
+@lru_cache(maxsize=64)
+def _stiffness(parts: tuple, youngs_modulus: float, poisson_ratio: float, density: float) -> float:
+    """Support stiffness of a shaft [N/m], computed once for equal shafts."""
+    from femgear.fe.elasticity import Material
+    from femgear.fe.shaft import ShaftStep, shaft_support_stiffness
+
+    steps = [ShaftStep(*part) for part in parts]
+    return shaft_support_stiffness(steps, Material(youngs_modulus, poisson_ratio, density))

@@ -1,6 +1,7 @@
-"""What must hold between the entries of a case file.
+"""What must hold between the entries of a case file, and of members that float.
 
-Members of a case that float though nothing holds them.
+`cross_check` lists what no entry shows alone. `check_floating` needs the gears of the case: it refuses
+floating members that the planets cannot hold.
 """
 
 from __future__ import annotations
@@ -18,125 +19,14 @@ from femgear.gears.checks import unheld_members
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
-
-def check_deviation_sections(case: Case):
-    """What no entry shows alone: amounts against the module, numbers of teeth and planets."""
-    most = LARGEST_DEVIATION * case.sun.module
-    yield from _check_planets(case)
-    for name in ("sun", "planet", "ring"):
-        gear = getattr(case, name)
-        tables = [] if gear.errors is None else [(f"{name}.errors", gear.errors)]
-        if name == "planet":
-            tables += [(f"planet.individual[{i}]", one) for i, one in enumerate(gear.individual)]
-        for key, table in tables:
-            yield from _check_pitch(key, table, gear.teeth, most)
-    for key, value in _amounts(case):
-        if abs(value) > most:
-            yield CaseError(
-                f"a deviation of {value * 1e6:.6g} um is not plausible",
-                code="E-RANGE",
-                key=key,
-                limit=f"{LARGEST_DEVIATION} modules, {most * 1e6:.6g} um",
-                remedy="check the unit",
-            )
-
-
-def _check_planets(case: Case):
-    for key, tables in (
-        ("planet.individual", case.planet.individual),
-        ("set.pin_errors", case.set.pin_errors),
-    ):
-        seen = set()
-        for i, table in enumerate(tables):
-            if table.planet > case.set.planets:
-                yield CaseError(
-                    f"there is no planet {table.planet}",
-                    code="E-RANGE",
-                    key=f"{key}[{i}].planet",
-                    value=table.planet,
-                    limit=f"1 to {case.set.planets}",
-                )
-            if table.planet in seen:
-                yield CaseError(
-                    f"planet {table.planet} is given twice", code="E-DUPLICATE", key=f"{key}[{i}].planet"
-                )
-            seen.add(table.planet)
-
-
-def _check_pitch(key: str, table: GearErrors, teeth: int, most: float):
-    for name in ("pitch", "cumulative_pitch"):
-        values = getattr(table, name)
-        if values is not None and len(values) != teeth:
-            yield CaseError(
-                f"{len(values)} pitch deviations for {teeth} teeth",
-                code="E-COUNT",
-                key=f"{key}.{name}",
-                limit=f"{teeth} deviations",
-            )
-    total = math.fsum(table.pitch or ())
-    if abs(total) > ROUNDING * teeth:
-        yield CaseError(
-            f"the pitch deviations add up to {total * 1e6:.6g} um; around the gear they must add up to zero",
-            code="E-RANGE",
-            key=f"{key}.pitch",
-            limit=f"{ROUNDING * teeth * 1e6:.6g} um from rounding",
-            remedy="subtract their mean, or give cumulative_pitch",
-        )
-    elif table.pitch:
-        yield from _check_cumulative(f"{key}.pitch", table.pitch, most)
-
-
-def _check_cumulative(key: str, pitch: tuple[float, ...], most: float):
-    """Single pitches, each of them plausible, may still carry a tooth far away."""
-    mean = math.fsum(pitch) / len(pitch)
-    cumulative = list(accumulate(value - mean for value in pitch[1:]))
-    largest = _largest(tuple(cumulative))
-    if abs(largest) > most:
-        yield CaseError(
-            f"the single pitch deviations add up to {largest * 1e6:.6g} um at tooth "
-            f"{cumulative.index(largest) + 1}",
-            code="E-RANGE",
-            key=key,
-            limit=f"cumulative deviations of at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um",
-            remedy="check signs, order and unit of the list; it holds deviations from tooth to tooth",
-        )
-
-
-def _amounts(case: Case):
-    """Keys and values [m] of all deviations."""
-    for name in ("sun", "planet", "ring"):
-        gear = getattr(case, name)
-        for i, one in enumerate(gear.modifications):
-            for entry in ("amount", "deviations"):
-                yield f"{name}.modifications[{i}].{entry}", _largest(getattr(one, entry))
-        yield from _error_amounts(f"{name}.errors", gear.errors)
-    for i, one in enumerate(case.planet.individual):
-        yield from _error_amounts(f"planet.individual[{i}]", one)
-    yield from _error_amounts("carrier.errors", case.carrier.errors)
-    if case.ring.errors is not None and case.ring.errors.ovality is not None:
-        yield "ring.errors.ovality", case.ring.errors.ovality.amplitude
-    for i, pin in enumerate(case.set.pin_errors):
-        yield f"set.pin_errors[{i}].radial", pin.radial
-        yield f"set.pin_errors[{i}].tangential", pin.tangential
-
-
-def _error_amounts(key: str, table: CarrierErrors | None):
-    for name in ("pitch", "cumulative_pitch", "thickness_reduction", "runout_amplitude"):
-        yield f"{key}.{name}", _largest(getattr(table, name, None))
-
-
-def _largest(value: float | tuple[float, ...] | None) -> float:
-    """The value, or of several the one that is largest in size; 0 for none."""
-    values = value if isinstance(value, tuple) else (value or 0.0,)
-    return max(values, key=abs, default=0.0)
-
-
 LEAST_TORQUE = 1e-6
+"""Smallest torque that is told from none [N m]."""
 
 
 def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
     """What no entry shows alone; `more` is what its train adds."""
-    problems = [problem for check in _CHECKS for problem in check(case)] + list(more)
+    checks = (_check_operation, _check_set, _check_supports, _check_numbers, check_deviation_sections)
+    problems = [problem for check in checks for problem in check(case)] + list(more)
     return problems or list(check_published(case))
 
 
@@ -264,13 +154,116 @@ def _check_numbers(case: Case):
         )
 
 
-_CHECKS = (
-    _check_operation,
-    _check_set,
-    _check_supports,
-    _check_numbers,
-    check_deviation_sections,
-)
+def check_deviation_sections(case: Case):
+    """What no entry shows alone: amounts against the module, numbers of teeth and planets."""
+    most = LARGEST_DEVIATION * case.sun.module
+    yield from _check_planets(case)
+    for name in ("sun", "planet", "ring"):
+        gear = getattr(case, name)
+        tables = [] if gear.errors is None else [(f"{name}.errors", gear.errors)]
+        if name == "planet":
+            tables += [(f"planet.individual[{i}]", one) for i, one in enumerate(gear.individual)]
+        for key, table in tables:
+            yield from _check_pitch(key, table, gear.teeth, most)
+    for key, value in _amounts(case):
+        if abs(value) > most:
+            yield CaseError(
+                f"a deviation of {value * 1e6:.6g} um is not plausible",
+                code="E-RANGE",
+                key=key,
+                limit=f"{LARGEST_DEVIATION} modules, {most * 1e6:.6g} um",
+                remedy="check the unit",
+            )
+
+
+def _check_planets(case: Case):
+    for key, tables in (
+        ("planet.individual", case.planet.individual),
+        ("set.pin_errors", case.set.pin_errors),
+    ):
+        seen = set()
+        for i, table in enumerate(tables):
+            if table.planet > case.set.planets:
+                yield CaseError(
+                    f"there is no planet {table.planet}",
+                    code="E-RANGE",
+                    key=f"{key}[{i}].planet",
+                    value=table.planet,
+                    limit=f"1 to {case.set.planets}",
+                )
+            if table.planet in seen:
+                yield CaseError(
+                    f"planet {table.planet} is given twice", code="E-DUPLICATE", key=f"{key}[{i}].planet"
+                )
+            seen.add(table.planet)
+
+
+def _check_pitch(key: str, table: GearErrors, teeth: int, most: float):
+    for name in ("pitch", "cumulative_pitch"):
+        values = getattr(table, name)
+        if values is not None and len(values) != teeth:
+            yield CaseError(
+                f"{len(values)} pitch deviations for {teeth} teeth",
+                code="E-COUNT",
+                key=f"{key}.{name}",
+                limit=f"{teeth} deviations",
+            )
+    total = math.fsum(table.pitch or ())
+    if abs(total) > ROUNDING * teeth:
+        yield CaseError(
+            f"the pitch deviations add up to {total * 1e6:.6g} um; around the gear they must add up to zero",
+            code="E-RANGE",
+            key=f"{key}.pitch",
+            limit=f"{ROUNDING * teeth * 1e6:.6g} um from rounding",
+            remedy="subtract their mean, or give cumulative_pitch",
+        )
+    elif table.pitch:
+        yield from _check_cumulative(f"{key}.pitch", table.pitch, most)
+
+
+def _check_cumulative(key: str, pitch: tuple[float, ...], most: float):
+    """Single pitches, each of them plausible, may still carry a tooth far away."""
+    mean = math.fsum(pitch) / len(pitch)
+    cumulative = list(accumulate(value - mean for value in pitch[1:]))
+    largest = _largest(tuple(cumulative))
+    if abs(largest) > most:
+        yield CaseError(
+            f"the single pitch deviations add up to {largest * 1e6:.6g} um at tooth "
+            f"{cumulative.index(largest) + 1}",
+            code="E-RANGE",
+            key=key,
+            limit=f"cumulative deviations of at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um",
+            remedy="check signs, order and unit of the list; it holds deviations from tooth to tooth",
+        )
+
+
+def _amounts(case: Case):
+    """Keys and values [m] of all deviations."""
+    for name in ("sun", "planet", "ring"):
+        gear = getattr(case, name)
+        for i, one in enumerate(gear.modifications):
+            for entry in ("amount", "deviations"):
+                yield f"{name}.modifications[{i}].{entry}", _largest(getattr(one, entry))
+        yield from _error_amounts(f"{name}.errors", gear.errors)
+    for i, one in enumerate(case.planet.individual):
+        yield from _error_amounts(f"planet.individual[{i}]", one)
+    yield from _error_amounts("carrier.errors", case.carrier.errors)
+    if case.ring.errors is not None and case.ring.errors.ovality is not None:
+        yield "ring.errors.ovality", case.ring.errors.ovality.amplitude
+    for i, pin in enumerate(case.set.pin_errors):
+        yield f"set.pin_errors[{i}].radial", pin.radial
+        yield f"set.pin_errors[{i}].tangential", pin.tangential
+
+
+def _error_amounts(key: str, table: CarrierErrors | None):
+    for name in ("pitch", "cumulative_pitch", "thickness_reduction", "runout_amplitude"):
+        yield f"{key}.{name}", _largest(getattr(table, name, None))
+
+
+def _largest(value: float | tuple[float, ...] | None) -> float:
+    """The value, or of several the one that is largest in size; 0 for none."""
+    values = value if isinstance(value, tuple) else (value or 0.0,)
+    return max(values, key=abs, default=0.0)
 
 
 def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False) -> None:

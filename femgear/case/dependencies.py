@@ -11,11 +11,15 @@ if TYPE_CHECKING:
     from femgear.case.sections import Case
 
 Entries = Mapping[str, object]
+"""Values by dotted key."""
 
 _WORDS = {"format", "title", "housing"}
+"""No stage before the housing depends on them."""
 _INERT = {"mass", "inertia", "density"}
+"""Nothing static depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
 _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
+"""As the supports, without effect on the static solution while all members are fixed."""
 
 
 def static_entries(case: Case) -> Entries:
@@ -88,6 +92,7 @@ def check_entries(entries: Entries, case_entries: Entries, result: str) -> None:
 
 
 def _flat(value: object, name: str = "") -> Iterator[tuple[str, object]]:
+    """Dotted keys and values of nested tables, without entries that are left out."""
     if isinstance(value, dict) and (value or not name):
         for key, inner in value.items():
             yield from _flat(inner, f"{name}.{key}" if name else str(key))
@@ -96,9 +101,11 @@ def _flat(value: object, name: str = "") -> Iterator[tuple[str, object]]:
 
 
 def _begins(key: str, names: set[str]) -> bool:
+    """Whether a key is one of the names or lies below one."""
     return any(key == name or key.startswith(f"{name}.") for name in names)
 
 
 def _show(value: object) -> str:
+    """A value in a message, of at most 60 characters."""
     text = "not given" if value is None else f"{value:.12g}" if isinstance(value, float) else str(value)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -1,4 +1,4 @@
-"""The sections of a case file that hold deviations: modifications of flanks and errors of members."""
+"""Sections of a case file that hold deviations: modifications of flanks and errors of members."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import math
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+from pydantic import Field, StrictBool, model_validator
 
-from femgear.case.fields import Count, Number, Quantity, refuse
+from femgear.case.fields import Count, Number, Quantity, Section, refuse
 from femgear.case.units import ANGLE, LENGTH
 
 LARGEST_DEVIATION = 0.2
 """Largest plausible amount of any modification or error, in modules."""
-
 MOST_POINTS = 2000
 """Points of a measured profile; machines write some hundreds."""
+ROUNDING = 0.05e-6
+"""What the sum of the pitch deviations may miss zero by for every tooth [m]: tenths of micrometres."""
 
 Deviation = Quantity(LENGTH, -0.02, 0.02)
 Amplitude = Quantity(LENGTH, 0.0, 0.02)
@@ -29,11 +30,7 @@ _MEASURED = ("file", "roll_angles", "diameters", "deviations")
 _PLACES = ("diameter", "roll_angle", "roll_length")
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ModificationSection(_Section):
+class ModificationSection(Section):
     """One modification of the flanks of a gear; several add up.
 
     Reliefs and crowning take their positive amount off the flank. The amount of a profile slope and the
@@ -86,6 +83,12 @@ class ModificationSection(_Section):
         return self.power if self.power is not None else 2.0 if self.shape == "parabolic" else 1.0
 
 
+class PlanetModificationSection(ModificationSection):
+    """A modification of the planets' flanks: of those that touch the sun, the ring, or of both."""
+
+    flank: Literal["sun side", "ring side", "both"] = "both"
+
+
 def _check_points(section: ModificationSection) -> None:
     """Refuse a measured profile without its columns; a file has been read into them before."""
     columns = [name for name in ("roll_angles", "diameters") if getattr(section, name) is not None]
@@ -104,13 +107,7 @@ def _check_points(section: ModificationSection) -> None:
         raise refuse(f"{columns[0]} are neither ascending nor descending", code="E-RANGE")
 
 
-class PlanetModificationSection(ModificationSection):
-    """A modification of the planets' flanks: of those that touch the sun, the ring, or of both."""
-
-    flank: Literal["sun side", "ring side", "both"] = "both"
-
-
-class CarrierErrors(_Section):
+class CarrierErrors(Section):
     """Eccentricity of the circle of the planet pins."""
 
     runout_amplitude: Amplitude | None = None
@@ -141,7 +138,7 @@ class IndividualPlanet(GearErrors):
     planet: Count(1, 1000)
 
 
-class OvalitySection(_Section):
+class OvalitySection(Section):
     """Out-of-roundness of the ring, ``amplitude cos(nodal_diameter (angle - phase))`` outwards."""
 
     nodal_diameter: Count(1, 1000)
@@ -156,13 +153,9 @@ class RingErrors(GearErrors):
     ovality: OvalitySection | None = None
 
 
-class PinError(_Section):
+class PinError(Section):
     """Displacement of the axis of one planet: radial outwards, tangential counter-clockwise positive."""
 
     planet: Count(1, 1000)
     radial: Deviation = 0.0
     tangential: Deviation = 0.0
-
-
-ROUNDING = 0.05e-6
-"""What the sum of the pitch deviations may miss zero by for every tooth [m]: tenths of micrometres."""

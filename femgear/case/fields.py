@@ -1,11 +1,11 @@
-"""Types of the entries of a case file: quantities, numbers and counts with their plausible windows."""
+"""Building blocks of the sections of a case file: quantities, numbers and counts within plausible windows."""
 
 from __future__ import annotations
 
 import math
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, WithJsonSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from femgear.case.text import found, shown
@@ -13,19 +13,10 @@ from femgear.case.units import ANGLE, Dimension, to_si
 from femgear.errors import CaseError
 
 
-def refuse(
-    message: str, *, code: str, value: object = None, limit: str | None = None, remedy: str | None = None
-) -> PydanticCustomError:
-    """Validation error that `femgear.case.case` turns into a `CaseError` with these fields."""
-    return PydanticCustomError(
-        code, "{message}", {"message": message, "found": value, "limit": limit, "remedy": remedy}
-    )
+class Section(BaseModel):
+    """A table of a case file: unknown keys are refused, values do not change."""
 
-
-def described(value: object) -> str:
-    """What a TOML value is, in words."""
-    names = {bool: "true or false", int: "an integer", float: "a number", str: "a text", list: "a list"}
-    return names.get(type(value), "a table" if isinstance(value, dict) else "a date or time")
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = False) -> Any:
@@ -167,6 +158,7 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Any:
 
 
 def _one_line(value: object) -> str:
+    """A printable text of at most 200 characters."""
     if not isinstance(value, str):
         raise refuse(f"a text is needed, not {described(value)}", code="E-TYPE", value=value)
     if len(value) > 200 or not value.isprintable():
@@ -180,3 +172,18 @@ def _one_line(value: object) -> str:
 
 
 Title = Annotated[str, BeforeValidator(_one_line)]
+
+
+def refuse(
+    message: str, *, code: str, value: object = None, limit: str | None = None, remedy: str | None = None
+) -> PydanticCustomError:
+    """Validation error that `femgear.case.problems` turns into a `CaseError` with these fields."""
+    return PydanticCustomError(
+        code, "{message}", {"message": message, "found": value, "limit": limit, "remedy": remedy}
+    )
+
+
+def described(value: object) -> str:
+    """What a TOML value is, in words."""
+    names = {bool: "true or false", int: "an integer", float: "a number", str: "a text", list: "a list"}
+    return names.get(type(value), "a table" if isinstance(value, dict) else "a date or time")

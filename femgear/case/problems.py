@@ -1,6 +1,8 @@
-"""From pydantic's validation errors to femgear's, with the nearest valid key and the line of the file.
+"""Mistakes of a case file in the words of its author.
 
-Refusals of the gears, in terms of what the case file gives.
+`translate` turns the validation errors of pydantic into errors of femgear with the nearest valid key,
+`combine` makes one of several, with the lines of the file. `in_terms_of_the_case` lets a refusal of the gears
+name what the file gives. `added_material` and `notices` are remarks on what is accepted.
 """
 
 from __future__ import annotations
@@ -16,6 +18,17 @@ from femgear.case.fields import described
 from femgear.case.sections import Case, RackSection
 from femgear.case.units import ANGLE, LENGTH
 from femgear.errors import CaseError, GeometryError
+
+_DIMENSIONS = {
+    "centre_distance": LENGTH,
+    "bore_radius": LENGTH,
+    "outer_radius": LENGTH,
+    "tip_diameter": LENGTH,
+    "root_diameter": LENGTH,
+    "module": LENGTH,
+    "pressure_angle": ANGLE,
+}
+"""Of entries whose values the refusals of gears give as SI numbers."""
 
 
 def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") -> list[CaseError]:
@@ -45,32 +58,8 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
     return problems
 
 
-def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
-    """One error that lists all; its ``problems`` holds them one by one.
-
-    Parameters
-    ----------
-    problems : list of CaseError
-        At least one.
-    text : str
-        The file, for line numbers; empty where the text is not the user's.
-    name : str
-        Its name.
-    """
-    for problem in problems:
-        line = case_text.line_of(text, problem.key) if problem.key and name else None
-        problem.file = f"{name}:{line}" if line else name
-    if len(problems) == 1:
-        combined = problems[0]
-    else:
-        listed = "\n".join(str(problem) for problem in problems)
-        combined = CaseError(f"{len(problems)} problems\n{listed}", file=name)
-        combined.code = problems[0].code if len({p.code for p in problems}) == 1 else "E-CASE"
-    combined.problems = tuple(problems)
-    return combined
-
-
 def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
+    """One error of pydantic's list."""
     kind, context, value = item["type"], item.get("ctx", {}), item.get("input")
     if kind.startswith("E-"):
         return CaseError(
@@ -140,6 +129,7 @@ def _description(model: type[BaseModel], location: tuple) -> str:
 
 
 def _keys(section: type[BaseModel] | None) -> list[str]:
+    """Names of its entries as the file gives them."""
     return [field.alias or name for name, field in section.model_fields.items()] if section else []
 
 
@@ -156,6 +146,7 @@ def _section(model: type[BaseModel], location: tuple) -> type[BaseModel] | None:
 
 
 def _dotted(location: tuple, prefix: str) -> str:
+    """Key such as ``sun.modifications[0].amount``."""
     key = prefix
     for part in location:
         if isinstance(part, int):
@@ -165,16 +156,29 @@ def _dotted(location: tuple, prefix: str) -> str:
     return key
 
 
-# dimensions of the entries whose values the refusals of gears give as SI numbers
-_DIMENSIONS = {
-    "centre_distance": LENGTH,
-    "bore_radius": LENGTH,
-    "outer_radius": LENGTH,
-    "tip_diameter": LENGTH,
-    "root_diameter": LENGTH,
-    "module": LENGTH,
-    "pressure_angle": ANGLE,
-}
+def combine(problems: list[CaseError], text: str, name: str) -> CaseError:
+    """One error that lists all; its ``problems`` holds them one by one.
+
+    Parameters
+    ----------
+    problems : list of CaseError
+        At least one.
+    text : str
+        The file, for line numbers; empty where the text is not the user's.
+    name : str
+        Its name.
+    """
+    for problem in problems:
+        line = case_text.line_of(text, problem.key) if problem.key and name else None
+        problem.file = f"{name}:{line}" if line else name
+    if len(problems) == 1:
+        combined = problems[0]
+    else:
+        listed = "\n".join(str(problem) for problem in problems)
+        combined = CaseError(f"{len(problems)} problems\n{listed}", file=name)
+        combined.code = problems[0].code if len({p.code for p in problems}) == 1 else "E-CASE"
+    combined.problems = tuple(problems)
+    return combined
 
 
 def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
@@ -218,18 +222,8 @@ def rack_at(case: Case, key: str) -> RackSection:
     return case.rack if gear == "rack" else getattr(case, gear).rack
 
 
-def _in_transverse_section(error: GeometryError, case: Case) -> None:
-    """Gears of a helical case are refused in their transverse section, the file gives the normal one."""
-    if case.helix_angle is None:
-        return
-    error.message += " (in the transverse section of the helical gears"
-    factor = math.cos(case.helix_angle)
-    if factor < 0.999 and ((error.key or "").endswith("profile_shift") or "rack." in (error.key or "")):
-        error.message += f", whose coefficients are {factor:.6g} times those of the file"
-    error.message += ")"
-
-
 def _assembly(error: GeometryError, case: Case) -> None:
+    """Planets that cannot be assembled: the angles given, or the number of equally spaced planets."""
     angles = case.set.planet_angles
     if angles is None:
         error.key, error.value = "set.planets", case.set.planets
@@ -255,6 +249,17 @@ def _shift_left_out(error: GeometryError, case: Case) -> None:
     if error.code == "E-SHIFT":
         error.limit = f"such that the {gear}'s shift is {error.limit}"
     error.value, error.remedy = given, remedy
+
+
+def _in_transverse_section(error: GeometryError, case: Case) -> None:
+    """Gears of a helical case are refused in their transverse section, the file gives the normal one."""
+    if case.helix_angle is None:
+        return
+    error.message += " (in the transverse section of the helical gears"
+    factor = math.cos(case.helix_angle)
+    if factor < 0.999 and ((error.key or "").endswith("profile_shift") or "rack." in (error.key or "")):
+        error.message += f", whose coefficients are {factor:.6g} times those of the file"
+    error.message += ")"
 
 
 def added_material(case: Case) -> tuple[str, ...]:

@@ -1,6 +1,8 @@
-"""The sections of a case file and what must hold between them.
+"""The sections of a case file, and the case that they make up.
 
-Published lines: they are compared only where the case computes their speed and harmonic.
+Every entry has its type and its plausible window; values are SI numbers, angles radians. What no entry shows
+alone is in `femgear.case.checks`, but for the published lines: `check_published` refuses those whose speed or
+harmonic the case does not compute, `without_uncomputed` takes them out.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, model_validator
+from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from femgear.case.deviations import (
     CarrierErrors,
@@ -20,7 +22,7 @@ from femgear.case.deviations import (
     PlanetModificationSection,
     RingErrors,
 )
-from femgear.case.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
 from femgear.case.text import ReadCase
 from femgear.case.units import (
     ANGLE,
@@ -39,7 +41,11 @@ from femgear.case.units import (
 from femgear.errors import CaseError
 
 FORMAT = 1
+"""Newest format of the case file."""
 RPM = SPEED.scale
+"""One revolution a minute [rad/s]."""
+CODE = "E-PUBLISHED"
+"""Of refusals of published lines."""
 _MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
 
 Member = Literal["sun", "ring", "carrier"]
@@ -48,13 +54,10 @@ Mass = Quantity(MASS, 1e-6, 1e6)
 Inertia = Quantity(INERTIA, 1e-12, 1e8)
 Stiffness = Quantity(STIFFNESS, 1.0, 1e15)
 Shift = Number(-5.0, 5.0)
+_Speed = Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class SetSection(_Section):
+class SetSection(Section):
     """What the gears share.
 
     ``centre_distance`` may be left out (the profile shifts give it), and so may the profile shift of the sun,
@@ -70,7 +73,7 @@ class SetSection(_Section):
     pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
 
 
-class RackSection(_Section):
+class RackSection(Section):
     """Basic rack, in modules; the default is ISO 53 profile C."""
 
     addendum: Number(0.1, 3.0) = 1.0
@@ -78,7 +81,7 @@ class RackSection(_Section):
     root_radius: Number(0.0, 1.0) = 0.25
 
 
-class MaterialSection(_Section):
+class MaterialSection(Section):
     """Isotropic elastic material of all gears."""
 
     youngs_modulus: Quantity(MODULUS, 1e9, 1e12)
@@ -92,7 +95,7 @@ class MaterialSection(_Section):
     density: Quantity(DENSITY, 100.0, 25000.0)
 
 
-class ShaftPart(_Section):
+class ShaftPart(Section):
     """One part of a stepped shaft of the material of the gears."""
 
     length: Quantity(LENGTH, 1e-4, 10.0)
@@ -103,7 +106,7 @@ class ShaftPart(_Section):
 _Shaft = Annotated[tuple[ShaftPart, ...], Field(max_length=50)]
 
 
-class SunSection(_Section):
+class SunSection(Section):
     """The sun, and with it the module and the pressure angle of the set."""
 
     teeth: Count(5, 5000, note=_MANY_TEETH)
@@ -122,7 +125,7 @@ class SunSection(_Section):
     errors: GearErrors | None = None
 
 
-class PlanetSection(_Section):
+class PlanetSection(Section):
     """One of the equal planets."""
 
     teeth: Count(5, 5000, note=_MANY_TEETH)
@@ -140,7 +143,7 @@ class PlanetSection(_Section):
     individual: Annotated[tuple[IndividualPlanet, ...], Field(max_length=1000)] = ()
 
 
-class RingSection(_Section):
+class RingSection(Section):
     """The internal gear; a positive profile shift moves its flanks outwards, to larger radii."""
 
     teeth: Count(10, 5000, note=_MANY_TEETH, signed=True)
@@ -157,7 +160,7 @@ class RingSection(_Section):
     errors: RingErrors | None = None
 
 
-class CarrierSection(_Section):
+class CarrierSection(Section):
     """The rigid carrier, without its planets."""
 
     mass: Mass
@@ -167,7 +170,7 @@ class CarrierSection(_Section):
     errors: CarrierErrors | None = None
 
 
-class MachineSection(_Section):
+class MachineSection(Section):
     """A rotor behind a torsional coupling; without it the member turns freely under its torque."""
 
     inertia: Inertia
@@ -186,16 +189,15 @@ def _speed_range(value: object) -> object:
     return [f"{ends.start + i * step!r} rad/s" for i in range(ends.count)]
 
 
-_Speed = Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)
+class _SpeedRange(Section):
+    """Equally spaced speeds, both ends among them."""
 
-
-class _SpeedRange(_Section):
     start: _Speed = Field(alias="from")
     to: _Speed
     count: Count(2, 100_000)
 
 
-class OperationSection(_Section):
+class OperationSection(Section):
     """Torque and speeds of the input member; a negative torque loads the other flanks."""
 
     input: Member
@@ -204,7 +206,7 @@ class OperationSection(_Section):
     speeds: Annotated[tuple[_Speed, ...], BeforeValidator(_speed_range), Field(max_length=100_000)]
 
 
-class StaticSection(_Section):
+class StaticSection(Section):
     """Positions over one mesh period, contact search and grid."""
 
     positions: Count(8, 4096) = 64
@@ -217,7 +219,7 @@ class StaticSection(_Section):
     depth: Quantity(LENGTH, 1e-6, 0.1) | None = None
 
 
-class DynamicsSection(_Section):
+class DynamicsSection(Section):
     """Modal damping, reach of the excitation and tolerance of the periodic solution.
 
     The excitation of a set with an elastic ring ends at the frequency ``up_to``, or after ``mesh_harmonics``;
@@ -231,7 +233,7 @@ class DynamicsSection(_Section):
     tolerance: Number(1e-14, 1e-2) = 1e-6
 
 
-class PublishedLines(_Section):
+class PublishedLines(Section):
     """Lines and lobes around a mesh harmonic that somebody published; the report compares them."""
 
     speed: _Speed
@@ -241,7 +243,7 @@ class PublishedLines(_Section):
     source: Title
 
 
-class HousingSection(_Section):
+class HousingSection(Section):
     """The fixed sensor, and how the ring's field is carried to it.
 
     ``form = "exact"`` hears every circumferential component at its own order; ``"linear"`` is the
@@ -254,7 +256,7 @@ class HousingSection(_Section):
     published: tuple[PublishedLines, ...] = ()
 
 
-class Case(_Section, ReadCase):
+class Case(Section, ReadCase):
     """A planetary gear set, its operation and how to compute it, in SI units.
 
     The sections carry the names of the case file. ``source`` is the text that gives this case,
@@ -315,7 +317,7 @@ class RigidCase(Case):
         return True
 
 
-class MeshStiffnessSection(_Section):
+class MeshStiffnessSection(Section):
     """Constant stiffness of every mesh, in place of the static solution's."""
 
     sun_planet: Quantity(STIFFNESS, 1e3, 1e13)
@@ -326,9 +328,6 @@ def output_member(case: Case) -> str:
     """The member that is neither driven nor held."""
     others = {case.operation.input, case.operation.fixed}
     return next((name for name in ("carrier", "sun", "ring") if name not in others), "carrier")
-
-
-CODE = "E-PUBLISHED"
 
 
 def check_published(case: Case) -> Iterator[CaseError]:

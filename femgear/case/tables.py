@@ -1,6 +1,7 @@
-"""CSV files of two columns that a case names: numbers with their units in the heading.
+"""CSV files that a case names: two columns, numbers with their units in the heading.
 
-Measured profiles: the CSV files that a case names, read once and kept inside the case.
+`read_columns` reads any such file, `embedded` one beside the case file. `embed_profiles` puts the points of
+measured profiles in the place of their files: they are read once and kept inside the case.
 """
 
 from __future__ import annotations
@@ -22,6 +23,11 @@ from femgear.errors import CaseError
 
 _HEADING = re.compile(r"\s*(?P<name>[A-Za-z_ ]+?)[\s_]*[\[(](?P<unit>[^\])]+)[\])]\s*")
 _COMMAS = "decimal commas need semicolons or tabs between the columns, or write decimal points"
+
+_PROFILE_ENTRIES = {"roll angle": "roll_angles", "diameter": "diameters", "deviation": "deviations"}
+_PROFILE_DIMENSIONS = {"roll angle": ANGLE, "diameter": LENGTH, "deviation": LENGTH}
+_PROFILE_UNITS = {"roll_angles": "rad", "diameters": "m", "deviations": "m"}
+_PROFILE_HEADING = "the first line names two columns: roll angle [deg] or diameter [mm], and deviation [um]"
 
 
 @dataclass(frozen=True)
@@ -50,42 +56,6 @@ class Columns:
         return _problem(message, self.name, line, value=value, limit=limit, remedy=remedy)
 
 
-def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
-    """What `read` finds in a file beside the case file or below.
-
-    Parameters
-    ----------
-    file : str
-        Relative to the folder of the case file.
-    name : str
-        Of the case file.
-    key : str
-        Of the entry, for messages.
-    read : callable
-        Takes the path.
-
-    Raises
-    ------
-    CaseError
-        A path that leads out of the folder (E-FILE), and what `read` raises, with the key.
-    """
-    path = PurePath(file)
-    if path.is_absolute() or ".." in path.parts or not path.parts:
-        raise CaseError(
-            "the file must lie in the folder of the case or below",
-            code="E-FILE",
-            key=key,
-            value=text.printable(file),
-            file=name or None,
-            remedy="copy it there and name it relative to the case file",
-        )
-    try:
-        return read(os.path.join(os.path.dirname(name), file))
-    except CaseError as error:
-        error.key = key
-        raise
-
-
 def read_columns(
     path: str | os.PathLike, dimensions: Mapping[str, Dimension], *, least: int, most: int, remedy: str
 ) -> Columns:
@@ -107,7 +77,7 @@ def read_columns(
     Raises
     ------
     CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `tomlfile.read_text`); ``E-CSV`` with the number of the line: unknown
+        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-CSV`` with the number of the line: unknown
         columns or units, numbers that are none or not finite, decimal commas beside decimal points.
     """
     name = text.printable(os.fsdecode(path))
@@ -130,6 +100,7 @@ def read_columns(
 
 
 def _text(path) -> str:
+    """Text of the file; a refusal says what is expected."""
     try:
         return text.read_text(path)
     except CaseError as error:
@@ -168,6 +139,7 @@ def _heading(cells, dimensions, name: str, line: int, remedy: str) -> dict[str, 
 
 
 def _has(unit: str, dimension: Dimension) -> bool:
+    """Whether a unit has a dimension."""
     try:
         to_si(f"1 {unit}", dimension)
     except CaseError:
@@ -188,6 +160,7 @@ def _row(cells, titles: list[str], divider: str, comma: bool, name: str, line: i
 
 
 def _number(cell: str, divider: str, comma: bool, name: str, line: int) -> float:
+    """A finite number, with a decimal comma where the file has them."""
     if comma and "." in cell:
         raise _problem(
             "decimal commas and points in one file", name, line, value=cell, limit="one of them",
@@ -209,10 +182,40 @@ def _problem(message: str, name: str, line: int | None, *, value=None, limit=Non
     return CaseError(message, code="E-CSV", file=file, value=value, limit=limit, remedy=remedy)
 
 
-_COLUMNS = {"roll angle": "roll_angles", "diameter": "diameters", "deviation": "deviations"}
-_DIMENSIONS = {"roll angle": ANGLE, "diameter": LENGTH, "deviation": LENGTH}
-_UNITS = {"roll_angles": "rad", "diameters": "m", "deviations": "m"}
-_REMEDY = "the first line names two columns: roll angle [deg] or diameter [mm], and deviation [um]"
+def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
+    """What `read` finds in a file beside the case file or below.
+
+    Parameters
+    ----------
+    file : str
+        Relative to the folder of the case file.
+    name : str
+        Of the case file.
+    key : str
+        Of the entry, for messages.
+    read : callable
+        Takes the path.
+
+    Raises
+    ------
+    CaseError
+        A path that leads out of the folder (E-FILE), and what `read` raises, with the key.
+    """
+    path = PurePath(file)
+    if path.is_absolute() or ".." in path.parts or not path.parts:
+        raise CaseError(
+            "the file must lie in the folder of the case or below",
+            code="E-FILE",
+            key=key,
+            value=text.printable(file),
+            file=name or None,
+            remedy="copy it there and name it relative to the case file",
+        )
+    try:
+        return read(os.path.join(os.path.dirname(name), file))
+    except CaseError as error:
+        error.key = key
+        raise
 
 
 def embed_profiles(data: dict, name: str) -> dict[str, str]:
@@ -248,7 +251,7 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
             file = table.pop("file")
             columns = embedded(file, name, f"{key}.file", read_profile)
             for column, values in columns.items():
-                table[column] = [f"{value:.13g} {_UNITS[column]}" for value in values]
+                table[column] = [f"{value:.13g} {_PROFILE_UNITS[column]}" for value in values]
             found[key] = text.printable(file)
     return found
 
@@ -272,12 +275,12 @@ def read_profile(path: str | os.PathLike) -> dict[str, list[float]]:
     Raises
     ------
     CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `tomlfile.read_text`); ``E-CSV`` with the number of the line.
+        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-CSV`` with the number of the line.
     """
-    found = read_columns(path, _DIMENSIONS, least=2, most=MOST_POINTS, remedy=_REMEDY)
+    found = read_columns(path, _PROFILE_DIMENSIONS, least=2, most=MOST_POINTS, remedy=_PROFILE_HEADING)
     if "deviation" not in found.values:
         words = f"the columns are {' and '.join(found.values)}"
-        raise found.problem(words, found.heading, limit="one of them deviations", remedy=_REMEDY)
+        raise found.problem(words, found.heading, limit="one of them deviations", remedy=_PROFILE_HEADING)
     (places,) = (values for title, values in found.values.items() if title != "deviation")
     rising = places[1] > places[0]
     for (before, after), line in zip(pairwise(places), found.lines[1:], strict=True):
@@ -286,4 +289,4 @@ def read_profile(path: str | os.PathLike) -> dict[str, list[float]]:
                 "the points are neither ascending nor descending", line, value=after,
                 remedy="sort the lines, and keep one line of every point",
             )  # fmt: skip
-    return {_COLUMNS[title]: values for title, values in found.values.items()}
+    return {_PROFILE_ENTRIES[title]: values for title, values in found.values.items()}

@@ -1,7 +1,4 @@
-"""TOML text: read with care, and written back.
-
-Where a case came from: its file, the text that gives it, the lines of its keys.
-"""
+"""TOML text of a case: read with care, written back, and remembered with the lines of its keys."""
 
 from __future__ import annotations
 
@@ -17,6 +14,8 @@ from femgear.errors import CaseError
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 32
+"""Levels of tables and lists."""
+
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _HEADER = re.compile(r"\s*(\[\[?)([^\[\]#]+)\]")
 _ENTRY = re.compile(r"\s*([A-Za-z0-9_.\"' -]+?)\s*=")
@@ -117,6 +116,23 @@ def parse(text: str, name: str) -> dict:
     return data
 
 
+def _check_tree(data: dict, name: str) -> dict[str, float]:
+    """Keys and values of the numbers that are not finite; refuses what is too deep (without recursion)."""
+    infinite, pending = {}, [("", data, 1)]
+    while pending:
+        key, value, depth = pending.pop()
+        if depth > MAX_DEPTH:
+            raise _too_deep(name)
+        if isinstance(value, dict):
+            prefix = f"{key}." if key else ""
+            pending += [(prefix + printable(k), v, depth + 1) for k, v in reversed(value.items())]
+        elif isinstance(value, list):
+            pending += [(f"{key}[{i}]", v, depth + 1) for i, v in reversed(list(enumerate(value)))]
+        elif isinstance(value, float) and not math.isfinite(value):
+            infinite[key] = value
+    return infinite
+
+
 def _too_deep(name: str) -> CaseError:
     return CaseError(
         "tables or lists are nested too deeply", code="E-TOML-DEPTH", file=name, limit=f"{MAX_DEPTH} levels"
@@ -124,6 +140,7 @@ def _too_deep(name: str) -> CaseError:
 
 
 def _syntax_error(text: str, message: str, name: str) -> CaseError:
+    """Refusal of a text that is no TOML: of a key given twice with both lines."""
     position = re.search(r"\(at line (\d+), column \d+\)", message)
     line = int(position[1]) if position else text.count("\n") + 1
     if "Cannot overwrite a value" in message or "Cannot declare" in message:
@@ -158,6 +175,19 @@ def _duplicate(text: str, line: int) -> tuple[str | None, list[int]]:
     return key, seen[key]
 
 
+def line_of(text: str, key: str) -> int | None:
+    """Line (from 1) that gives the dotted ``key``, or None where no line starts with it.
+
+    Of an entry of a list it is the line of the entry, of its table, or of the list.
+    """
+    lines: dict[str, int] = {}
+    for found, number in _entries(text):
+        lines.setdefault(found, number)
+    table = key.rpartition("]")
+    wanted = (key, re.sub(r"(\[\d+\])+$", "", key), table[0] + table[1], key.split("[")[0], f"{key}[0]")
+    return next((lines[name] for name in wanted if name in lines), None)
+
+
 def _entries(text: str):
     """Dotted key and line number of every table header and every key that starts a line.
 
@@ -183,37 +213,8 @@ def _entries(text: str):
 
 
 def _clean(key: str) -> str:
+    """Dotted key without blanks and quotation marks."""
     return ".".join(part.strip().strip("\"'") for part in key.split("."))
-
-
-def line_of(text: str, key: str) -> int | None:
-    """Line (from 1) that gives the dotted ``key``, or None where no line starts with it.
-
-    Of an entry of a list it is the line of the entry, of its table, or of the list.
-    """
-    lines: dict[str, int] = {}
-    for found, number in _entries(text):
-        lines.setdefault(found, number)
-    table = key.rpartition("]")
-    wanted = (key, re.sub(r"(\[\d+\])+$", "", key), table[0] + table[1], key.split("[")[0], f"{key}[0]")
-    return next((lines[name] for name in wanted if name in lines), None)
-
-
-def _check_tree(data: dict, name: str) -> dict[str, float]:
-    """Keys and values of the numbers that are not finite; refuses what is too deep (without recursion)."""
-    infinite, pending = {}, [("", data, 1)]
-    while pending:
-        key, value, depth = pending.pop()
-        if depth > MAX_DEPTH:
-            raise _too_deep(name)
-        if isinstance(value, dict):
-            prefix = f"{key}." if key else ""
-            pending += [(prefix + printable(k), v, depth + 1) for k, v in reversed(value.items())]
-        elif isinstance(value, list):
-            pending += [(f"{key}[{i}]", v, depth + 1) for i, v in reversed(list(enumerate(value)))]
-        elif isinstance(value, float) and not math.isfinite(value):
-            infinite[key] = value
-    return infinite
 
 
 def write(data: dict) -> str:
@@ -227,6 +228,27 @@ def write(data: dict) -> str:
     lines: list[str] = []
     _write_table(data, (), lines)
     return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def text_with_points(data: dict, name: str, *, points: str, remedy: str) -> str:
+    """TOML text of tables that the points of other files were put into.
+
+    Raises
+    ------
+    CaseError
+        It is too long for a case file (E-FILE).
+    """
+    text = write(data)
+    if len(text.encode()) > MAX_BYTES:
+        raise CaseError(
+            f"the case is too long with the points of its {points}",
+            code="E-FILE",
+            value=f"{len(text.encode())} bytes",
+            limit=f"{MAX_BYTES} bytes",
+            remedy=remedy,
+            file=name or None,
+        )
+    return text
 
 
 def _write_table(table: dict, path: tuple[str, ...], lines: list[str]) -> None:
@@ -268,25 +290,6 @@ def _escape(character: str) -> str:
         return character
     code = ord(character)
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
-
-
-def shown(number: int) -> str:
-    """Text of an integer of any size (``str`` refuses those of thousands of digits)."""
-    if abs(number) < 10**15:
-        return str(number)
-    return f"{'-' if number < 0 else ''}about 2^{abs(number).bit_length()}"
-
-
-def found(number: int) -> int | str:
-    """An integer as messages show it: itself, or the size of one of thousands of digits."""
-    return number if abs(number) < 10**15 else shown(number)
-
-
-def printable(text: str) -> str:
-    """``text`` with every control character as an escape, fit for one line of a message."""
-    return "".join(
-        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text
-    )
 
 
 class ReadCase(BaseModel):
@@ -346,22 +349,20 @@ class ReadCase(BaseModel):
         return self._notices
 
 
-def text_with_points(data: dict, name: str, *, points: str, remedy: str) -> str:
-    """TOML text of tables that the points of other files were put into.
+def printable(text: str) -> str:
+    """``text`` with every control character as an escape, fit for one line of a message."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text
+    )
 
-    Raises
-    ------
-    CaseError
-        It is too long for a case file (E-FILE).
-    """
-    text = write(data)
-    if len(text.encode()) > MAX_BYTES:
-        raise CaseError(
-            f"the case is too long with the points of its {points}",
-            code="E-FILE",
-            value=f"{len(text.encode())} bytes",
-            limit=f"{MAX_BYTES} bytes",
-            remedy=remedy,
-            file=name or None,
-        )
-    return text
+
+def shown(number: int) -> str:
+    """Text of an integer of any size (``str`` refuses those of thousands of digits)."""
+    if abs(number) < 10**15:
+        return str(number)
+    return f"{'-' if number < 0 else ''}about 2^{abs(number).bit_length()}"
+
+
+def found(number: int) -> int | str:
+    """An integer as messages show it: itself, or the size of one of thousands of digits."""
+    return number if abs(number) < 10**15 else shown(number)

@@ -123,13 +123,6 @@ def _factor(unit: str, dimension: Dimension, text: str) -> float:
     return found[0] / expected[0]
 
 
-@functools.cache
-def _registry():
-    import pint
-
-    return pint.UnitRegistry()
-
-
 @functools.lru_cache(maxsize=256)
 def _root(unit: str) -> tuple[float, dict[str, float]] | None:
     """Factor to and exponents of the registry's root units (radian among them); None if unknown."""
@@ -141,3 +134,11 @@ def _root(unit: str) -> tuple[float, dict[str, float]] | None:
     except (pint.errors.PintError, ValueError):
         return None
     return float(quantity.magnitude), {str(name): float(power) for name, power in quantity._units.items()}
+
+
+@functools.cache
+def _registry():
+    """Pint's units, loaded when the first quantity is read."""
+    import pint
+
+    return pint.UnitRegistry()

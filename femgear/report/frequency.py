@@ -111,6 +111,7 @@ def campbell(
 
 
 def _sense(value: float | None) -> dict:
+    """Colour, dash and legend of a sense of whirl."""
     if value is None:
         return {"color": BLUE, "linestyle": "-", "label": "mode"}
     if value > 0.1:
@@ -313,6 +314,7 @@ def _phase(response: np.ndarray) -> np.ndarray:
 
 
 def _columns(values, count: int, along: np.ndarray) -> np.ndarray:
+    """Curves as columns, refused where their number or length is another."""
     values = np.asarray(values)
     values = values[:, None] if values.ndim == 1 else values
     if values.shape != (len(along), count):

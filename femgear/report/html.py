@@ -17,10 +17,11 @@ from femgear.storage.results import Results
 if TYPE_CHECKING:
     from femgear.trains.protocol import Train
 
-_LARGEST_PICTURE = 8_000_000  # bytes
+_LARGEST_PICTURE = 8_000_000
+"""Bytes of a picture on the page."""
 _OTHER = "Other pictures"
+"""Section of those that no stage describes."""
 _KINDS = {".png": "image/png", ".gif": "image/gif"}
-
 _STYLE = """
 body { font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1b1b1b; background: #fff;
   max-width: 62rem; margin: 2rem auto; padding: 0 1.2rem; }
@@ -111,28 +112,33 @@ def page(train: Train, results: Results) -> str:
 
 
 def _lead(results: Results) -> str:
+    """Version, stages, and whether the run came to its end."""
     stages = ", ".join(results.stages) or "nothing"
     state = "" if results.manifest.complete else "; the run did not come to its end"
     return f"femgear {results.manifest.versions.get('femgear', '')}: {stages}{state}"
 
 
 def _contents(sections, numbers, pictures) -> str:
+    """Links to the sections that there are."""
     shown = [name for name in sections if name in numbers or any(p.section == name for p in pictures)]
     links = [("gears", "Gears"), *((_anchor(name), name) for name in shown), ("provenance", "Provenance")]
     return "<nav>" + " ".join(f'<a href="#{key}">{escape(text)}</a>' for key, text in links) + "</nav>\n"
 
 
 def _anchor(name: str) -> str:
+    """Name of a section in links."""
     return name.lower().replace(" ", "-")
 
 
 def _warnings(warnings) -> str:
+    """List of all warnings, empty without any."""
     if not warnings:
         return ""
     return '<ul class="warnings">\n' + "".join(f"<li>{escape(text)}</li>\n" for text in warnings) + "</ul>\n"
 
 
 def _section(name: str, numbers, pictures, train: Train, results: Results) -> str:
+    """Tables and pictures of a stage, empty without any."""
     blocks = [numbers[name]] if name in numbers else []
     for stage in train.stages:
         if stage.title == name and stage.name in results.stages:
@@ -145,6 +151,7 @@ def _section(name: str, numbers, pictures, train: Train, results: Results) -> st
 
 
 def _table(block: Block, *, heading: bool = True) -> str:
+    """A table with its notes."""
     title = f"<h3>{escape(block.title)}</h3>\n" if heading else ""
     header = "".join(f"<th>{escape(text)}</th>" for text in block.header)
     rows = "".join(
@@ -156,6 +163,16 @@ def _table(block: Block, *, heading: bool = True) -> str:
         table = f'<div class="wide"><table>\n{head}<tbody>\n{rows}</tbody>\n</table></div>\n'
     notes = "".join(f'<p class="note">{escape(note)}</p>\n' for note in block.notes)
     return title + table + notes
+
+
+def _figure(picture: Picture) -> str:
+    """A picture with its caption, embedded."""
+    data = base64.b64encode(picture.data).decode("ascii")
+    caption = escape(picture.caption)
+    return (
+        f'<figure>\n<img alt="{caption}" src="data:{picture.kind};base64,{data}">\n'
+        f"<figcaption>{caption}</figcaption>\n</figure>\n"
+    )
 
 
 def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]:
@@ -191,16 +208,8 @@ def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
     return len(captions), _OTHER, re.sub("[_-]+", " ", stem)
 
 
-def _figure(picture: Picture) -> str:
-    data = base64.b64encode(picture.data).decode("ascii")
-    caption = escape(picture.caption)
-    return (
-        f'<figure>\n<img alt="{caption}" src="data:{picture.kind};base64,{data}">\n'
-        f"<figcaption>{caption}</figcaption>\n</figure>\n"
-    )
-
-
 def _provenance(results: Results, numbers) -> str:
+    """Time, versions, checksums, and the case as run."""
     manifest = results.manifest
     versions = Block("Versions", ("", "version"), tuple(manifest.versions.items()))
     files = tuple((name, digest) for name, digest in manifest.files.items() if name != "report.html")

@@ -1,4 +1,7 @@
-"""Figures that several trains draw: mode shapes, transmission errors over period and harmonics, sweeps."""
+"""Figures of modes and periodic responses: mode shapes, spectra of the transmission error, sweeps over speed.
+
+They draw datasets of results, of whatever train; helpers for figures over the mesh period stand beside them.
+"""
 
 from __future__ import annotations
 
@@ -32,63 +35,135 @@ if TYPE_CHECKING:
 
     from femgear.gears.planetary import PlanetarySet
 
-
-# spectra end so far below their largest line, and have bars up to so many
 MANY_SPEEDS = 3
 """More speeds are drawn over the speed, too."""
 _DECADES, _MOST_BARS = 1e-5, 60
+"""Spectra end so far below their largest line, and have bars up to so many."""
+_CIRCLE = np.linspace(0.0, 2 * np.pi, 241)
+"""Angles of the outlines of bodies [rad]."""
 
 
-def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
-    """Complex harmonics of a variable stored as real and imaginary part."""
-    return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
+def mode_shapes(
+    modes: xr.Dataset, planetary_set: PlanetarySet, *, shown: Sequence[int] | None = None, scale: float = 0.16
+) -> Figure:
+    """Bodies and outer ring surface in their undeformed (grey) and displaced positions.
 
+    Parameters
+    ----------
+    modes : xarray.Dataset
+        With ``shape`` (dof, mode), ``frequency`` [Hz], ``kind``, ``nodal_diameter`` and, where there is
+        an elastic ring, ``ring_shape_real`` and ``ring_shape_imag`` (mode, circumferential).
+    planetary_set : PlanetarySet
+        Radii, centre distance and planet angles.
+    shown : sequence of int, optional
+        Mode numbers from 0; the first twelve that are no rigid-body motions when omitted.
+    scale : float
+        Largest displacement as a share of the ring's outer radius.
 
-def fine_positions(harmonics: int) -> np.ndarray:
-    """Positions of one mesh period, enough for a curve of so many harmonics."""
-    return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
-
-
-def name_kinds(ax, dynamics: xr.Dataset) -> None:
-    """Legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
-    known = "excitation" if "excitation_limit" in dynamics else "response"
-    for text, look in (
-        ("dynamic (thick)", {"linewidth": 2.0}),
-        (f"static, harmonics of the {known} (thin)", {"linewidth": 0.9}),
-        ("static, whole (pale)", {"linewidth": 2.5, "alpha": 0.3}),
-    ):
-        ax.plot([], [], color=BLACK, label=text, **look)
-
-
-def draw_static(ax, at, values, harmonics: int, position, style) -> None:
-    """Static transmission error [m] less its mean: the whole record pale, its first harmonics thin."""
-    at, whole, part = _fluctuation(at, values, harmonics, position)
-    ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
-    ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
-
-
-def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
-    """Highest harmonic of the mesh frequency that excites: by ``excitation_limit`` [Hz] where it is known."""
-    highest = int(dynamics["harmonic"].values.max())
-    if "excitation_limit" not in dynamics:
-        return highest
-    limit = float(dynamics["excitation_limit"].values[speed_index])
-    frequency = float(dynamics["mesh_frequency"].values[speed_index])
-    return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
-
-
-def _fluctuation(at, values, harmonics: int, position):
-    """A record of one period less its mean, closed, and the sum of its first harmonics at `position`.
-
-    The record is linear between its positions, which may be closer where it is steep. Harmonics of such a
-    curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
+    Returns
+    -------
+    Figure
     """
-    at, value = periodic(at, values)
-    mean = np.trapezoid(value, at) / (at[-1] - at[0])
-    slope = np.diff(value) / np.diff(at)
-    jump, h = slope - np.roll(slope, 1), np.arange(1, harmonics + 1)
-    line = -2.0 * np.exp(-2j * np.pi * np.outer(h, at[:-1])) @ jump / (2.0 * np.pi * h) ** 2
-    return at, value - mean, (line @ np.exp(2j * np.pi * np.outer(h, position))).real
+    frequency = modes["frequency"].values
+    if shown is None:
+        elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))
+        shown = elastic[:12]
+    shown = [int(mode) for mode in shown]
+    columns = max(min(4, len(shown)), 1)
+    rows = max(-(-len(shown) // columns), 1)
+    figure, axes = new_figure(rows=rows, columns=columns, width=2.5 * columns, height=2.75 * rows + 0.5)
+    for ax in axes:
+        ax.set_axis_off()
+        ax.set_aspect("equal")
+    for ax, mode in zip(axes, shown):
+        _draw_mode(ax, modes, planetary_set, mode, scale)
+    legend_below(figure, columns=5)
+    return figure
+
+
+def _draw_mode(ax, modes, planetary_set, mode, scale):
+    """One mode: bodies with a spoke each, the carrier by its pins, the ring by its outer surface."""
+    shape = dict(zip((str(name) for name in modes["dof"].values), modes["shape"].values[:, mode]))
+    outer = planetary_set.ring.rim_radius
+    ring = _ring_radial(modes, mode)
+    bodies = _bodies(planetary_set)
+    largest = np.abs(ring).max()
+    for name, radius in (("ring", outer), *((name, body[1]) for name, body in bodies.items())):
+        x, y, turn = _motion(shape, name)
+        largest = max(largest, np.hypot(x, y), abs(turn) * radius)
+    factor = scale * outer / largest if largest > 0 else 0.0
+    circle = np.exp(1j * _CIRCLE)
+    ax.plot(*_xy(outer * circle), color="0.8", linewidth=1.0, label="at rest")
+    rigid = _motion(shape, "ring")
+    shift, turn = factor * (rigid[0] + 1j * rigid[1]), factor * rigid[2]
+    ax.plot(
+        *_xy((outer + factor * ring) * circle + shift),
+        color=BLACK,
+        linewidth=1.8,
+        label="ring, outer surface",
+    )
+    if "ring: rotation" in shape:
+        # a rigid ring shows its rotation by a mark in its rim
+        mark = np.array([0.9, 1.0]) * outer
+        ax.plot(*_xy(1j * mark), color="0.8", linewidth=1.0)
+        ax.plot(*_xy(shift + 1j * mark * np.exp(1j * turn)), color=BLACK, linewidth=1.8)
+    for name, (centre, radius, colour, text) in bodies.items():
+        x, y, turn = _motion(shape, name)
+        moved = centre + factor * (x + 1j * y)
+        spoke = np.exp(1j * (np.angle(centre) if centre else 0.0)) * radius
+        if name == "carrier":
+            _draw_carrier(ax, planetary_set, moved, factor * turn, colour)
+            continue
+        ax.plot(*_xy(centre + radius * circle), color="0.8", linewidth=1.0)
+        ax.plot(*_xy(np.array([centre, centre + spoke])), color="0.8", linewidth=1.0)
+        ax.plot(*_xy(moved + radius * circle), color=colour, linewidth=1.6, label=text)
+        ax.plot(
+            *_xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6
+        )
+    span = 1.24 * outer
+    ax.set_xlim(-span, span)
+    ax.set_ylim(-span, span)
+    diameter = int(modes["nodal_diameter"].values[mode])
+    text = f"mode {mode + 1}: {modes['frequency'].values[mode]:.5g} Hz\n{modes['kind'].values[mode]}"
+    ax.set_title(text + (f", n = {diameter}" if diameter >= 0 else ""), fontsize=SIZE - 1.5)
+
+
+def _draw_carrier(ax, planetary_set, moved, turn, colour):
+    """Displaced pins, each joined to the centre of the carrier."""
+    pins = planetary_set.centre_distance * np.exp(1j * np.asarray(planetary_set.planet_angles, float))
+    pins = moved + pins * np.exp(1j * turn)
+    for pin in pins:
+        ax.plot(*_xy(np.array([moved, pin])), color=colour, linewidth=1.2, linestyle="--", label="carrier")
+    ax.plot(*_xy(pins), "o", color=colour, markersize=3)
+
+
+def _bodies(planetary_set):
+    """Centre, radius, colour and legend of every rigid body."""
+    bodies = {"carrier": (0j, planetary_set.centre_distance, GREEN, "carrier")}
+    bodies["sun"] = (0j, planetary_set.sun.reference_radius, VERMILION, "sun")
+    for n, angle in enumerate(planetary_set.planet_angles):
+        centre = planetary_set.centre_distance * np.exp(1j * float(angle))
+        bodies[f"planet {n + 1}"] = (centre, planetary_set.planet.reference_radius, BLUE, "planets")
+    return bodies
+
+
+def _motion(shape, name):
+    """Displacement and rotation of a body in a mode; zero where it does not move."""
+    return tuple(float(shape.get(f"{name}: {axis}", 0.0)) for axis in ("x", "y", "rotation"))
+
+
+def _ring_radial(modes, mode):
+    """Radial displacement of the outer surface at the angles of `_CIRCLE`."""
+    if "ring_shape_real" not in modes:
+        return np.zeros_like(_CIRCLE)
+    n = modes["circumferential"].values
+    value = modes["ring_shape_real"].values[mode] + 1j * modes["ring_shape_imag"].values[mode]
+    return (np.exp(1j * np.outer(_CIRCLE, n)) @ value).real
+
+
+def _xy(points):
+    """Coordinates of complex points."""
+    return points.real, points.imag
 
 
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
@@ -204,6 +279,58 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     return figure
 
 
+def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
+    """Complex harmonics of a variable stored as real and imaginary part."""
+    return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
+
+
+def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
+    """Highest harmonic of the mesh frequency that excites: by ``excitation_limit`` [Hz] where it is known."""
+    highest = int(dynamics["harmonic"].values.max())
+    if "excitation_limit" not in dynamics:
+        return highest
+    limit = float(dynamics["excitation_limit"].values[speed_index])
+    frequency = float(dynamics["mesh_frequency"].values[speed_index])
+    return min(int(limit / frequency * (1.0 + 1e-9)), highest) if frequency > 0.0 else highest
+
+
+def fine_positions(harmonics: int) -> np.ndarray:
+    """Positions of one mesh period, enough for a curve of so many harmonics."""
+    return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
+
+
+def name_kinds(ax, dynamics: xr.Dataset) -> None:
+    """Legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
+    known = "excitation" if "excitation_limit" in dynamics else "response"
+    for text, look in (
+        ("dynamic (thick)", {"linewidth": 2.0}),
+        (f"static, harmonics of the {known} (thin)", {"linewidth": 0.9}),
+        ("static, whole (pale)", {"linewidth": 2.5, "alpha": 0.3}),
+    ):
+        ax.plot([], [], color=BLACK, label=text, **look)
+
+
+def draw_static(ax, at, values, harmonics: int, position, style) -> None:
+    """Static transmission error [m] less its mean: the whole record pale, its first harmonics thin."""
+    at, whole, part = _fluctuation(at, values, harmonics, position)
+    ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
+    ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
+
+
+def _fluctuation(at, values, harmonics: int, position):
+    """A record of one period less its mean, closed, and the sum of its first harmonics at `position`.
+
+    The record is linear between its positions, which may be closer where it is steep. Harmonics of such a
+    curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
+    """
+    at, value = periodic(at, values)
+    mean = np.trapezoid(value, at) / (at[-1] - at[0])
+    slope = np.diff(value) / np.diff(at)
+    jump, h = slope - np.roll(slope, 1), np.arange(1, harmonics + 1)
+    line = -2.0 * np.exp(-2j * np.pi * np.outer(h, at[:-1])) @ jump / (2.0 * np.pi * h) ** 2
+    return at, value - mean, (line @ np.exp(2j * np.pi * np.outer(h, position))).real
+
+
 def panels(count: int):
     """Figure with `count` axes of one vertical scale, two in a row."""
     rows, columns = -(-count // 2), min(count, 2)
@@ -215,134 +342,12 @@ def panels(count: int):
     return figure, axes[:count]
 
 
-def some_speeds(count: int, limit: int = 4) -> list[int]:
-    """Numbers of at most `limit` speeds, spread evenly."""
-    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, limit))})
-
-
-_CIRCLE = np.linspace(0.0, 2 * np.pi, 241)
-
-
-def mode_shapes(
-    modes: xr.Dataset, planetary_set: PlanetarySet, *, shown: Sequence[int] | None = None, scale: float = 0.16
-) -> Figure:
-    """Bodies and outer ring surface in their undeformed (grey) and displaced positions.
-
-    Parameters
-    ----------
-    modes : xarray.Dataset
-        With ``shape`` (dof, mode), ``frequency`` [Hz], ``kind``, ``nodal_diameter`` and, where there is
-        an elastic ring, ``ring_shape_real`` and ``ring_shape_imag`` (mode, circumferential).
-    planetary_set : PlanetarySet
-        Radii, centre distance and planet angles.
-    shown : sequence of int, optional
-        Mode numbers from 0; the first twelve that are no rigid-body motions when omitted.
-    scale : float
-        Largest displacement as a share of the ring's outer radius.
-
-    Returns
-    -------
-    Figure
-    """
-    frequency = modes["frequency"].values
-    if shown is None:
-        elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))
-        shown = elastic[:12]
-    shown = [int(mode) for mode in shown]
-    columns = max(min(4, len(shown)), 1)
-    rows = max(-(-len(shown) // columns), 1)
-    figure, axes = new_figure(rows=rows, columns=columns, width=2.5 * columns, height=2.75 * rows + 0.5)
-    for ax in axes:
-        ax.set_axis_off()
-        ax.set_aspect("equal")
-    for ax, mode in zip(axes, shown):
-        _draw_mode(ax, modes, planetary_set, mode, scale)
-    legend_below(figure, columns=5)
-    return figure
-
-
-def _draw_mode(ax, modes, planetary_set, mode, scale):
-    shape = dict(zip((str(name) for name in modes["dof"].values), modes["shape"].values[:, mode]))
-    outer = planetary_set.ring.rim_radius
-    ring = _ring_radial(modes, mode)
-    bodies = _bodies(planetary_set)
-    largest = np.abs(ring).max()
-    for name, radius in (("ring", outer), *((name, body[1]) for name, body in bodies.items())):
-        x, y, turn = _motion(shape, name)
-        largest = max(largest, np.hypot(x, y), abs(turn) * radius)
-    factor = scale * outer / largest if largest > 0 else 0.0
-    circle = np.exp(1j * _CIRCLE)
-    ax.plot(*_xy(outer * circle), color="0.8", linewidth=1.0, label="at rest")
-    rigid = _motion(shape, "ring")
-    shift, turn = factor * (rigid[0] + 1j * rigid[1]), factor * rigid[2]
-    ax.plot(
-        *_xy((outer + factor * ring) * circle + shift),
-        color=BLACK,
-        linewidth=1.8,
-        label="ring, outer surface",
-    )
-    if "ring: rotation" in shape:
-        # a rigid ring shows its rotation by a mark in its rim
-        mark = np.array([0.9, 1.0]) * outer
-        ax.plot(*_xy(1j * mark), color="0.8", linewidth=1.0)
-        ax.plot(*_xy(shift + 1j * mark * np.exp(1j * turn)), color=BLACK, linewidth=1.8)
-    for name, (centre, radius, colour, text) in bodies.items():
-        x, y, turn = _motion(shape, name)
-        moved = centre + factor * (x + 1j * y)
-        spoke = np.exp(1j * (np.angle(centre) if centre else 0.0)) * radius
-        if name == "carrier":
-            _draw_carrier(ax, planetary_set, moved, factor * turn, colour)
-            continue
-        ax.plot(*_xy(centre + radius * circle), color="0.8", linewidth=1.0)
-        ax.plot(*_xy(np.array([centre, centre + spoke])), color="0.8", linewidth=1.0)
-        ax.plot(*_xy(moved + radius * circle), color=colour, linewidth=1.6, label=text)
-        ax.plot(
-            *_xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6
-        )
-    span = 1.24 * outer
-    ax.set_xlim(-span, span)
-    ax.set_ylim(-span, span)
-    diameter = int(modes["nodal_diameter"].values[mode])
-    text = f"mode {mode + 1}: {modes['frequency'].values[mode]:.5g} Hz\n{modes['kind'].values[mode]}"
-    ax.set_title(text + (f", n = {diameter}" if diameter >= 0 else ""), fontsize=SIZE - 1.5)
-
-
-def _draw_carrier(ax, planetary_set, moved, turn, colour):
-    pins = planetary_set.centre_distance * np.exp(1j * np.asarray(planetary_set.planet_angles, float))
-    pins = moved + pins * np.exp(1j * turn)
-    for pin in pins:
-        ax.plot(*_xy(np.array([moved, pin])), color=colour, linewidth=1.2, linestyle="--", label="carrier")
-    ax.plot(*_xy(pins), "o", color=colour, markersize=3)
-
-
-def _bodies(planetary_set):
-    """Centre, radius, colour and legend of every rigid body."""
-    bodies = {"carrier": (0j, planetary_set.centre_distance, GREEN, "carrier")}
-    bodies["sun"] = (0j, planetary_set.sun.reference_radius, VERMILION, "sun")
-    for n, angle in enumerate(planetary_set.planet_angles):
-        centre = planetary_set.centre_distance * np.exp(1j * float(angle))
-        bodies[f"planet {n + 1}"] = (centre, planetary_set.planet.reference_radius, BLUE, "planets")
-    return bodies
-
-
-def _motion(shape, name):
-    return tuple(float(shape.get(f"{name}: {axis}", 0.0)) for axis in ("x", "y", "rotation"))
-
-
-def _ring_radial(modes, mode):
-    """Radial displacement of the outer surface at the angles of `_CIRCLE`."""
-    if "ring_shape_real" not in modes:
-        return np.zeros_like(_CIRCLE)
-    n = modes["circumferential"].values
-    value = modes["ring_shape_real"].values[mode] + 1j * modes["ring_shape_imag"].values[mode]
-    return (np.exp(1j * np.outer(_CIRCLE, n)) @ value).real
-
-
-def _xy(points):
-    return points.real, points.imag
-
-
 def shown_speeds(data: xr.Dataset) -> list[int]:
     """Indices of the speeds that get pictures of their own: all of a few, else first, middle and last."""
     n = data.sizes["speed"]
     return list(range(n)) if n <= MANY_SPEEDS else [0, n // 2, n - 1]
+
+
+def some_speeds(count: int, limit: int = 4) -> list[int]:
+    """Numbers of at most `limit` speeds, spread evenly."""
+    return sorted({round(i) for i in np.linspace(0, count - 1, min(count, limit))})

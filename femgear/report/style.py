@@ -1,4 +1,4 @@
-"""What all figures share: colours, sizes, legends outside the axes, files."""
+"""What all figures share: colours, sizes, legends outside the axes, files, and the lines of meshes."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ DASHES = ("-", "--", "-.", ":")
 MARKERS = "osD^vPX*<>"
 SIZE = 11
 DPI = 120
-# height of a row of the legend [in]
 _LEGEND_ROW = 0.21
+"""Height of a row of the legend [in]."""
 
 
 def new_figure(

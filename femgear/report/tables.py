@@ -1,4 +1,4 @@
-"""Titled tables for the terminal and the report, and those that several trains have."""
+"""Titled tables for the terminal and the page, and those of modes and periodic responses."""
 
 from __future__ import annotations
 
@@ -11,8 +11,12 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-# Speeds that a warning names.
+MANY = 8
+"""Rows of a table that shows the speeds."""
+_MODES = 16
+"""Rows of the table of modes."""
 _NAMED = 8
+"""Speeds that a warning names."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +36,6 @@ class Block:
     header: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
     notes: tuple[str, ...] = ()
-
-
-MANY = 8
-"""Rows of a table that shows the speeds."""
-_MODES = 16
 
 
 def describe_modes(data: xr.Dataset) -> Block:

@@ -1,6 +1,8 @@
-"""Design maps: transmission error over torque and relief, load sharing over pin errors, derivatives.
+"""Studies of a case: design maps, derivatives, optimisation, sweeps.
 
-Optimisation over entries of the case file: objectives, limits, searches, Pareto fronts, sweeps."""
+Transmission error over torque and relief, load sharing over pin errors and the derivatives of both start from
+gears and their compliances; searches, Pareto fronts and sweeps change entries of the case file.
+"""
 
 from femgear.study.linearised import LinearContact
 from femgear.study.names import NAMES, named_quantity, parse_limit, parse_variable

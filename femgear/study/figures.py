@@ -1,6 +1,6 @@
-"""Figures of the design maps; functions take the results of `femgear.study`.
+"""Figures of the studies: transmission error over torque and relief, load sharing, searches, fronts, sweeps.
 
-Figures of searches and sweeps; functions take arrays.
+Functions take arrays.
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 KINDS = ("sun-planet", "planet-ring")
 QUARTER, LINE = 0.25, COLOURS[4]
+"""Ratio at which a contour is drawn, and its colour."""
+BEFORE = {"color": GREY, "linestyle": "--", "label": "before"}
+AFTER = {"color": BLUE, "linestyle": "-", "label": "optimum"}
 
 
 def harris_curves(torques, peak_to_peak, names, *, design: float | None = None) -> Figure:
@@ -143,10 +146,6 @@ def sharing_histogram(factors, names, n_planets: int) -> Figure:
     right.set_ylim(bottom=0)
     legend_below(figure)
     return figure
-
-
-BEFORE = {"color": GREY, "linestyle": "--", "label": "before"}
-AFTER = {"color": BLUE, "linestyle": "-", "label": "optimum"}
 
 
 def before_and_after(position, errors, speed=None, forces=None, *, costs=()) -> Figure:

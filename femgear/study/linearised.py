@@ -1,13 +1,17 @@
-"""The contact problem at every position with its linear answer to separations; see `sensitivity`.
+"""The contact problem of a design at every position, with its linear answer to separations.
 
-What all variants of a design share: the gears of a case, their compliance, supports and deviations.
+`design_basis` holds what all variants of a design share: gears, compliances, supports and deviations.
+`linear_positions` solves the contact and factorises it for `femgear.study.sensitivity`, where the method
+stands.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,18 +25,102 @@ from femgear.contact.assembly import (
     rotation_approach,
 )
 from femgear.contact.candidates import cell_centres, separation
+from femgear.contact.cycle import ROUGH_STIFFNESS
 from femgear.contact.pivoting import factor
 from femgear.contact.sides import mirrored_set
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import RIGID, Supports, moving_members
 from femgear.errors import CaseError, ContactError
 from femgear.gears.deviations import mirrored_deviations
+from femgear.gears.kinematics import torques
+from femgear.study.relief import relief_starts
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.contact.assembly import Bodies
     from femgear.gears.deviations import SetDeviations
     from femgear.gears.planetary import PlanetarySet
+
+
+@dataclass(frozen=True, eq=False)
+class DesignBasis:
+    """Gears, flank compliances, supports as the case's static problem has them, deviations (None: ideal)."""
+
+    gears: PlanetarySet
+    bodies: Bodies
+    supports: Supports
+    deviations: SetDeviations | None
+
+
+@one_blas_thread()
+def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
+    """The compliance of a case, computed once for all variants.
+
+    Parameters
+    ----------
+    case : Case
+    cache : path, optional
+        Folder of generated grids.
+
+    Raises
+    ------
+    GeometryError, GridError
+    """
+    from femgear.contact.bodies import make_bodies, make_sectors
+    from femgear.fe.elasticity import Material, foundation
+
+    gears, deviations = planetary_set(case), set_deviations(case)
+    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
+    springs = None
+    if case.static.members == "elastic":
+        grid, ring = sectors.ring.grid, case.ring
+        stiffness = ring.foundation_radial, ring.foundation_tangential
+        springs = foundation(grid, "rim", *stiffness, thickness=gears.ring.face_width)
+    bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=springs)
+    return DesignBasis(gears, bodies, static_supports(case), None if deviations.ideal else deviations)
+
+
+def case_supports(case: Case) -> Supports:
+    """Supports of sun, carrier and planets with the stiffnesses and the bearing clearance of the case."""
+    return Supports(
+        sun=case.sun.support_stiffness,
+        carrier=case.carrier.support_stiffness,
+        planet=case.planet.bearing_stiffness,
+        planet_clearance=case.planet.bearing_clearance,
+    )
+
+
+def static_supports(case: Case) -> Supports:
+    """Supports as the static problem of the case has them."""
+    return RIGID if case.static.members == "fixed" else case_supports(case)
+
+
+def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:
+    """Torque on the sun [N m] under a torque on the input of the case, by default that of the case.
+
+    Raises
+    ------
+    CaseError
+        E-TORQUE: without torque there is nothing to design for.
+    """
+    value = case.operation.torque if torque is None else torque
+    if value == 0:
+        raise CaseError("without torque no tooth bends", code="E-TORQUE", key="operation.torque")
+    return torques(gears, member=case.operation.input, torque=value).sun
+
+
+def relief_snippet(gears: PlanetarySet, *, amount: float, length: float, power: float, back: bool) -> str:
+    """Tables of a case file for the tip relief of `relief.with_tip_relief`, to be pasted at its end."""
+    side = "ring side" if back else "sun side"
+    lines = []
+    for gear, start, flank in zip((gears.sun, gears.planet), relief_starts(gears, length=length), ("", side)):
+        lines += [f"[[{gear.name}.modifications]]", 'kind = "tip relief"']
+        lines += [f'flank = "{flank}"'] if flank else []
+        diameter = 2e3 * math.hypot(start, gear.base_radius)
+        lines += [f'amount = "{amount * 1e6:.3f} um"', f'start_diameter = "{diameter:.5f} mm"']
+        lines += [f"power = {power:g}", ""]
+    return "\n".join(lines)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,10 +260,10 @@ def linear_positions(original, bodies, sun_torque, chosen, record, deviations, s
 def _solve(solved, bodies, load, numbers, members, options):
     """Windows wide enough, and the answers of all positions in them."""
     N = solved.n_planets
-    share, nearest = load / N, 3.0 * load / (N * 10e9 * solved.sun.face_width)
     right = np.zeros(N + 1 + int(members.free.sum()))
     right[N] = load
-    for _ in range(8):
+
+    def attempt(share: float, nearest: float):
         setup = mesh_windows(solved, bodies, share=share, nearest=nearest, **options)
         answers, overflow, outside, previous = [], False, False, None
         for p in numbers:
@@ -187,8 +275,31 @@ def _solve(solved, bodies, load, numbers, members, options):
             overflow |= problem.touches_window_end(state.active, setup)
             penetrates = ~setup.near[:, p] & (setup.smallest_gap[:, p] < answers[-1]["deflection"][:, None])
             outside |= options["contact"] == "profile" and bool(penetrates.any())
+        return (setup, answers), overflow, outside
+
+    return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * solved.sun.face_width))
+
+
+def in_windows(attempt: Callable[[float, float], tuple], share: float, nearest: float) -> Any:
+    """What is found in windows that contain the contact; they are enlarged until they do.
+
+    Parameters
+    ----------
+    attempt : callable
+        ``(share, nearest) -> found, overflow, outside``: what is found in these windows, whether the contact
+        reaches the end of one, and whether teeth without a window overlap.
+    share, nearest : float
+        Of the first windows, as `mesh_windows` takes them [N], [m].
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-WINDOW
+    """
+    for _ in range(8):
+        found, overflow, outside = attempt(share, nearest)
         if not overflow and not outside:
-            return setup, answers
+            return found
         share *= 4.0 if overflow else 1.0
         nearest *= 2.0 if outside else 1.0
     raise ContactError(
@@ -249,86 +360,3 @@ def _touching(solved, bodies, setup, numbers, cells) -> TouchingCells:
         roll_1[rows] = np.sqrt(twice * arc)
         roll_2[rows] = separation(contact, setup.zeta[here], roll_1[rows])[1]
     return TouchingCells(at, mesh, roll_1, roll_2, tooth_1, tooth_2, weight)
-
-
-@dataclass(frozen=True, eq=False)
-class DesignBasis:
-    """Gears, flank compliances, supports as the case's static problem has them, deviations (None: ideal)."""
-
-    gears: PlanetarySet
-    bodies: Bodies
-    supports: Supports
-    deviations: SetDeviations | None
-
-
-@one_blas_thread()
-def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
-    """The compliance of a case, computed once for all variants.
-
-    Parameters
-    ----------
-    case : Case
-    cache : path, optional
-        Folder of generated grids.
-
-    Raises
-    ------
-    GeometryError, GridError
-    """
-    from femgear.contact.bodies import make_bodies, make_sectors
-    from femgear.fe.elasticity import Material, foundation
-
-    gears, deviations = planetary_set(case), set_deviations(case)
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-    sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
-    springs = None
-    if case.static.members == "elastic":
-        grid, ring = sectors.ring.grid, case.ring
-        stiffness = ring.foundation_radial, ring.foundation_tangential
-        springs = foundation(grid, "rim", *stiffness, thickness=gears.ring.face_width)
-    bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=springs)
-    supports = RIGID if case.static.members == "fixed" else case_supports(case)
-    return DesignBasis(gears, bodies, supports, None if deviations.ideal else deviations)
-
-
-def case_supports(case: Case) -> Supports:
-    """Supports of sun, carrier and planets with the stiffnesses and the bearing clearance of the case."""
-    return Supports(
-        sun=case.sun.support_stiffness,
-        carrier=case.carrier.support_stiffness,
-        planet=case.planet.bearing_stiffness,
-        planet_clearance=case.planet.bearing_clearance,
-    )
-
-
-def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:
-    """Torque on the sun [N m] under a torque on the input of the case, by default that of the case.
-
-    Raises
-    ------
-    CaseError
-        E-TORQUE: without torque there is nothing to design for.
-    """
-    from femgear.gears.kinematics import torques
-
-    value = case.operation.torque if torque is None else torque
-    if value == 0:
-        raise CaseError("without torque no tooth bends", code="E-TORQUE", key="operation.torque")
-    return torques(gears, member=case.operation.input, torque=value).sun
-
-
-def relief_snippet(gears: PlanetarySet, *, amount: float, length: float, power: float, back: bool) -> str:
-    """Tables of a case file for the tip relief of `relief.with_tip_relief`, to be pasted at its end."""
-    import math
-
-    from femgear.study.relief import relief_starts
-
-    side = "ring side" if back else "sun side"
-    lines = []
-    for gear, start, flank in zip((gears.sun, gears.planet), relief_starts(gears, length=length), ("", side)):
-        lines += [f"[[{gear.name}.modifications]]", 'kind = "tip relief"']
-        lines += [f'flank = "{flank}"'] if flank else []
-        diameter = 2e3 * math.hypot(start, gear.base_radius)
-        lines += [f'amount = "{amount * 1e6:.3f} um"', f'start_diameter = "{diameter:.5f} mm"']
-        lines += [f"power = {power:g}", ""]
-    return "\n".join(lines)

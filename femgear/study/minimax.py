@@ -18,18 +18,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.case import set_deviations
 from femgear.errors import ContactError, FemgearError, StorageError
-from femgear.study.variables import Variable
+from femgear.study.linearised import static_supports
+from femgear.study.sensitivity import linearise, sensitivity
+from femgear.study.variables import FLANK_ENTRIES, Variable
 from femgear.trains.reading import with_values
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
     from femgear.study.problem import Evaluations, Problem
 
-_FLANKS = ("modifications", "errors", "individual", "pin_errors")
 _STEP = 1e-4
 """Half the difference of separations, over the range of the variable: their round-off is 1e-12 of that."""
-
 _SMALLEST, _LEAST = 1e-4, 1e-5
 """Box, over the ranges, and gain, over the objective of the case, at which a descent ends."""
 
@@ -63,68 +64,8 @@ def has_derivatives(problem: Problem) -> bool:
     sided = problem.objective.signal is not None and not case.static.back_flanks
     clear = not (case.static.members == "elastic" and case.planet.bearing_clearance)
     keys = [key for variable in problem.variables for key in variable.key]
-    deviations = all(re.split(r"[.\[]", key.partition(".")[2])[0] in _FLANKS for key in keys)
+    deviations = all(re.split(r"[.\[]", key.partition(".")[2])[0] in FLANK_ENTRIES for key in keys)
     return bool(sided and clear and deviations and not any(v.integer for v in problem.variables))
-
-
-def signals(evaluations: Evaluations, x: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Transmission error (K, P) at a point and its derivatives (n, K, P) per unit of the variables.
-
-    Kept in the journal. FemgearError: the point cannot be computed.
-    """
-    problem = evaluations.problem
-    key = "derivatives of " + problem.objective.name + " at " + json.dumps(problem.point(x))
-    record = evaluations.designs.journal.get(key)
-    if record is None:
-        value, slopes = _linearised(evaluations, x)
-        record = {"value": value.tolist(), "slopes": slopes.tolist()}
-        evaluations.designs.journal.add(key, record)
-    return np.array(record["value"]), np.array(record["slopes"])
-
-
-def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
-    from femgear.case.case import set_deviations
-    from femgear.contact.supports import RIGID
-    from femgear.study.linearised import case_supports
-    from femgear.study.sensitivity import linearise, sensitivity
-
-    problem = evaluations.problem
-    variant = evaluations.designs.variant(problem.point(x))
-    case, objective = variant.case, problem.objective
-    static = variant.static(objective.torque)
-    linear = linearise(
-        static.planetary_set,
-        static.bodies,
-        sun_torque=static.sun_torque,
-        positions=case.static.positions,
-        periods=static.cycle.periods,
-        contact=case.static.contact,
-        deviations=set_deviations(case),
-        supports=RIGID if case.static.members == "fixed" else case_supports(case),
-    )
-    n = static.planetary_set.n_planets
-    value = objective.signal(linear.sun_arc, linear.deflection, n)
-    slopes = []
-    for variable, number in zip(problem.variables, x, strict=True):
-        low, high = variable.bounds
-        step = _STEP * (high - low)
-        inside = min(max(float(number), low + step), high - step)
-        found = sensitivity(linear, _deviations(case, variable), inside, step=step)
-        slopes.append(objective.signal(found.sun_arc, found.deflection, n))
-    if not np.isfinite(slopes).all():
-        raise ContactError("a planet that carries nothing has no derivative", code="E-DERIVATIVE")
-    return value, np.array(slopes)
-
-
-def _deviations(case: Case, variable: Variable):
-    """Deviations of the case for a value of one variable; not rounded as `Variable.text` does."""
-    from femgear.case.case import set_deviations
-
-    def variant(number: float):
-        text = f"{number!r} {variable.unit}" if variable.unit else number
-        return set_deviations(with_values(case, dict.fromkeys(variable.key, text)))
-
-    return variant
 
 
 def descend(
@@ -203,3 +144,58 @@ def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndar
     if found.x is None:
         return np.zeros(n), float(np.ptp(value, axis=1).max())
     return found.x[:n] * width, float(found.fun)
+
+
+def signals(evaluations: Evaluations, x: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Transmission error (K, P) at a point and its derivatives (n, K, P) per unit of the variables.
+
+    Kept in the journal. FemgearError: the point cannot be computed.
+    """
+    problem = evaluations.problem
+    key = "derivatives of " + problem.objective.name + " at " + json.dumps(problem.point(x))
+    record = evaluations.designs.journal.get(key)
+    if record is None:
+        value, slopes = _linearised(evaluations, x)
+        record = {"value": value.tolist(), "slopes": slopes.tolist()}
+        evaluations.designs.journal.add(key, record)
+    return np.array(record["value"]), np.array(record["slopes"])
+
+
+def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
+    """As `signals`, from the contact problem at the point."""
+    problem = evaluations.problem
+    variant = evaluations.designs.variant(problem.point(x))
+    case, objective = variant.case, problem.objective
+    static = variant.static(objective.torque)
+    linear = linearise(
+        static.planetary_set,
+        static.bodies,
+        sun_torque=static.sun_torque,
+        positions=case.static.positions,
+        periods=static.cycle.periods,
+        contact=case.static.contact,
+        deviations=set_deviations(case),
+        supports=static_supports(case),
+    )
+    n = static.planetary_set.n_planets
+    value = objective.signal(linear.sun_arc, linear.deflection, n)
+    slopes = []
+    for variable, number in zip(problem.variables, x, strict=True):
+        low, high = variable.bounds
+        step = _STEP * (high - low)
+        inside = min(max(float(number), low + step), high - step)
+        found = sensitivity(linear, _deviations(case, variable), inside, step=step)
+        slopes.append(objective.signal(found.sun_arc, found.deflection, n))
+    if not np.isfinite(slopes).all():
+        raise ContactError("a planet that carries nothing has no derivative", code="E-DERIVATIVE")
+    return value, np.array(slopes)
+
+
+def _deviations(case: Case, variable: Variable):
+    """Deviations of the case for a value of one variable; not rounded as `Variable.text` does."""
+
+    def variant(number: float):
+        text = f"{number!r} {variable.unit}" if variable.unit else number
+        return set_deviations(with_values(case, dict.fromkeys(variable.key, text)))
+
+    return variant

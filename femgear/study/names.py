@@ -1,17 +1,16 @@
-"""Quantities by the words of a command line.
-
-Tip reliefs of all gears as design variables.
-"""
+"""Words of a command line as quantities, limits and variables; tip reliefs of all gears as variables."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 
+from femgear.case import text as case_text
 from femgear.case.case import planetary_set
 from femgear.case.sections import Case
 from femgear.case.units import LENGTH, to_si
 from femgear.errors import CaseError
+from femgear.gears.kinematics import torques
 from femgear.study import objectives
 from femgear.study.objectives import NUMBER, Quantity
 from femgear.study.problem import Limit
@@ -19,7 +18,9 @@ from femgear.study.variables import Variable
 from femgear.trains.reading import with_values
 
 Speeds = tuple[str, str]
-
+"""First and last speed of the input, with their units."""
+_LATEST_START = 0.93
+"""Of a relief, over the height from the pitch circle to the tip: later ones are chamfers."""
 _WORDS: dict[str, Callable[[str | None, Speeds | None], Quantity]] = {
     "ste": lambda torque, _: objectives.transmission_error("largest", torque=torque),
     "ste overall": lambda torque, _: objectives.transmission_error("overall", torque=torque),
@@ -66,6 +67,18 @@ def named_quantity(words: str, *, torque: str | None = None, speeds: Speeds | No
             "no such quantity", code="E-OBJECTIVE", key="objective", value=words, limit=", ".join(NAMES)
         ) from None
     return make(torque, speeds)
+
+
+def _given(speeds: Speeds | None, words: str) -> Speeds:
+    """The speeds, refused where they are left out."""
+    if speeds is None:
+        raise CaseError(
+            f"{words} is found over a range of speeds",
+            code="E-OBJECTIVE",
+            key="speeds",
+            remedy='give two speeds of the input, "1000 rpm" and "3500 rpm"',
+        )
+    return speeds
 
 
 def parse_limit(text: str, **options) -> Limit:
@@ -121,21 +134,6 @@ def _number(text: str) -> str | float:
         return text
 
 
-def _given(speeds: Speeds | None, words: str) -> Speeds:
-    if speeds is None:
-        raise CaseError(
-            f"{words} is found over a range of speeds",
-            code="E-OBJECTIVE",
-            key="speeds",
-            remedy='give two speeds of the input, "1000 rpm" and "3500 rpm"',
-        )
-    return speeds
-
-
-_LATEST_START = 0.93
-"""Of the height from the pitch circle to the tip: later ones are chamfers."""
-
-
 def tip_reliefs(
     case: Case, *, largest: str | None = None, tolerance: str = "1 um", places: str = "0.1 mm"
 ) -> tuple[Case, tuple[Variable, ...]]:
@@ -159,8 +157,6 @@ def tip_reliefs(
     CaseError
         E-RANGE: a largest amount that is not over 0 and at most 0.2 modules.
     """
-    from femgear.gears.kinematics import torques
-
     gears = planetary_set(case)
     most = 0.01 * case.sun.module if largest is None else to_si(largest, LENGTH)
     if not 0 < most <= 0.2 * case.sun.module:
@@ -196,6 +192,4 @@ def tip_reliefs(
 
 def _tables(case: Case, gear: str) -> list:
     """Modifications of a gear as its file holds them."""
-    from femgear.case import text
-
-    return text.parse(case.source, case.name)[gear].get("modifications", [])
+    return case_text.parse(case.source, case.name)[gear].get("modifications", [])

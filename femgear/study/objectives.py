@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from femgear.case.units import SPEED, TORQUE, Dimension, to_si
+from femgear.case.units import ACCELERATION, SPEED, TORQUE, Dimension, to_si
 from femgear.errors import CaseError
 
 if TYPE_CHECKING:
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 Mesh = Literal["largest", "overall", "sun-planet", "planet-ring"]
 MICROMETRES = Dimension("a length", "m", "um", 1e-6)
 FORCE = Dimension("a force", "N", "N", 1.0)
-LEVEL = Dimension("an acceleration", "m/s^2", "m/s^2", 1.0)
+LEVEL = ACCELERATION
 STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
 NUMBER = Dimension("a number", "1", "1", 1.0)
 STAGES = ("gears", "static", "stress", "dynamics", "housing")
+"""In the order of their effort."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Quantity:
     dimension : Dimension
         Its units on disk (SI) and in tables.
     stage : str
-        Last stage that it needs, one of `STAGES`: the order of the effort.
+        Last stage that it needs, one of `STAGES`.
     compute : callable
         ``(Variant) -> float`` in SI units.
     signal : callable, optional
@@ -219,6 +220,7 @@ def root_stress(gear: Literal["sun", "planet", "ring"]) -> Quantity:
 
 
 def _chosen(value, table: dict, key: str):
+    """Entry of a table, refused (E-OBJECTIVE) where there is none."""
     try:
         return table[value]
     except (KeyError, TypeError):
@@ -228,6 +230,7 @@ def _chosen(value, table: dict, key: str):
 
 
 def _range(first: str, last: str, count: int) -> Range:
+    """Range of speeds from texts with units, refused (E-OBJECTIVE) where it is none."""
     low, high = to_si(first, SPEED), to_si(last, SPEED)
     if not (0 < low < high and 2 <= count <= 10000):
         raise CaseError(
@@ -241,4 +244,5 @@ def _range(first: str, last: str, count: int) -> Range:
 
 
 def _words(at: Range) -> str:
+    """A range of speeds in the name of a quantity."""
     return f"{at[0] / SPEED.scale:.6g} to {SPEED.show(at[1])} ({at[2]} speeds)"

@@ -1,11 +1,12 @@
-"""Transmission error over torque for several reliefs (Harris map), and the relief for one torque.
+"""Tip relief of the sun-planet meshes: transmission error over torque, and the relief for one torque.
 
-S. L. Harris, "Dynamic loads on the teeth of spur gears", Proc. IMechE 172 (1958): a relief takes off the tips
-what the teeth bend under one torque, and the transmission error is then nearly constant under that torque.
+A relief takes off the tips what the teeth bend under one torque, and the transmission error is then nearly
+constant under that torque (S. L. Harris, "Dynamic loads on the teeth of spur gears", Proc. IMechE 172, 1958).
+`harris_map` computes it over torque, `relief_grid` over amount and length of the relief, `optimise_relief`
+finds the least peak to peak at one torque and says whether it is a minimum.
 
-Parameters of the deviations: functions of one number that return deviations, for `sensitivity`.
-
-The tip relief with the least transmission error at one torque, and whether it is a minimum.
+Amount, length, pin and pitch errors are parameters of the deviations as well: functions of one number that
+return deviations, for `femgear.study.sensitivity`.
 """
 
 from __future__ import annotations
@@ -30,58 +31,12 @@ if TYPE_CHECKING:
 
 LARGEST_LENGTH = 1.3
 """Longest relief in lengths of two-pair contact; longer ones reach the pitch point of common sets."""
-
-
-@dataclass(frozen=True, eq=False)
-class HarrisMap:
-    """Transmission error over torque.
-
-    Parameters
-    ----------
-    torques : (T,) array
-        Torque on the sun [N m].
-    peak_to_peak : (variants, 2, T) array
-        Of the transmission error of the sun-planet and the planet-ring meshes, the largest of each kind [m].
-    overall : (variants, T) array
-        Of the transmission error from sun to ring [m].
-    residual : float
-        Largest residual of all contact problems.
-    """
-
-    torques: np.ndarray
-    peak_to_peak: np.ndarray
-    overall: np.ndarray
-    residual: float
-
-
-@dataclass(frozen=True, eq=False)
-class ReliefGrid:
-    """Transmission error peak to peak of the sun-planet meshes over two parameters of the tip relief.
-
-    Parameters
-    ----------
-    amounts : (A,) array
-        [m]
-    lengths : (L,) array
-        In lengths of two-pair contact, see `relief_starts`.
-    torques : (T,) array
-        On the sun [N m].
-    peak_to_peak : (T, A, L) array
-        [m]
-    unmodified : (T,) array
-        Without the relief [m].
-    """
-
-    amounts: np.ndarray
-    lengths: np.ndarray
-    torques: np.ndarray
-    peak_to_peak: np.ndarray
-    unmodified: np.ndarray
-
-    @property
-    def ratio(self) -> np.ndarray:
-        """Peak to peak over that without relief, (T, A, L)."""
-        return self.peak_to_peak / self.unmodified[:, None, None]
+AMOUNT_STEP, LENGTH_STEP = 0.1e-6, 0.05e-3
+"""Steps [m] of the points around the optimum, of amount and of length along the path of contact."""
+SMALLEST_GAIN = 1e-4
+"""Gain [um] under which a neighbour counts as no better."""
+Parameter = Callable[[float], SetDeviations]
+"""Deviations for a value of one parameter."""
 
 
 def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[float, float]:
@@ -114,6 +69,12 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
     begin, end = pair.path
     along = length * (end - begin - planetary_set.sun.base_pitch)
     return float(pair.pitch_roll_1 + end - along), float(pair.pitch_roll_2 - begin - along)
+
+
+def two_pair_length(planetary_set: PlanetarySet) -> float:
+    """Length of two-pair contact of sun and planet at either end, ``(epsilon - 1) p_b`` [m]."""
+    longer, shorter = (relief_starts(planetary_set, length=length)[0] for length in (0.5, 1.0))
+    return 2.0 * (longer - shorter)
 
 
 def with_tip_relief(
@@ -151,136 +112,14 @@ def with_tip_relief(
     return replace(found, **forms)
 
 
-@one_blas_thread()
-def harris_map(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
-    *,
-    torques,
-    deviations: Sequence[SetDeviations | None],
-    positions: int = 32,
-    contact: str = "profile",
-    supports: Supports = RIGID,
-    progress: Callable[[int, int], None] | None = None,
-) -> HarrisMap:
-    """Transmission error peak to peak over torque for a list of deviations.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    bodies : Bodies
-        Flank compliances; they serve all mesh cycles.
-    torques : sequence of float
-        On the sun [N m], not zero.
-    deviations : sequence of SetDeviations or None
-        One a curve; the record spans the common period of each.
-    positions : int
-        In one mesh period.
-    contact, supports
-        See `contact.cycle.walk_mesh_cycle`.
-    progress : callable, optional
-        Called with (mesh cycles done, mesh cycles).
-
-    Returns
-    -------
-    HarrisMap
-
-    Raises
-    ------
-    CaseError
-        E-TORQUE: a torque of zero, or none.
-    ContactError
-    """
-    torques = np.array(torques, float)
-    if not len(torques) or not (np.isfinite(torques).all() and torques.all()):
-        raise CaseError("every torque of the map must differ from zero", code="E-TORQUE", value=torques)
-    N = planetary_set.n_planets
-    peaks = np.zeros((len(deviations), 2, len(torques)))
-    overall, residual = np.zeros((len(deviations), len(torques))), 0.0
-    for v, variant in enumerate(deviations):
-        periods = 1 if variant is None else common_period(variant, planetary_set)[0]
-        for t, torque in enumerate(torques):
-            cycle = walk_either_flank(
-                planetary_set,
-                bodies,
-                sun_torque=float(torque),
-                positions=positions,
-                contact=contact,
-                deviations=variant,
-                supports=supports,
-                periods=periods,
-            )
-            peak = np.ptp(cycle.deflection, axis=1)
-            peaks[v, :, t] = peak[:N].max(), peak[N:].max()
-            overall[v, t] = np.ptp(cycle.sun_arc)
-            residual = max(residual, float(cycle.residual.max()))
-            if progress is not None:
-                progress(v * len(torques) + t + 1, peaks[:, 0].size)
-    return HarrisMap(torques, peaks, overall, residual)
+def relief_amount(deviations, planetary_set: PlanetarySet, *, length: float, **options) -> Parameter:
+    """Amount [m] of the tip relief of `with_tip_relief`; options are its ``power`` and ``back``."""
+    return lambda value: with_tip_relief(deviations, planetary_set, amount=value, length=length, **options)
 
 
-@one_blas_thread()
-def relief_grid(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
-    *,
-    amounts,
-    lengths,
-    torques,
-    deviations: SetDeviations | None = None,
-    power: float = 1.0,
-    positions: int = 32,
-    contact: str = "profile",
-    supports: Supports = RIGID,
-    progress: Callable[[int, int], None] | None = None,
-) -> ReliefGrid:
-    """Transmission error of the sun-planet meshes over amount and length of their tip relief.
-
-    Parameters
-    ----------
-    amounts : (A,) sequence
-        [m]
-    lengths : (L,) sequence
-        In lengths of two-pair contact.
-    torques : (T,) sequence
-        On the sun [N m], of one sign.
-    planetary_set, bodies, deviations, power, positions, contact, supports, progress
-        As for `with_tip_relief` and `harris_map`.
-
-    Returns
-    -------
-    ReliefGrid
-    """
-    amounts, lengths, torques = (np.array(a, float) for a in (amounts, lengths, torques))
-    back = loads_back(torques)
-    variants = [deviations]
-    variants += [
-        with_tip_relief(deviations, planetary_set, amount=a, length=length, power=power, back=back)
-        for a in amounts
-        for length in lengths
-    ]
-    found = harris_map(
-        planetary_set,
-        bodies,
-        torques=torques,
-        deviations=variants,
-        positions=positions,
-        contact=contact,
-        supports=supports,
-        progress=progress,
-    ).peak_to_peak[:, 0]
-    peaks = found[1:].T.reshape(len(torques), len(amounts), len(lengths))
-    return ReliefGrid(amounts, lengths, torques, peaks, found[0])
-
-
-def loads_back(torques: np.ndarray) -> bool:
-    """Whether torques are negative; E-TORQUE (CaseError) where their signs differ."""
-    if (torques > 0).any() and (torques < 0).any():
-        raise CaseError("torques of both signs load different flanks", code="E-TORQUE", value=torques)
-    return bool((torques < 0).any())
-
-
-Parameter = Callable[[float], "SetDeviations"]
+def relief_length(deviations, planetary_set: PlanetarySet, *, amount: float, **options) -> Parameter:
+    """Length of the same relief along the path of contact, in lengths of two-pair contact."""
+    return lambda value: with_tip_relief(deviations, planetary_set, amount=amount, length=value, **options)
 
 
 def pin_error(
@@ -360,30 +199,185 @@ def tooth_pitch_error(
     return variant
 
 
-def relief_amount(deviations, planetary_set: PlanetarySet, *, length: float, **options) -> Parameter:
-    """Amount [m] of the tip relief of `with_tip_relief`; options are its ``power`` and ``back``."""
-    base = no_deviations(planetary_set) if deviations is None else deviations
-    return lambda value: with_tip_relief(base, planetary_set, amount=value, length=length, **options)
+@dataclass(frozen=True, eq=False)
+class HarrisMap:
+    """Transmission error over torque.
+
+    Parameters
+    ----------
+    torques : (T,) array
+        Torque on the sun [N m].
+    peak_to_peak : (variants, 2, T) array
+        Of the transmission error of the sun-planet and the planet-ring meshes, the largest of each kind [m].
+    overall : (variants, T) array
+        Of the transmission error from sun to ring [m].
+    residual : float
+        Largest residual of all contact problems.
+    """
+
+    torques: np.ndarray
+    peak_to_peak: np.ndarray
+    overall: np.ndarray
+    residual: float
 
 
-def relief_length(deviations, planetary_set: PlanetarySet, *, amount: float, **options) -> Parameter:
-    """Length of the same relief along the path of contact, in lengths of two-pair contact."""
-    base = no_deviations(planetary_set) if deviations is None else deviations
-    return lambda value: with_tip_relief(base, planetary_set, amount=amount, length=value, **options)
+@one_blas_thread()
+def harris_map(
+    planetary_set: PlanetarySet,
+    bodies: Bodies,
+    *,
+    torques,
+    deviations: Sequence[SetDeviations | None],
+    positions: int = 32,
+    contact: str = "profile",
+    supports: Supports = RIGID,
+    progress: Callable[[int, int], None] | None = None,
+) -> HarrisMap:
+    """Transmission error peak to peak over torque for a list of deviations.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    bodies : Bodies
+        Flank compliances; they serve all mesh cycles.
+    torques : sequence of float
+        On the sun [N m], not zero.
+    deviations : sequence of SetDeviations or None
+        One a curve; the record spans the common period of each.
+    positions : int
+        In one mesh period.
+    contact, supports
+        See `contact.cycle.walk_mesh_cycle`.
+    progress : callable, optional
+        Called with (mesh cycles done, mesh cycles).
+
+    Returns
+    -------
+    HarrisMap
+
+    Raises
+    ------
+    CaseError
+        E-TORQUE: a torque of zero, or none.
+    ContactError
+    """
+    torques = np.array(torques, float)
+    if not len(torques) or not (np.isfinite(torques).all() and torques.all()):
+        raise CaseError("every torque of the map must differ from zero", code="E-TORQUE", value=torques)
+    N = planetary_set.n_planets
+    peaks = np.zeros((len(deviations), 2, len(torques)))
+    overall, residual = np.zeros((len(deviations), len(torques))), 0.0
+    for v, variant in enumerate(deviations):
+        periods = 1 if variant is None else common_period(variant, planetary_set)[0]
+        for t, torque in enumerate(torques):
+            cycle = walk_either_flank(
+                planetary_set,
+                bodies,
+                sun_torque=float(torque),
+                positions=positions,
+                contact=contact,
+                deviations=variant,
+                supports=supports,
+                periods=periods,
+            )
+            peak = np.ptp(cycle.deflection, axis=1)
+            peaks[v, :, t] = peak[:N].max(), peak[N:].max()
+            overall[v, t] = np.ptp(cycle.sun_arc)
+            residual = max(residual, float(cycle.residual.max()))
+            if progress is not None:
+                progress(v * len(torques) + t + 1, peaks[:, 0].size)
+    return HarrisMap(torques, peaks, overall, residual)
 
 
-def two_pair_length(planetary_set: PlanetarySet) -> float:
-    """Length of two-pair contact of sun and planet at either end, ``(epsilon - 1) p_b`` [m]."""
+@dataclass(frozen=True, eq=False)
+class ReliefGrid:
+    """Transmission error peak to peak of the sun-planet meshes over two parameters of the tip relief.
 
-    longer, shorter = (relief_starts(planetary_set, length=length)[0] for length in (0.5, 1.0))
-    return 2.0 * (longer - shorter)
+    Parameters
+    ----------
+    amounts : (A,) array
+        [m]
+    lengths : (L,) array
+        In lengths of two-pair contact, see `relief_starts`.
+    torques : (T,) array
+        On the sun [N m].
+    peak_to_peak : (T, A, L) array
+        [m]
+    unmodified : (T,) array
+        Without the relief [m].
+    """
+
+    amounts: np.ndarray
+    lengths: np.ndarray
+    torques: np.ndarray
+    peak_to_peak: np.ndarray
+    unmodified: np.ndarray
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Peak to peak over that without relief, (T, A, L)."""
+        return self.peak_to_peak / self.unmodified[:, None, None]
 
 
-AMOUNT_STEP, LENGTH_STEP = 0.1e-6, 0.05e-3
-"""Steps [m] of the points around the optimum, of amount and of length along the path of contact."""
+@one_blas_thread()
+def relief_grid(
+    planetary_set: PlanetarySet,
+    bodies: Bodies,
+    *,
+    amounts,
+    lengths,
+    torques,
+    deviations: SetDeviations | None = None,
+    power: float = 1.0,
+    positions: int = 32,
+    contact: str = "profile",
+    supports: Supports = RIGID,
+    progress: Callable[[int, int], None] | None = None,
+) -> ReliefGrid:
+    """Transmission error of the sun-planet meshes over amount and length of their tip relief.
 
-SMALLEST_GAIN = 1e-4
-"""Gain [um] under which a neighbour counts as no better."""
+    Parameters
+    ----------
+    amounts : (A,) sequence
+        [m]
+    lengths : (L,) sequence
+        In lengths of two-pair contact.
+    torques : (T,) sequence
+        On the sun [N m], of one sign.
+    planetary_set, bodies, deviations, power, positions, contact, supports, progress
+        As for `with_tip_relief` and `harris_map`.
+
+    Returns
+    -------
+    ReliefGrid
+    """
+    amounts, lengths, torques = (np.array(a, float) for a in (amounts, lengths, torques))
+    back = loads_back(torques)
+    variants = [deviations]
+    variants += [
+        with_tip_relief(deviations, planetary_set, amount=a, length=length, power=power, back=back)
+        for a in amounts
+        for length in lengths
+    ]
+    found = harris_map(
+        planetary_set,
+        bodies,
+        torques=torques,
+        deviations=variants,
+        positions=positions,
+        contact=contact,
+        supports=supports,
+        progress=progress,
+    ).peak_to_peak[:, 0]
+    peaks = found[1:].T.reshape(len(torques), len(amounts), len(lengths))
+    return ReliefGrid(amounts, lengths, torques, peaks, found[0])
+
+
+def loads_back(torques: np.ndarray) -> bool:
+    """Whether torques are negative; E-TORQUE (CaseError) where their signs differ."""
+    if (torques > 0).any() and (torques < 0).any():
+        raise CaseError("torques of both signs load different flanks", code="E-TORQUE", value=torques)
+    return bool((torques < 0).any())
 
 
 @dataclass(frozen=True)

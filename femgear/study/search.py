@@ -1,8 +1,9 @@
-"""Minimisation with SciPy's optimisers, from samples of the design space to a local finish.
+"""Searches for the best design: one objective, or the front between two.
 
-Pareto front of two objectives: designs of which none is better in both.
-
-An optimum in words and rows.
+`minimise` goes from samples of the design space to a local finish, by descents with derivatives
+(`femgear.study.minimax`) where the objective has them, else by SciPy's optimisers. `pareto_front` finds
+designs of which none is better in both objectives. `describe` and the rows beside it put an optimum into
+words.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -20,16 +21,18 @@ from femgear.case.sections import Case
 from femgear.errors import CaseError, ConvergenceError
 from femgear.study.minimax import descend, has_derivatives
 from femgear.study.objectives import Quantity
-from femgear.study.problem import OUTSIDE, Enough, Evaluations, Failure, Problem, Progress, evaluations
+from femgear.study.problem import OUTSIDE, Enough, Evaluations, Failure, Problem, evaluations
 from femgear.study.sensitivity import Tolerance, tolerances
 from femgear.study.variables import start_point
 from femgear.threads import one_blas_thread
+from femgear.trains.protocol import Progress
 
 Method = Literal["auto", "minimax", "global", "simplex", "powell"]
-METHODS = ("auto", "minimax", "global", "simplex", "powell")
-
+METHODS = get_args(Method)
 _HOP = 0.1
 """Standard deviation of a hop, over the range of every variable."""
+_SMALL = 0.01
+"""Share of the sum in the scalar objective; without it points that are better in one alone would tie."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,6 @@ class Optimum:
 
     def summary(self) -> str:
         """Before and after, values of the variables, and what their tolerances cost."""
-
         return describe(self)
 
 
@@ -188,54 +190,8 @@ def minimise(
         return _optimum(run, before, sensitivity, (method, message, converged))
 
 
-def _optimum(run: Evaluations, before: dict, sensitivity: bool, ended) -> Optimum:
-    """The best point with all that is reported of it."""
-    problem = run.problem
-    x, cost = run.best
-    if cost >= OUTSIDE:
-        raise ConvergenceError(
-            f"none of {run.asked} designs can be computed and lies within the limits",
-            code="E-INFEASIBLE",
-            limit="; ".join(limit.text for limit in problem.limits) or None,
-            remedy="widen limits or bounds, or ask for more samples",
-        )
-    x = np.array([v.number(text) for v, text in zip(problem.variables, problem.point(x))])
-    try:
-        after = run.values(x, problem.reported)
-    except Failure as failure:
-        raise ConvergenceError(
-            f"the optimum has the objective but not all other quantities: {failure}",
-            code=failure.error["code"],
-            key=failure.error["key"],
-            value=problem.point(x),
-        ) from None
-    quantities = (problem.objective, *problem.also)
-    off, all_off = tolerances(run, x, quantities) if sensitivity else ((), {})
-    designs, (method, message, converged) = run.designs, ended
-    return Optimum(
-        problem=problem, x=x, case=designs.at(problem.point(x)), before=before, after=after, tolerances=off,
-        all_off=all_off, course=tuple(run.course), designs=run.asked, computed=designs.computed,
-        failures=len(designs.failures), seconds=designs.seconds / max(designs.computed, 1),
-        method=method, message=message, converged=converged,
-    )  # fmt: skip
-
-
-def check_counts(**counts: int | None) -> None:
-    """Refuse counts of nothing: one design is the case as it is, no search.
-
-    Raises
-    ------
-    CaseError
-        E-RANGE.
-    """
-    least = {"samples": 0, "max_designs": 2, "points": 2}
-    for name, count in counts.items():
-        low = least.get(name, 1)
-        if count is not None and not low <= count <= 1_000_000:
-            raise CaseError("not usable", code="E-RANGE", key=name, value=count, limit=f"{low} to 1000000")
-
-
 def _method(problem: Problem, method: str) -> str:
+    """The method, chosen where that is left to the problem; refused (E-METHOD) where it does not fit."""
     smooth = has_derivatives(problem)
     if method == "auto":
         return "minimax" if smooth else "global"
@@ -252,31 +208,6 @@ def _method(problem: Problem, method: str) -> str:
     if method != "global" and any(variable.integer for variable in problem.variables):
         raise CaseError("whole numbers", code="E-METHOD", key="method", value=method, limit='"global"')
     return method
-
-
-def start_at(problem: Problem, start: Sequence[float] | None) -> np.ndarray:
-    """A start within the bounds; by default the values of the case. CaseError (E-START) outside them."""
-    if start is None:
-        return start_point(problem.case, problem.variables)
-    x, (low, high) = np.asarray(start, float), problem.bounds.T
-    if x.shape != low.shape or not np.all((x >= low) & (x <= high)):
-        raise CaseError(
-            "the start lies outside the bounds",
-            code="E-START",
-            key="start",
-            value=start,
-            limit=", ".join(f"{v.name} {v.low} to {v.high}" for v in problem.variables),
-        )
-    return x
-
-
-def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
-    """Middle of the bounds, and a Latin hypercube of ``count`` points."""
-    from scipy.stats.qmc import LatinHypercube
-
-    low, high = problem.bounds.T
-    spread = LatinHypercube(len(low), rng=seed).random(max(count, 1))
-    return low + (high - low) * np.vstack([np.full(len(low), 0.5), spread])
 
 
 def _descents(run: Evaluations, x0, count: int, starts: int, seed: int) -> tuple[bool, str]:
@@ -320,51 +251,31 @@ def _evolution(run: Evaluations, x0, count: int, generations: int, seed: int) ->
     return polish(run, run.cost, run.best[0], size=0.05)
 
 
-def polish(
-    run: Evaluations, cost, x0, *, method: str = "simplex", size: float = 0.15, rounds: int = 2
-) -> tuple[bool, str]:
-    """Local search without derivatives within the bounds.
-
-    The simplex may collapse before it reaches a minimum (K. I. M. McKinnon, SIAM J. Optim. 9, 1998,
-    148-158): it begins again, half as large, from where it ended.
-
-    Parameters
-    ----------
-    run : Evaluations
-    cost : callable
-    x0 : (n,) array
-    method : {"simplex", "powell"}
-    size : float
-        Of the first simplex, over the ranges.
-    rounds : int
-        Simplexes one after the other.
-    """
-    from scipy.optimize import Bounds, minimize
-
-    low, high = run.problem.bounds.T
-    width, unit = high - low, Bounds(np.zeros(len(low)), np.ones(len(low)))
-    # a point at a bound is one after scaling back and forth as well
-    u, n = np.clip((x0 - low) / width, 0.0, 1.0), len(low)
-
-    def scaled(v):
-        return cost(np.clip(low + width * v, low, high))
-
-    if method == "powell":
-        found = minimize(scaled, u, method="Powell", bounds=unit, options={"xtol": 1e-4, "ftol": 1e-4})
-        return bool(found.success), str(found.message)
-    for _ in range(rounds):
-        steps = np.where(u + size > 1.0, -size, size)
-        simplex = u + np.vstack([np.zeros(n), np.diag(steps)])
-        options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "adaptive": n > 4}
-        found = minimize(
-            scaled, u, method="Nelder-Mead", bounds=unit, options=options | {"maxfev": 15 * (n + 1)}
-        )
-        u, size = found.x, 0.5 * size
-    return bool(found.success), str(found.message)
-
-
-_SMALL = 0.01
-"""Share of the sum in the scalar objective; without it points that are better in one alone would tie."""
+def _optimum(run: Evaluations, before: dict, sensitivity: bool, ended) -> Optimum:
+    """The best point with all that is reported of it."""
+    problem = run.problem
+    x, cost = run.best
+    if cost >= OUTSIDE:
+        raise _infeasible(run, limit="; ".join(limit.text for limit in problem.limits) or None)
+    x = _numbers(problem, problem.point(x))
+    try:
+        after = run.values(x, problem.reported)
+    except Failure as failure:
+        raise ConvergenceError(
+            f"the optimum has the objective but not all other quantities: {failure}",
+            code=failure.error["code"],
+            key=failure.error["key"],
+            value=problem.point(x),
+        ) from None
+    quantities = (problem.objective, *problem.also)
+    off, all_off = tolerances(run, x, quantities) if sensitivity else ((), {})
+    designs, (method, message, converged) = run.designs, ended
+    return Optimum(
+        problem=problem, x=x, case=designs.at(problem.point(x)), before=before, after=after, tolerances=off,
+        all_off=all_off, course=tuple(run.course), designs=run.asked, computed=designs.computed,
+        failures=len(designs.failures), seconds=designs.seconds / max(designs.computed, 1),
+        method=method, message=message, converged=converged,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -469,11 +380,7 @@ def pareto_front(
             complete = False
         x, values = _known(run, both)
         if not len(x):
-            raise ConvergenceError(
-                f"none of {run.asked} designs can be computed and lies within the limits",
-                code="E-INFEASIBLE",
-                remedy="widen limits or bounds, or ask for more samples",
-            )
+            raise _infeasible(run)
         best = non_dominated(values)
         order = best[np.argsort(values[best, 0], kind="stable")]
         rest = np.setdiff1d(np.arange(len(values)), best)
@@ -554,7 +461,7 @@ def _known(run: Evaluations, quantities) -> tuple[np.ndarray, np.ndarray]:
         known = (run.designs.journal.get(json.dumps(point)) or {}).get("values", {})
         if any(q.name not in known for q in quantities):
             continue
-        x = np.array([v.number(text) for v, text in zip(problem.variables, point)])
+        x = _numbers(problem, point)
         try:
             inside = bool(np.all((x >= low) & (x <= high))) and run.violation(x) == 0.0
         except Failure:
@@ -563,6 +470,104 @@ def _known(run: Evaluations, quantities) -> tuple[np.ndarray, np.ndarray]:
             points.append(x)
             values.append([known[q.name] for q in quantities])
     return np.array(points).reshape(-1, len(low)), np.array(values).reshape(-1, len(quantities))
+
+
+def check_counts(**counts: int | None) -> None:
+    """Refuse counts of nothing: one design is the case as it is, no search.
+
+    Raises
+    ------
+    CaseError
+        E-RANGE.
+    """
+    least = {"samples": 0, "max_designs": 2, "points": 2}
+    for name, count in counts.items():
+        low = least.get(name, 1)
+        if count is not None and not low <= count <= 1_000_000:
+            raise CaseError("not usable", code="E-RANGE", key=name, value=count, limit=f"{low} to 1000000")
+
+
+def start_at(problem: Problem, start: Sequence[float] | None) -> np.ndarray:
+    """A start within the bounds; by default the values of the case. CaseError (E-START) outside them."""
+    if start is None:
+        return start_point(problem.case, problem.variables)
+    x, (low, high) = np.asarray(start, float), problem.bounds.T
+    if x.shape != low.shape or not np.all((x >= low) & (x <= high)):
+        raise CaseError(
+            "the start lies outside the bounds",
+            code="E-START",
+            key="start",
+            value=start,
+            limit=", ".join(f"{v.name} {v.low} to {v.high}" for v in problem.variables),
+        )
+    return x
+
+
+def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
+    """Middle of the bounds, and a Latin hypercube of ``count`` points."""
+    from scipy.stats.qmc import LatinHypercube
+
+    low, high = problem.bounds.T
+    spread = LatinHypercube(len(low), rng=seed).random(max(count, 1))
+    return low + (high - low) * np.vstack([np.full(len(low), 0.5), spread])
+
+
+def polish(
+    run: Evaluations, cost, x0, *, method: str = "simplex", size: float = 0.15, rounds: int = 2
+) -> tuple[bool, str]:
+    """Local search without derivatives within the bounds.
+
+    The simplex may collapse before it reaches a minimum (K. I. M. McKinnon, SIAM J. Optim. 9, 1998,
+    148-158): it begins again, half as large, from where it ended.
+
+    Parameters
+    ----------
+    run : Evaluations
+    cost : callable
+    x0 : (n,) array
+    method : {"simplex", "powell"}
+    size : float
+        Of the first simplex, over the ranges.
+    rounds : int
+        Simplexes one after the other.
+    """
+    from scipy.optimize import Bounds, minimize
+
+    low, high = run.problem.bounds.T
+    width, unit = high - low, Bounds(np.zeros(len(low)), np.ones(len(low)))
+    # a point at a bound is one after scaling back and forth as well
+    u, n = np.clip((x0 - low) / width, 0.0, 1.0), len(low)
+
+    def scaled(v):
+        return cost(np.clip(low + width * v, low, high))
+
+    if method == "powell":
+        found = minimize(scaled, u, method="Powell", bounds=unit, options={"xtol": 1e-4, "ftol": 1e-4})
+        return bool(found.success), str(found.message)
+    for _ in range(rounds):
+        steps = np.where(u + size > 1.0, -size, size)
+        simplex = u + np.vstack([np.zeros(n), np.diag(steps)])
+        options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "adaptive": n > 4}
+        found = minimize(
+            scaled, u, method="Nelder-Mead", bounds=unit, options=options | {"maxfev": 15 * (n + 1)}
+        )
+        u, size = found.x, 0.5 * size
+    return bool(found.success), str(found.message)
+
+
+def _numbers(problem: Problem, point: Sequence[object]) -> np.ndarray:
+    """Values as the case file holds them, in the units of the variables."""
+    return np.array([v.number(text) for v, text in zip(problem.variables, point)])
+
+
+def _infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
+    """What a search ends with that found no design."""
+    return ConvergenceError(
+        f"none of {run.asked} designs can be computed and lies within the limits",
+        code="E-INFEASIBLE",
+        limit=limit,
+        remedy="widen limits or bounds, or ask for more samples",
+    )
 
 
 def describe(found: Optimum) -> str:

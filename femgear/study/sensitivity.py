@@ -14,10 +14,11 @@ every cell (the adjoint of a linear system: M. B. Giles, N. A. Pierce, Flow, Tur
 2000, 393-415). The chain rule goes on through the separations, which cost no contact solution.
 
 What these derivatives are not: cells change sides at the rims of the contacts, where pressures vanish, so
-over a finite step the exact function bends away from them. Extremes over positions and planets have
-kinks, see `peak_to_peak_slopes`.
+over a finite step the exact function bends away from them. Extremes over positions and planets have kinks,
+see `peak_to_peak_slopes`.
 
-What an optimum loses when its variables are off by their tolerances.
+`tolerances` tells what an optimum loses when its variables are off by their tolerances: computed again, not
+by derivatives, which a corner does not have.
 """
 
 from __future__ import annotations
@@ -34,12 +35,14 @@ from femgear.gears.deviations import (
     SetDeviations,
     body_separation,
     mirrored_deviations,
+    no_deviations,
     profile_separation,
     tooth_separation,
 )
 from femgear.study.linearised import LinearContact, linear_positions
 from femgear.study.objectives import Quantity
 from femgear.study.problem import Failure
+from femgear.study.relief import pin_error
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -143,7 +146,8 @@ def sensitivity(
     linear : LinearContact
         Of the set with the deviations ``variant(value)``.
     variant : callable
-        Deviations (of the set as it is, not mirrored) for a value of the parameter, see `relief`.
+        Deviations (of the set as it is, not mirrored) for a value of the parameter, as those of
+        `femgear.study.relief`.
     value : float
     step : float
         The separations are differentiated centrally over twice this; exact where they are linear in the
@@ -205,9 +209,6 @@ def pin_sensitivities(linear: LinearContact) -> np.ndarray:
     The third index is radial (outwards), tangential (counter-clockwise). Pin errors separate whole meshes,
     so these derivatives hold beside any other deviations.
     """
-    from femgear.gears.deviations import no_deviations
-    from femgear.study.relief import pin_error
-
     ideal, N = no_deviations(linear.original), linear.original.n_planets
     found = [
         [
@@ -265,6 +266,7 @@ def sharing_factor_slopes(share, change, *, step: float) -> tuple[float, float]:
 
 
 def _slopes(function, values, change, step):
+    """Secants of a function of the values to the left and to the right."""
     values, change = np.asarray(values, float), np.asarray(change, float)
     if not (np.isfinite(step) and step > 0):
         raise CaseError("a slope needs a step", code="E-RANGE", value=step, limit="over 0")
@@ -336,6 +338,7 @@ def tolerances(
 
 
 def _values(evaluations: Evaluations, x, quantities) -> dict[str, float]:
+    """Quantities by name at a point; NaN where it cannot be computed."""
     try:
         return evaluations.values(x, quantities)
     except Failure:

@@ -1,6 +1,6 @@
-"""Many cases: quantities over all combinations of values of some entries of the case file, resumable.
+"""Sweeps: quantities over all combinations of values of some entries of the case file, resumable.
 
-A sweep from the words of a command line to its files.
+`sweep` computes them; `sweep_into` takes the words of a command line and writes journal, table and figure.
 """
 
 from __future__ import annotations
@@ -22,17 +22,22 @@ from femgear.errors import CaseError
 from femgear.storage.files import storage_errors, write_text
 from femgear.study.names import named_quantity
 from femgear.study.objectives import Quantity
-from femgear.study.problem import Failure, Progress, open_designs
+from femgear.study.problem import Failure, open_designs
 from femgear.study.variables import Variable, split
+from femgear.study.variants import need_elastic_ring
 from femgear.threads import one_blas_thread
+from femgear.trains.protocol import Progress
 from femgear.trains.reading import with_value
 
 LARGEST = 100_000
 """Combinations at most."""
 MANY = 1000
 """Combinations from which their time is estimated and said."""
-_WITHOUT_EFFECT = {"title", "format"}
+JOURNAL, TABLE, FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
+"""Files of a sweep."""
 _TIMED = 3
+"""Cases that the estimate is made from."""
+_WITHOUT_EFFECT = {"title", "format"}
 _RANGE = re.compile(r"(.+?)\.\.(.+?)/\s*(\d{1,6})\s*", re.DOTALL)
 
 
@@ -160,12 +165,8 @@ def check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str]
     """
     stages = {quantity.stage for quantity in quantities}
     elastic = [quantity.name for quantity in quantities if quantity.stage in ("dynamics", "housing")]
-    other = [name for name in ("planar", "helical") if getattr(case, name, None) is not None]
-    if elastic and other:
-        raise CaseError(
-            f"{elastic[0]} needs a case with an elastic ring", code="E-STAGE", key=other[0],
-            limit="transmission error, contact ratio, tip thickness, contact pressure, root stress",
-        )  # fmt: skip
+    if elastic:
+        need_elastic_ring(case, f"{elastic[0]} needs")
     # transmission errors may name a torque of their own
     loaded = any(key.startswith("operation") for key in keys) or any("N m" in q.name for q in quantities)
     if stages - {"gears"} and case.operation.torque == 0.0 and not loaded:
@@ -176,6 +177,7 @@ def check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str]
 
 
 def _warn_of_time(left: int, seconds: float) -> None:
+    """Say on standard error how long the cases left will take, at so many seconds each."""
     total = left * seconds
     shown = f"{total / 3600.0:.1f} h" if total > 5400.0 else f"{total / 60.0:.1f} min"
     print(
@@ -231,9 +233,6 @@ def _not_over(text: str) -> CaseError:
         limit="KEY=V1,V2,V3 or KEY=LOW..HIGH/COUNT with a count of 2 or more",
         remedy='--over "operation.torque=50 N m, 100 N m" --over "sun.modifications[0].amount=0 um..12 um/7"',
     )
-
-
-JOURNAL, TABLE, FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
 
 
 def sweep_into(

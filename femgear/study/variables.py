@@ -14,10 +14,12 @@ from femgear.case.units import Dimension, to_si
 from femgear.errors import CaseError
 from femgear.trains.reading import with_values
 
-_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
-_DIGITS = 9
 DEFAULT_TOLERANCE = 0.1
 """Over the range of the variable."""
+FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"})
+"""Entries that do nothing but separate flanks: no grid knows them, and derivatives reach them."""
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+_DIGITS = 9
 
 
 @dataclass(frozen=True)

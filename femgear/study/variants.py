@@ -1,6 +1,7 @@
-"""Stages of many variants of one case: grids, compliances and the ring are computed once and used again.
+"""Variants of one case: their stages, and a journal of what was computed.
 
-What was computed, kept line by line on disk, so that an interrupted search goes on where it was.
+Grids, compliances and the ring are computed once and used again by every variant that shares them. The
+journal keeps numbers line by line on disk, so that an interrupted search goes on where it was.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from femgear.case.sections import Case
 from femgear.case.units import SPEED
 from femgear.errors import CaseError, StorageError
 from femgear.storage.files import exclusive_lock, storage_errors
+from femgear.study.linearised import static_supports
+from femgear.study.variables import FLANK_ENTRIES
 from femgear.threads import one_blas_thread
 from femgear.trains.elastic import stages as elastic_stages
 from femgear.trains.elastic.checks import check_dynamic_case, check_rim_speed
@@ -38,64 +41,13 @@ if TYPE_CHECKING:
     from femgear.trains.elastic.results import HousingResult, ModesResult
     from femgear.trains.static.results import StaticResult, StressResult
 
+FORMAT = 1
+"""Of journals."""
 Range = tuple[float, float, int]
 """First and last input speed [rad/s] and number of speeds."""
-
-# separations of the flanks, which no grid knows
-_FLANKS = {"modifications", "errors", "individual", "pin_errors"}
 _SOLUTION = {"positions", "contact", "back_flanks", "stresses", "longest_record"}
 _RIGID = {"mass", "inertia", "support_stiffness", "bearing_stiffness", "bearing_clearance"}
 _WITHOUT_GRID = {"title", "operation", "dynamics", "housing", "carrier", "motor", "brake", "planar"}
-
-
-class Shared:
-    """What variants share, the latest few of each: flank compliances, and the dynamic model.
-
-    Parameters
-    ----------
-    cache : path, optional
-        Folder of generated grids.
-    case : Case
-        Only its grids are kept on disk: those of variants of its geometry would fill the folder.
-    """
-
-    def __init__(self, case: Case, *, cache: Path | None = None, keep: int = 4):
-        self._cache, self._keep = cache, keep
-        self._own = grid_key(case)
-        self._found: OrderedDict[str, Any] = OrderedDict()
-
-    def take(self, key: str, compute: Callable[[], Any]) -> tuple[Any, bool]:
-        """What is kept under a key, else computed now; and whether it is new."""
-        new = key not in self._found
-        if new:
-            self._found[key] = compute()
-            if len(self._found) > self._keep:
-                self._found.popitem(last=False)
-        self._found.move_to_end(key)
-        return self._found[key], new
-
-    def grid_folder(self, key: str) -> Path | None:
-        return self._cache if key == self._own else None
-
-
-def grid_key(case: Case) -> str:
-    """Text that two cases share when their flanks have the same compliance."""
-    return _key(case, _WITHOUT_GRID, _FLANKS | _SOLUTION | _RIGID)
-
-
-def model_key(case: Case) -> str:
-    """Text that two cases share when only deviations of the flanks set their dynamic models apart."""
-    return "model " + _key(case, {"title", "housing"}, _FLANKS | _SOLUTION | {"damping_ratio", "tolerance"})
-
-
-def _key(case: Case, sections: set[str], entries: set[str]) -> str:
-    data = case.model_dump()
-    kept = {
-        name: {k: v for k, v in section.items() if k not in entries} if isinstance(section, dict) else section
-        for name, section in data.items()
-        if name not in sections
-    }
-    return json.dumps(kept, sort_keys=True, default=str)
 
 
 class Variant:
@@ -113,12 +65,14 @@ class Variant:
         self._found: dict[tuple, Any] = {}
 
     def _once(self, *key, compute: Callable[[], Any]):
+        """What was found under a key, else computed now."""
         if key not in self._found:
             self._found[key] = compute()
         return self._found[key]
 
     @cached_property
     def gears(self) -> PlanetarySet:
+        """Gears, closed and checked."""
         return planetary_set(self.case)
 
     def static(self, torque: float | None = None) -> StaticResult:
@@ -130,9 +84,7 @@ class Variant:
 
     def stress(self) -> StressResult:
         """Root stresses under the torque of the case."""
-        from femgear.trains.static.stages import solve_stress
-
-        return self._once("stress", compute=lambda: solve_stress(self.case, self.static()))
+        return self._once("stress", compute=lambda: static_stages.solve_stress(self.case, self.static()))
 
     def response(self, speeds: Range) -> Response:
         """Periodic response at a range of speeds, without the verdict on its stability."""
@@ -150,6 +102,7 @@ class Variant:
         return self._once("housing", speeds, compute=compute)
 
     def _modes(self, speeds: Range) -> tuple[Case, ModesResult]:
+        """The case at a range of speeds, and its modal basis."""
         case = self._once("speeds", speeds, compute=lambda: at_speeds(self.case, speeds))
         return case, self._once(
             "modes", speeds, compute=lambda: _modal_basis(case, self.static(), self._shared)
@@ -164,28 +117,31 @@ def at_speeds(case: Case, speeds: Range) -> Case:
     CaseError
         E-STAGE: a planar or helical case, which has no elastic ring.
     """
-    other = [name for name in ("planar", "helical") if getattr(case, name, None) is not None]
-    if other:
-        raise CaseError(
-            "mesh forces over speed and housing levels need a case with an elastic ring",
-            code="E-STAGE",
-            key=other[0],
-            limit="transmission error, contact ratio, tip thickness, contact pressure, root stress",
-        )
+    need_elastic_ring(case, "mesh forces over speed and housing levels need")
     first, last, count = speeds
     low, high = (f"{value / SPEED.scale:.12g} rpm" for value in (first, last))
     case = with_value(case, "housing.published", None)
     return with_value(case, "operation.speeds", {"from": low, "to": high, "count": count})
 
 
+def need_elastic_ring(case: Case, subject: str) -> None:
+    """Refuse a planar or helical case (E-STAGE); the subject with its verb begins the message."""
+    other = [name for name in ("planar", "helical") if getattr(case, name, None) is not None]
+    if other:
+        raise CaseError(
+            f"{subject} a case with an elastic ring",
+            code="E-STAGE",
+            key=other[0],
+            limit="transmission error, contact ratio, tip thickness, contact pressure, root stress",
+        )
+
+
 @one_blas_thread()
 def _static(case: Case, shared: Shared) -> StaticResult:
     """As `solve_static`, with the compliances of an earlier variant where they are the same."""
     from femgear.contact.cycle import walk_either_flank
-    from femgear.contact.supports import RIGID
     from femgear.gears.deviations import common_period
     from femgear.gears.kinematics import torques
-    from femgear.study.linearised import case_supports
 
     key = grid_key(case)
     first, new = shared.take(key, lambda: static_stages.solve_static(case, cache=shared.grid_folder(key)))
@@ -201,7 +157,7 @@ def _static(case: Case, shared: Shared) -> StaticResult:
         positions=gears.equal_positions(case.static.positions),
         contact=case.static.contact,
         deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
-        supports=RIGID if case.static.members == "fixed" else case_supports(case),
+        supports=static_supports(case),
         periods=periods,
         both_flanks=case.static.back_flanks,
     )
@@ -242,12 +198,58 @@ def _response(case: Case, modes: ModesResult) -> Response:
     )[1]
 
 
-FORMAT = 1
+class Shared:
+    """What variants share, the latest few of each: flank compliances, and the dynamic model.
+
+    Parameters
+    ----------
+    cache : path, optional
+        Folder of generated grids.
+    case : Case
+        Only its grids are kept on disk: those of variants of its geometry would fill the folder.
+    """
+
+    def __init__(self, case: Case, *, cache: Path | None = None, keep: int = 4):
+        self._cache, self._keep = cache, keep
+        self._own = grid_key(case)
+        self._found: OrderedDict[str, Any] = OrderedDict()
+
+    def take(self, key: str, compute: Callable[[], Any]) -> tuple[Any, bool]:
+        """What is kept under a key, else computed now; and whether it is new."""
+        new = key not in self._found
+        if new:
+            self._found[key] = compute()
+            if len(self._found) > self._keep:
+                self._found.popitem(last=False)
+        self._found.move_to_end(key)
+        return self._found[key], new
+
+    def grid_folder(self, key: str) -> Path | None:
+        """Where grids of a key are kept on disk, if they are."""
+        return self._cache if key == self._own else None
 
 
-def fingerprint(case: Case) -> str:
-    """SHA-256 of the text of a case."""
-    return hashlib.sha256(to_toml(case).encode()).hexdigest()
+def grid_key(case: Case) -> str:
+    """Text that two cases share when their flanks have the same compliance."""
+    return _key(case, _WITHOUT_GRID, FLANK_ENTRIES | _SOLUTION | _RIGID)
+
+
+def model_key(case: Case) -> str:
+    """Text that two cases share when only deviations of the flanks set their dynamic models apart."""
+    return "model " + _key(
+        case, {"title", "housing"}, FLANK_ENTRIES | _SOLUTION | {"damping_ratio", "tolerance"}
+    )
+
+
+def _key(case: Case, sections: set[str], entries: frozenset[str]) -> str:
+    """Text of a case without some of its sections and entries."""
+    data = case.model_dump()
+    kept = {
+        name: {k: v for k, v in section.items() if k not in entries} if isinstance(section, dict) else section
+        for name, section in data.items()
+        if name not in sections
+    }
+    return json.dumps(kept, sort_keys=True, default=str)
 
 
 class Journal:
@@ -286,6 +288,7 @@ class Journal:
         self._write({"key": key, "record": self._records[key]})
 
     def _write(self, line: dict) -> None:
+        """Append a line and force it out."""
         if self._stream is None:
             return
         with storage_errors(self._path):
@@ -295,6 +298,7 @@ class Journal:
             os.fsync(self._stream.fileno())
 
     def _open(self, header: dict) -> None:
+        """Read what the file holds, and keep it open for more."""
         with storage_errors(self._path):
             self._stream = open(self._path, "a+b")
             self._stream.seek(0)
@@ -357,7 +361,13 @@ def open_journal(path: str | os.PathLike | None, case: Case, keys: tuple[str, ..
             journal._close()
 
 
+def fingerprint(case: Case) -> str:
+    """SHA-256 of the text of a case."""
+    return hashlib.sha256(to_toml(case).encode()).hexdigest()
+
+
 def _line(text: bytes, path: Path, number: int) -> dict:
+    """One JSON line."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):
@@ -377,6 +387,7 @@ def _broken(path: Path, number: int) -> StorageError:
 
 
 def _check(found: dict, header: dict, path: Path) -> None:
+    """Refuse a journal whose header is not the expected one."""
     words = {
         "format": "by another version of femgear",
         "femgear": "by another version of femgear",

@@ -137,14 +137,6 @@ class Train:
         ``"planar"``, ``"a planar case"``.
     model : type
         Of its cases; a case is one of the train with the most special model.
-    section : str
-        Table that makes a planetary set one of this train, and the field of the model; ``""`` for none.
-    own_file : OwnFile, optional
-        Where the case file is not that of a planetary set.
-    cross_check : callable
-        ``(case) -> problems``: what no entry shows alone.
-    notices : callable
-        ``(tables) -> sentences``: what was read in a way that deserves to be said.
     stages : tuple of Stage
         In order.
     describe : callable
@@ -157,6 +149,14 @@ class Train:
         ``() -> Figures`` of the case, whatever is computed of it.
     remarks : callable
         ``(Results, name of a picture) -> sentences`` that this case adds to a caption.
+    section : str
+        Table that makes a planetary set one of this train, and the field of the model; ``""`` for none.
+    own_file : OwnFile, optional
+        Where the case file is not that of a planetary set.
+    cross_check : callable
+        ``(case) -> problems``: what no entry shows alone.
+    notices : callable
+        ``(tables) -> sentences``: what was read in a way that deserves to be said.
     """
 
     name: str

@@ -1,4 +1,9 @@
-"""Case files of every train: reading, changing one entry, the schema."""
+"""Case files and results of every train: reading, changing entries, the schema of the file.
+
+`femgear.case` holds the sections of a planetary set and their checks. Here the registry decides which train
+reads a file: one that claims it with a case file of its own, one whose section the file has, or the train of
+sets without such a section.
+"""
 
 from __future__ import annotations
 
@@ -54,6 +59,29 @@ def parse_case(text: str, *, name: str = "") -> Case:
         File name for messages.
     """
     return _build(case_text.parse(text, name), text, name)
+
+
+def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
+    """Results of a run; of an interrupted one those stages that are complete, with a warning.
+
+    Parameters
+    ----------
+    folder : path-like
+    partial : bool
+        Accept the results of an interrupted run.
+
+    Returns
+    -------
+    Results
+        ``results.modes`` or ``results["modes"]`` is the dataset of a stage.
+
+    Raises
+    ------
+    StorageError
+        No folder, no manifest, a broken one or one of a newer femgear. ``E-RESULTS-INCOMPLETE``: an
+        interrupted run and not ``partial``.
+    """
+    return results_of(folder, read_case, partial=partial)
 
 
 def with_value(case: Case, key: str, value: object) -> Case:
@@ -193,24 +221,8 @@ def every_section() -> type[Case]:
     return create_model("Case", __base__=Case, __doc__=Case.__doc__, **fields)
 
 
-def _train_of_set(data: dict, lines: str, name: str) -> Train:
-    """Train whose section the tables of a planetary set hold; that without one where they hold none."""
-    given = [train for train in reversed(registry.TRAINS) if train.section and train.section in data]
-    if len(given) > 1:
-        sections = [train.section for train in given]
-        problem = CaseError(
-            f"a set is {' or '.join(sections)}",
-            code="E-CHOICE",
-            key=sections[-1],
-            value=" and ".join(sections),
-            limit="one of the sections",
-            remedy="leave one of them out",
-        )
-        raise combine([problem], lines, name)
-    return given[0] if given else next(t for t in registry.TRAINS if not t.section and t.own_file is None)
-
-
 def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
+    """Case of tables; refusals name the lines of the text where it is the user's (`numbered`)."""
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
         raise CaseError(
@@ -241,24 +253,18 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     return with_shafts(case)
 
 
-def open_results(folder: str | os.PathLike, *, partial: bool = True) -> Results:
-    """Results of a run; of an interrupted one those stages that are complete, with a warning.
-
-    Parameters
-    ----------
-    folder : path-like
-    partial : bool
-        Accept the results of an interrupted run.
-
-    Returns
-    -------
-    Results
-        ``results.modes`` or ``results["modes"]`` is the dataset of a stage.
-
-    Raises
-    ------
-    StorageError
-        No folder, no manifest, a broken one or one of a newer femgear. ``E-RESULTS-INCOMPLETE``: an
-        interrupted run and not ``partial``.
-    """
-    return results_of(folder, read_case, partial=partial)
+def _train_of_set(data: dict, lines: str, name: str) -> Train:
+    """Train whose section the tables of a planetary set hold; that without one where they hold none."""
+    given = [train for train in reversed(registry.TRAINS) if train.section and train.section in data]
+    if len(given) > 1:
+        sections = [train.section for train in given]
+        problem = CaseError(
+            f"a set is {' or '.join(sections)}",
+            code="E-CHOICE",
+            key=sections[-1],
+            value=" and ".join(sections),
+            limit="one of the sections",
+            remedy="leave one of them out",
+        )
+        raise combine([problem], lines, name)
+    return given[0] if given else next(t for t in registry.TRAINS if not t.section and t.own_file is None)

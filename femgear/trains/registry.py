@@ -10,6 +10,7 @@ from femgear.trains.planar.stages import PLANAR
 from femgear.trains.protocol import Stage, Train
 
 TRAINS: tuple[Train, ...] = (DRIVETRAIN, HELICAL, PLANAR, ELASTIC)
+"""Special models before more general ones: a case belongs to the first whose model it is one of."""
 
 
 def train_of(case) -> Train:
