@@ -880,7 +880,7 @@ def read_torques(path: str | os.PathLike) -> tuple[list[float], list[float]]:
     Raises
     ------
     CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `tomlfile.read_text`); ``E-CSV`` with the number of the line: unknown
+        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-CSV`` with the number of the line: unknown
         columns or units, numbers that are none, not finite or beyond the limits of a case file, decimal
         commas beside decimal points, times that do not ascend.
     """
