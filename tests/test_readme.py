@@ -116,7 +116,7 @@ def case_keys(model) -> set[str]:
         for name, field in section.model_fields.items():
             inner = [t for t in _types(field.annotation) if isinstance(t, type) and issubclass(t, BaseModel)]
             pending += inner
-            if not inner or section is not Case:
+            if not inner or section is not every_section():
                 found.add(field.alias or name)
     return found
 
