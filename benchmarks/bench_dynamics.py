@@ -286,7 +286,7 @@ def test_frequency_response(benchmark, route):
 
 @question_group
 def test_campbell_diagram(benchmark):
-    from validation.planar import lin_parker_set
+    from published.planetary_sets import lin_parker_set
 
     from femgear.solvers.linear.campbell import campbell_data
     from femgear.system.assembler import planar_system

@@ -15,7 +15,7 @@ HERTZ = np.linspace(10.0, 15e3, 2000)
 @cache
 def inputs():
     """System, modes, rows of the loads and errors (8, 8, 4): four tooth sums, two lags of the planets."""
-    from validation.helical import kahraman_set
+    from published.planetary_sets import kahraman_set
 
     from femgear.gears.phasing import MeshPhasing
     from femgear.trains.helical.model import (
@@ -87,7 +87,7 @@ def test_direct(benchmark, medians):
 
 @pytest.mark.benchmark(group="Modes of the helical set of 42 dof", timer=process_time)
 def test_modes(benchmark):
-    from validation.helical import kahraman_set
+    from published.planetary_sets import kahraman_set
 
     from femgear.trains.helical.model import helical_modes
 

@@ -21,7 +21,7 @@ LINES = 24
 
 def mesh_stiffness():
     """k(t) of the six meshes in sequential phase."""
-    from validation.planar import lin_parker_set
+    from published.planetary_sets import lin_parker_set
 
     from femgear.trains.planar.model import phased_series
 
@@ -30,7 +30,7 @@ def mesh_stiffness():
 
 def planet_train(damping: float) -> NonlinearSystem:
     """Example set of Lin and Parker (1999) with three planets, 300 N m and 20 um of backlash."""
-    from validation.planar import lin_parker_set
+    from published.planetary_sets import lin_parker_set
 
     from femgear.system.assembler import planar_meshes
     from femgear.system.lumped import PlanarTorque
@@ -43,7 +43,7 @@ def planet_train(damping: float) -> NonlinearSystem:
 
 def two_base_train(damping: float) -> NonlinearSystem:
     """The same set with its weight, which turns with the carrier: carrier first, mesh second frequency."""
-    from validation.planar import lin_parker_set
+    from published.planetary_sets import lin_parker_set
 
     from femgear.system.assembler import planar_meshes
     from femgear.system.lumped import PlanarTorque

@@ -51,11 +51,17 @@ def main(
     sensitivity
         Whether to vary the assumed inputs of the published set.
     """
-    from femgear.trains.drivetrain.figures import write_drivetrain_pictures
+    from femgear.report.draw import write_pictures
     from femgear.trains.drivetrain.results import describe_drivetrain, describe_spectrum, describe_transient
     from femgear.trains.drivetrain.section import need_drivetrain
     from femgear.trains.drivetrain.setup import case_model, check_spectrum
-    from femgear.trains.drivetrain.stages import solve_drivetrain_modes, solve_spectrum, solve_transient_run
+    from femgear.trains.drivetrain.stages import (
+        DRIVETRAIN,
+        solve_drivetrain_modes,
+        solve_spectrum,
+        solve_transient_run,
+    )
+    from femgear.trains.protocol import Drawn
     from femgear.trains.reading import read_case, with_value
 
     data, paper = need_drivetrain(read_case(case)), read_case(PAPER)
@@ -77,7 +83,7 @@ def main(
         if gears:
             found["spectrum"] = solve_spectrum(data, found["transient"])
         sets = {name: stage.dataset() for name, stage in found.items()}
-        names = write_drivetrain_pictures(folder, data, sets, progress=progress)
+        names = write_pictures(folder, DRIVETRAIN, Drawn(data, sets), progress=progress)
     _write_forces(folder, sets["transient"])
     names.append("forces.csv")
     blocks = [*(block for block in blocks if block.rows), describe_transient(sets["transient"])]

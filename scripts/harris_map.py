@@ -49,18 +49,17 @@ def main(
     positions
         Positions over one mesh period.
     """
-    from femgear.case.case import planetary_set
+    from femgear.case.case import need_set, planetary_set
     from femgear.case.units import LENGTH, TORQUE, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
     from femgear.study.figures import harris_curves
     from femgear.study.linearised import design_basis, sun_torque
     from femgear.study.relief import harris_map, loads_back, relief_starts, with_tip_relief
-    from femgear.trains.drivetrain.section import refuse_drivetrain
     from femgear.trains.reading import read_case
 
     data = read_case(case)
-    refuse_drivetrain(data)
+    need_set(data)
     if not 4 <= positions <= 2048:
         raise CaseError("too few or too many positions", code="E-RANGE", key="--positions", value=positions)
     amounts = [_checked(to_si(text, LENGTH), text, data.sun.module) for text in relief]

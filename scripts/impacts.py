@@ -222,7 +222,7 @@ def eccentric_set(eccentricity: float, floating: bool):
     """Lin and Parker's set of three planets with an eccentric sun and a tooth error: errors and problem."""
     from dataclasses import replace
 
-    from validation.planar import lin_parker_set
+    from published.planetary_sets import lin_parker_set
 
     from femgear.system.assembler import planar_meshes
     from femgear.system.lumped import PlanarTorque

@@ -96,7 +96,7 @@ def main(
         data, variables = tip_reliefs(data)
     fast = {"static.positions": positions, "static.flank_elements": flank_elements}
     coarse = with_values(data, fast | QUIET)
-    elastic = data.planar is None and getattr(data, "helical", None) is None
+    elastic = not data.rigid
     reported = of or (*ERRORS, *(FORCES if elastic else ()))
     first, *others = (named_quantity(words, speeds=speeds) for words in (objective, *reported))
     another = None if second is None else named_quantity(second, speeds=speeds)

@@ -147,7 +147,7 @@ def _choice_rows(choices):
 
 def _types(convention, harmonics):
     """Tables of the three types of four equal planets, and of two pairs that stand unequally."""
-    from validation.helical import cases
+    from published.planetary_sets import cases
 
     from femgear.gears.phasing import MeshPhasing, phasing_table
 
@@ -159,7 +159,7 @@ def _types(convention, harmonics):
 
 def _title(name: str, letter: str) -> str:
     """Phasing, case of Table 2, teeth of sun, planet and ring."""
-    from validation.helical import TABLE_2
+    from published.planetary_sets import TABLE_2
 
     sun, ring, planet, _ = TABLE_2[letter]
     return f"{name}: {letter}, {sun}/{planet}/{ring}"
@@ -167,7 +167,7 @@ def _title(name: str, letter: str) -> str:
 
 def _spectra(points):
     """Forces of two sun meshes of the published helical train, four harmonics of 1 um, 5 % damping."""
-    from validation.helical import cases, kahraman_set
+    from published.planetary_sets import cases, kahraman_set
 
     from femgear.gears.phasing import phase_factors
     from femgear.trains.helical.model import helical_modes, helical_system, modal_error_response

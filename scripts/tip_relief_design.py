@@ -58,7 +58,7 @@ def main(
     positions
         Positions over one mesh period.
     """
-    from femgear.case.case import planetary_set
+    from femgear.case.case import need_set, planetary_set
     from femgear.case.units import LENGTH, TORQUE, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
@@ -66,11 +66,10 @@ def main(
     from femgear.study.figures import relief_contours
     from femgear.study.linearised import design_basis, relief_snippet, sun_torque
     from femgear.study.relief import loads_back
-    from femgear.trains.drivetrain.section import refuse_drivetrain
     from femgear.trains.reading import read_case
 
     data = read_case(case)
-    refuse_drivetrain(data)
+    need_set(data)
     _check_counts(points, positions)
     design = data.operation.torque if torque is None else to_si(torque, TORQUE)
     others = [to_si(text, TORQUE) for text in also] or [0.5 * design, 1.5 * design]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from validation.helical import kahraman_set
+from published.planetary_sets import kahraman_set
 
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError, GeometryError

@@ -30,7 +30,7 @@ def test_frequencies_in_the_prose_are_those_of_the_example(outputs):
 def test_table_of_the_eight_cases_is_computed():
     """Tooth numbers, class, closure, kinds of the four harmonics and peaks of the printed table."""
     import numpy as np
-    from validation.helical import TABLE_2, cases, kahraman_set
+    from published.planetary_sets import TABLE_2, cases, kahraman_set
 
     from femgear.gears.phasing import phase_factors, phasing_table
     from femgear.trains.helical.model import helical_modes, helical_system, modal_error_response

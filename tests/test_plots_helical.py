@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.helical import cases, kahraman_set
+from published.planetary_sets import cases, kahraman_set
 
 from femgear.errors import CaseError
 from femgear.report.style import png_bytes

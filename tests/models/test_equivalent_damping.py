@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.planetary_sets import lin_parker_set
 from scipy import linalg
-from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError
 from femgear.system.assembler import planar_system

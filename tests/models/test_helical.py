@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.planetary_sets import kahraman_set, lin_parker_set
 from scipy.linalg import eigh, null_space
 from scipy.optimize import root
 from uneven_set import ANGLES, UNEVEN
 from validation import helical
-from validation.helical import kahraman_set, rigid_motions
-from validation.planar import lin_parker_set
+from validation.helical import rigid_motions
 from validation.planetary import nrel_set
 
 from femgear.errors import CaseError

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from published.planetary_sets import kahraman_set
 from scipy.integrate import quad
-from validation.helical import kahraman_set
 
 from femgear.contact.cycle import cycle_without_load
 from femgear.errors import CaseError

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.helical import kahraman_set
+from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.tracking import stiffness_of, strain_shares

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.helical import cases, kahraman_set
-from validation.planar import lin_parker_set
+from published.planetary_sets import cases, kahraman_set, lin_parker_set
 from validation.routes import state_of
 
 from femgear.errors import CaseError

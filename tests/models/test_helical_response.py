@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.helical import TABLE_2, cases, kahraman_set
+from published.planetary_sets import TABLE_2, cases, kahraman_set
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears.phasing import MeshPhasing, mesh_phasing, phase_factors

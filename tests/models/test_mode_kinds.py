@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from validation.planar import lin_parker_set
+from published.planetary_sets import lin_parker_set
 
 from femgear.errors import CaseError
 from femgear.system.assembler import planar_system

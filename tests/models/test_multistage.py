@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from published.multistage_example import PUBLISHED, four_stage_train, published_train
+from published.planetary_sets import lin_parker_set
 from scipy.linalg import eigh
 from trains import closed_set, stage, two_stages
-from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.tracking import stiffness_of, strain_shares

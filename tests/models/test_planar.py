@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.planetary_sets import lin_parker_set
 from scipy.linalg import eig, eigh
 from uneven_set import ANGLES, UNEVEN
-from validation.planar import lin_parker_set
 from validation.planetary import nrel_set
 
 from femgear.errors import CaseError

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.planetary_sets import lin_parker_set
 from published.wind_turbine import wind_turbine_b
-from validation.planar import by_kind, lin_parker_set, torsional
+from validation.planar import by_kind, torsional
 
 from femgear.errors import CaseError
 from femgear.trains.planar.model import class_shares, planar_kinds, planar_modes

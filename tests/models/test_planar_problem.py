@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.planetary_sets import lin_parker_set
 from validation import planar
-from validation.planar import lin_parker_set, sharing_set, static_mesh_forces, sun_forces
+from validation.planar import sharing_set, static_mesh_forces, sun_forces
 
 from femgear.errors import CaseError
 from femgear.system.assembler import (

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.planar import lin_parker_set
+from published.planetary_sets import lin_parker_set
 
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.planar import lin_parker_set
+from published.planetary_sets import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes, damping_matrix, solve_modes, whirl

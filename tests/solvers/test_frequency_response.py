@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.planar import lin_parker_set
+from published.planetary_sets import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.frequency_response import (

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.planetary_sets import lin_parker_set
 from scipy.integrate import solve_ivp
-from validation.planar import lin_parker_set
 
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.system.assembler import planar_meshes

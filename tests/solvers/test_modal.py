@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.planar import lin_parker_set
+from published.planetary_sets import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import output_load, output_response, residual_output, solve_modes

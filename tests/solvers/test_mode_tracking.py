@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.planetary_sets import lin_parker_set
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
-from validation.planar import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.campbell import campbell_data

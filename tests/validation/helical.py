@@ -7,8 +7,9 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+from published.planetary_sets import TABLE_2, cases, kahraman_set
 
-from femgear.gears.phasing import MeshPhasing, phase_factors, standard_lag
+from femgear.gears.phasing import phase_factors
 from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.system.mode_kinds import phasing
 from femgear.trains.helical.model import (
@@ -19,8 +20,6 @@ from femgear.trains.helical.model import (
     mesh_directions,
     modal_error_response,
     phased_errors,
-    reduced_body,
-    reduced_support,
 )
 from validation import independent
 from validation.rows import Row, at_most, counted, information, within
@@ -35,61 +34,8 @@ TABLE_4 = {
     "IP": ((3116, 3704, 7900, 8407, 12032), (3116.55, 3704.31, 7900.52, 8407.24, 12032.88)),
     "CP": ((3627, 7625, 9840), (3627.12, 7624.95, 9840.18)),
 }
-# Z_s, Z_r, Z_p and class of sun, ring and planet; masses, stiffnesses and errors are those of Table 3 for all
-TABLE_2 = {
-    "A": (28, 68, 20, "I-I-even"),
-    "B": (28, 68, 19, "I-I-odd"),
-    "C": (30, 70, 20, "III-III-even"),
-    "D": (30, 70, 19, "III-III-odd"),
-    "E": (29, 71, 20, "II-IV-even"),
-    "F": (29, 71, 21, "II-IV-odd"),
-    "G": (31, 69, 20, "IV-II-even"),
-    "H": (31, 69, 19, "IV-II-odd"),
-}
 # one unit of the last printed digit [Hz], and never more than this share
 UNIT, SHARE = 1.0, 3e-4
-# N/um in N/m
-MICRO = 1e6
-
-
-def kahraman_set(**changes) -> HelicalSet:
-    """Example set of Kahraman (1994, Table 3): 30/20/70 teeth, four planets, helix angle 20 deg.
-
-    The radius of the planet circle is not printed; it enters as r_c / r_p alone. Axial and tilt stiffnesses
-    are 10 000 N/um: with the printed 1000 N/um the frequencies miss Table 4 by up to 46 %, and the text has
-    them nearly a hundred times the radial ones. The helix angle stands for that of the tooth normals.
-    """
-    alpha, stiff = math.radians(21.34), 1e4 * MICRO
-    sun, planet, ring = 0.024, 0.016, 0.056
-    distance = 0.040 / math.cos(alpha)
-
-    def support(radius, radial, torsional=0.0):
-        return reduced_support(radius, radial=radial * MICRO, axial=stiff, tilt=stiff, torsional=torsional)
-
-    given = {
-        "sun": reduced_body(sun, mass=0.460, polar=0.272, diametral=0.136, support=support(sun, 1e-4)),
-        "ring": reduced_body(
-            ring, mass=0.588, polar=0.759, diametral=0.389, support=support(ring, 1e4, stiff)
-        ),
-        "carrier": reduced_body(
-            distance, mass=3.0, polar=1.5, diametral=0.75, support=support(distance, 100.0)
-        ),
-        "planet": reduced_body(planet, mass=0.177, polar=0.100, diametral=0.050),
-        "sun_radius": sun,
-        "ring_radius": ring,
-        "planet_radius": planet,
-        "centre_distance": distance,
-        "planet_angles": 0.5 * np.pi * np.arange(4),
-        "pressure_angle_sun_planet": alpha,
-        "pressure_angle_planet_ring": alpha,
-        "base_helix_angle": math.radians(20.0),
-        "stiffness_sun_planet": 200.0 * MICRO,
-        "stiffness_planet_ring": 200.0 * MICRO,
-        # the springs of the pins act on w_c - (r_c / r_p) w_p
-        "planet_bearing": support(distance, 100.0),
-        "contact_points": "base_circles",
-    }
-    return HelicalSet(**given | changes)
 
 
 def by_phasing(data: HelicalSet, *, below: float = 15e3) -> dict[str, np.ndarray]:
@@ -201,21 +147,6 @@ def rigid() -> tuple[Row, ...]:
     name = "forces at the base circles: strain of the first mesh by a common tilt [m/rad]"
     rows.append(within("K", "a sin(alpha) cos(alpha) sin(beta)", name, largest, strain[3], 1e-12))
     return tuple(rows)
-
-
-def cases(*, convention: str = "rotation") -> dict[str, MeshPhasing]:
-    """Phasings A to H of Table 2, four equally spaced planets.
-
-    The two meshes of a planet are (Z_p + 1) / 2 pitches apart: in step in harmonic l or against one another
-    by the parity of Z_p and of l, which is `standard_lag`.
-    """
-    return {
-        letter: MeshPhasing(
-            sun, ring, tuple((sun + ring) // 4 * n for n in range(4)), convention=convention,
-            lag=standard_lag(planet),
-        )
-        for letter, (sun, ring, planet, _) in TABLE_2.items()
-    }  # fmt: skip
 
 
 def table_2() -> tuple[Row, ...]:

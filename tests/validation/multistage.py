@@ -16,6 +16,7 @@ from published.multistage_example import (
     four_stage_train,
     published_train,
 )
+from published.planetary_sets import lin_parker_set
 
 from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.system.lumped import torsional_set
@@ -33,7 +34,6 @@ from femgear.trains.multistage.model import (
 )
 from femgear.trains.multistage.stages import error_response, multistage_modes
 from femgear.trains.planar.model import planar_modes
-from validation.planar import lin_parker_set
 from validation.rows import Row, at_most, counted, information, within
 
 STRUCTURE = "Kiracofe and Parker, J. Vib. Acoust. 129, 2007: structure of the modes"

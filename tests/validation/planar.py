@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from published.planetary_sets import lin_parker_set
 from published.wind_turbine import wind_turbine_b
 
 from femgear.errors import ConvergenceError
@@ -14,7 +15,6 @@ from femgear.system.lumped import (
     PlanarBody,
     PlanarSet,
     PlanarTorque,
-    inertia_of_reduced,
     planar_from_set,
     torsional_of_reduced,
     torsional_set,
@@ -57,39 +57,6 @@ MISPRINTS = {
     "727.0": "printed too low, cause unknown",
     "1091.0": "printed too low, cause unknown",
 }
-
-
-def lin_parker_set(planets: int = 3, *, planet_bearing: float = 1e8, sun_support: float = 1e8) -> PlanarSet:
-    """Example set of Lin and Parker (1999, Table 1), equally spaced.
-
-    Inertias are given as I / r^2 and the torsional support of the ring as k_u, so that the radii do not
-    enter its modes. The printed base diameters of sun, planet and ring do not close; 77.42 mm and 100.35 mm
-    of sun and planet are kept, and ring and centre distance follow from them.
-    """
-    alpha = math.radians(24.6)
-    sun, planet = 0.5 * 0.07742, 0.5 * 0.10035
-    ring, distance = sun + 2.0 * planet, (sun + planet) / math.cos(alpha)
-
-    def body(mass, reduced, radius, **supports):
-        return PlanarBody(mass, inertia_of_reduced(reduced, radius), **supports)
-
-    torsional = torsional_of_reduced(1e9, ring)
-    return PlanarSet(
-        sun=body(0.4, 0.39, sun, support=sun_support),
-        ring=body(2.35, 3.00, ring, support=1e8, torsional_support=torsional),
-        carrier=body(5.43, 6.29, distance, support=1e8),
-        planet=body(0.66, 0.61, planet),
-        sun_radius=sun,
-        ring_radius=ring,
-        planet_radius=planet,
-        centre_distance=distance,
-        planet_angles=2.0 * np.pi * np.arange(planets) / planets,
-        pressure_angle_sun_planet=alpha,
-        pressure_angle_planet_ring=alpha,
-        stiffness_sun_planet=5e8,
-        stiffness_planet_ring=5e8,
-        planet_bearing=planet_bearing,
-    )
 
 
 def by_kind(modes) -> dict[str, np.ndarray]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from published.planetary_sets import lin_parker_set
 
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.shooting import ShootingSolution, solve_shooting
@@ -23,7 +24,6 @@ from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.series import FourierSeries, harmonics_of
 from femgear.trains.planar.model import phased_series, planar_problem
 from validation.nonlinear import duffing, one_harmonic, oscillator, shooting_motion
-from validation.planar import lin_parker_set
 from validation.rows import Row, at_most, counted, information
 
 GATE = 1e-5
