@@ -111,5 +111,5 @@ def test_charts_are_left_out_where_there_is_nothing_of_their_kind(gears, deviati
     for d, names in ((pins, []), (none, []), (forms, both[:1]), (pitches, both[1:]), (deviations, both)):
         monkeypatch.setattr(static_figures, "planetary_set", lambda _: gears)
         monkeypatch.setattr(static_figures, "set_deviations", lambda _, d=d: d)
-        assert list(static_figures.DEVIATIONS.draw(Drawn(None, {}))) == names
+        assert list(static_figures.FIGURES[""].draw(Drawn(None, {}))) == names
         assert [has_profiles(d, gears), has_pitches(d)] == [name in names for name in both]

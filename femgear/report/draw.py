@@ -8,19 +8,23 @@ from typing import TYPE_CHECKING
 from femgear.report.style import save_figure
 
 if TYPE_CHECKING:
-    from femgear.trains.protocol import Drawn, Progress, Train
+    from femgear.trains.protocol import Drawn, Figures, Progress, Train
 
 
 def write_figures(folder: Path, train: Train, drawn: Drawn) -> list[str]:
     """Figures of the stages whose data are there, and of the case; returns the names of the files."""
     figures = {}
-    for stage in train.stages:
-        if stage.name in drawn.data:
-            figures |= stage.figures().draw(drawn)
-    figures |= train.figures().draw(drawn)
+    for stage in _drawn(train, drawn):
+        figures |= stage.draw(drawn)
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
     return [f"{name}.png" for name in figures]
+
+
+def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
+    """Figures of the stages whose data are there, in their order, and of the case."""
+    figures, names = train.figures(), [*(s.name for s in train.stages if s.name in drawn.data), ""]
+    return [figures[name] for name in names if name in figures]
 
 
 def write_pictures(
@@ -37,7 +41,7 @@ def write_pictures(
     progress : callable, optional
         Called with (stage, done, total).
     """
-    written = [w for stage in train.stages if stage.name in drawn.data for w in stage.figures().write]
+    written = [w for stage in _drawn(train, drawn) for w in stage.write]
     steps = [
         lambda: write_figures(folder, train, drawn), *(lambda w=w: w(drawn, folder) for w in written),
     ]  # fmt: skip

@@ -200,7 +200,13 @@ def _pictures(train: Train, results: Results) -> tuple[list[Picture], list[str]]
 
 def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
     """Place in the order, section and caption of a picture from its file name."""
-    captions = [(stage.title, *one) for stage in train.stages for one in stage.figures().captions.items()]
+    figures = train.figures()
+    captions = [
+        (stage.title, *one)
+        for stage in train.stages
+        if stage.name in figures
+        for one in figures[stage.name].captions.items()
+    ]
     for rank, (section, prefix, caption) in enumerate(captions):
         if stem == prefix or stem.startswith(prefix + "_"):
             what = stem[len(prefix) :].strip("_").replace("_", " ")

@@ -81,8 +81,6 @@ class Stage:
         ``(result) -> dict`` for the manifest.
     describe : callable
         ``(Results) -> Block``: the numbers of the stage, read from its folder.
-    figures : callable
-        ``() -> Figures``; called when something is drawn, so that drawing libraries are loaded late.
     wanted : callable
         ``(case) -> bool``: whether a run without ``only`` computes it.
     unavailable : callable
@@ -100,7 +98,6 @@ class Stage:
     solve: Callable[[Any, Mapping[str, Any], Context], Any]
     verdict: Callable[[Any], dict]
     describe: Callable[[Results], Block]
-    figures: Callable[[], Figures] = lambda: Figures({})
     wanted: Callable[[Any], bool] = lambda case: True
     unavailable: Callable[[Any], str] = lambda case: ""
     needs: Callable[[Any], tuple[str, ...]] = lambda case: ()
@@ -146,7 +143,8 @@ class Train:
     result_warnings : callable
         ``(Results) -> sentences``: what the solvers say against their own results.
     figures : callable
-        ``() -> Figures`` of the case, whatever is computed of it.
+        ``() -> {stage: Figures}``; called when something is drawn, so that drawing libraries are loaded late.
+        ``""`` are those of the case, whatever is computed of it.
     remarks : callable
         ``(Results, name of a picture) -> sentences`` that this case adds to a caption.
     section : str
@@ -166,7 +164,7 @@ class Train:
     describe: Callable[[Any], tuple[Block, ...]]
     warnings: Callable[[Any], Iterable[str]]
     result_warnings: Callable[[Results], Iterable[str]] = lambda results: ()
-    figures: Callable[[], Figures] = lambda: Figures({})
+    figures: Callable[[], Mapping[str, Figures]] = dict
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
     section: str = ""
     own_file: OwnFile | None = None

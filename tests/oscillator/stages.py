@@ -88,10 +88,12 @@ OSCILLATOR = Train(
             describe=lambda results: Block(
                 "Receptance", ("largest [m/N]",), ((f"{float(results.receptance['receptance'].max()):.4g}",),)
             ),
-            figures=lambda: Figures({"receptance": "Displacement of the mass for a unit force."}, draw),
             needs=lambda case: ("modes",),
         ),
     ),
     describe=lambda case: (Block(case.title), Block("Oscillator"), Block("Warnings", notes=("none",))),
     warnings=lambda case: (),
+    figures=lambda: {
+        "receptance": Figures({"receptance": "Displacement of the mass for a unit force."}, draw)
+    },
 )

@@ -6,7 +6,7 @@ and the case file of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -199,15 +199,10 @@ def _transient_verdict(result: TransientResult) -> dict:
     }
 
 
-def _figures(name: str) -> Callable[[], Figures]:
-    """Figures of a stage, loaded when they are drawn."""
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.drivetrain.figures import FIGURES
 
-    def load() -> Figures:
-        from femgear.trains.drivetrain.figures import FIGURES
-
-        return FIGURES[name]
-
-    return load
+    return FIGURES
 
 
 def remarks(results: Results, stem: str) -> Iterator[str]:
@@ -233,7 +228,6 @@ DRIVETRAIN = Train(
                 "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
             },
             describe=lambda results: describe_drivetrain_modes(results.modes),
-            figures=_figures("modes"),
             check=check_drivetrain,
         ),
         Stage(
@@ -242,7 +236,6 @@ DRIVETRAIN = Train(
             solve=lambda case, _, context: solve_transient_run(case, progress=context.progress),
             verdict=_transient_verdict,
             describe=lambda results: describe_transient(results.transient),
-            figures=_figures("transient"),
             check=check_drivetrain,
         ),
         Stage(
@@ -254,7 +247,6 @@ DRIVETRAIN = Train(
                 "segments": min(one.segments for one in result.spectra.values()),
             },
             describe=lambda results: describe_spectrum(results.spectrum),
-            figures=_figures("spectrum"),
             unavailable=lambda case: "" if case.parallel or case.planetary else "the chain has no gears",
             needs=lambda case: ("transient",),
             check=lambda case: check_spectrum(case, case_model(case)),
@@ -265,5 +257,6 @@ DRIVETRAIN = Train(
     result_warnings=lambda results: (
         transient_warnings(results.transient) if "transient" in results.stages else ()
     ),
+    figures=_figures,
     remarks=remarks,
 )  # fmt: skip

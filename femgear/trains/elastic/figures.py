@@ -54,6 +54,7 @@ from femgear.report.style import (
     rpm,
 )
 from femgear.trains.protocol import Drawn, Figures
+from femgear.trains.static.figures import FIGURES as STATIC
 from femgear.trains.static.figures import PICTURE_FLANK_ELEMENTS, PICTURE_REFINE
 
 if TYPE_CHECKING:
@@ -612,7 +613,7 @@ def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
     return figures
 
 
-FIGURES = {
+FIGURES = STATIC | {
     "modes": Figures(
         {
             "mode_shapes": (

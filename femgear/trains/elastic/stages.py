@@ -7,7 +7,7 @@ each.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -42,7 +42,6 @@ from femgear.trains.static.stages import (
     _backlash,
     _ring_foundation,
     _supports_of,
-    case_figures,
     response_verdict,
 )
 
@@ -440,15 +439,10 @@ def _named(modes: Modes, model: ElasticSet) -> Modes:
     return replace(modes, kind=kinds, nodal_diameter=diameters)
 
 
-def _figures(name: str):
-    """Figures of a stage, loaded when they are drawn."""
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.elastic.figures import FIGURES
 
-    def load() -> Figures:
-        from femgear.trains.elastic.figures import FIGURES
-
-        return FIGURES[name]
-
-    return load
+    return FIGURES
 
 
 def _notices(data: dict) -> Iterator[str]:
@@ -476,7 +470,6 @@ ELASTIC = Train(
                 "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.model.system.M),
             },
             describe=lambda results: describe_modes(results.modes),
-            figures=_figures("modes"),
             needs=lambda case: ("static", "stress") if case.static.stresses else ("static",),
             check=lambda case: check_dynamic_case(case, planetary_set(case)),
         ),
@@ -488,7 +481,6 @@ ELASTIC = Train(
             ),
             verdict=response_verdict,
             describe=lambda results: describe_response(results.dynamics),
-            figures=_figures("dynamics"),
             needs=lambda case: ("modes",),
         ),
         Stage(
@@ -497,7 +489,6 @@ ELASTIC = Train(
             solve=lambda case, results, _: solve_housing(case, results["dynamics"]),
             verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(results.housing),
-            figures=_figures("housing"),
             needs=lambda case: ("dynamics",),
             tables=lambda results: (mesh_bands(results),),
         ),
@@ -507,6 +498,6 @@ ELASTIC = Train(
     result_warnings=lambda results: (
         response_warnings(results.dynamics) if "dynamics" in results.stages else ()
     ),
-    figures=case_figures,
+    figures=_figures,
     notices=_notices,
 )  # fmt: skip

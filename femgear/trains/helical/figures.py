@@ -43,7 +43,7 @@ from femgear.system.lumped import CENTRAL
 from femgear.system.mode_kinds import phasing
 from femgear.trains.helical.model import helical_motions
 from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.figures import STATIC
+from femgear.trains.static.figures import FIGURES as STATIC
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -500,9 +500,10 @@ def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
 
 
 FIGURES = {
+    "": STATIC[""],
     # static.nc holds the spur gears of the transverse section: nobody makes them, their set is not drawn
     "static": Figures(
-        STATIC.captions
+        STATIC["static"].captions
         | {
             "helical_mesh_stiffness": (
                 "Stiffness and static transmission error of the meshes of planet 1 along the transverse "
@@ -510,7 +511,7 @@ FIGURES = {
                 "transverse section (dotted) that the slices come from."
             ),
         },
-        draw=STATIC.draw,
+        draw=STATIC["static"].draw,
     ),
     "modes": Figures(
         {

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -216,15 +216,10 @@ def _remarks(results: Results, stem: str) -> Iterator[str]:
         yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
 
 
-def _figures(name: str) -> Callable[[], Figures]:
-    """Figures of a stage, loaded when they are drawn."""
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.helical.figures import FIGURES
 
-    def load() -> Figures:
-        from femgear.trains.helical.figures import FIGURES
-
-        return FIGURES[name]
-
-    return load
+    return FIGURES
 
 
 def _given(case: HelicalCase) -> bool:
@@ -247,7 +242,6 @@ HELICAL = Train(
             describe=lambda results: describe_helical_static(
                 results.static, results.modes if "modes" in results.stages else None
             ),
-            figures=_figures("static"),
             unavailable=lambda case: (
                 "a given helical.mesh_stiffness takes the place of the static solution"
                 if _given(case)
@@ -265,7 +259,6 @@ HELICAL = Train(
                 "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
             },
             describe=lambda results: describe_modes(results.modes),
-            figures=_figures("modes"),
             needs=lambda case: () if _given(case) else ("static",),
             check=lambda case: check_helical_case(case, planetary_set(case)),
         ),
@@ -277,7 +270,6 @@ HELICAL = Train(
             ),
             verdict=static_stages.response_verdict,
             describe=lambda results: describe_response(results.dynamics),
-            figures=_figures("dynamics"),
             unavailable=lambda case: (
                 "a given helical.mesh_stiffness does not vary: nothing excites the set"
                 if _given(case)
@@ -293,7 +285,7 @@ HELICAL = Train(
     result_warnings=lambda results: (
         response_warnings(results.dynamics) if "dynamics" in results.stages else ()
     ),
-    figures=static_stages.case_figures,
+    figures=_figures,
     remarks=_remarks,
     cross_check=check_helical,
     notices=helical_notices,

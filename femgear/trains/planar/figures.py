@@ -18,6 +18,7 @@ from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below
 from femgear.trains.planar.model import TAIL_LIMIT, merged_folds
 from femgear.trains.planar.results import PHASES
 from femgear.trains.protocol import Drawn, Figures
+from femgear.trains.static.figures import FIGURES as STATIC
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -493,7 +494,7 @@ def _response_figures(drawn: Drawn) -> dict[str, Figure]:
     return figures
 
 
-FIGURES = {
+FIGURES = STATIC | {
     "modes": Figures(
         {
             "mode_shapes": (

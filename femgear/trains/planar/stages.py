@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -40,7 +40,7 @@ from femgear.trains.planar.section import PlanarCase, check_planar, planar_notic
 from femgear.trains.protocol import Figures, Progress, Stage, Train
 from femgear.trains.static.description import describe_case, set_warnings
 from femgear.trains.static.results import StaticResult
-from femgear.trains.static.stages import STATIC, STRESS, case_figures
+from femgear.trains.static.stages import STATIC, STRESS
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -382,15 +382,10 @@ def _lacks(section: str) -> Callable[[PlanarCase], str]:
     return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
 
 
-def _figures(name: str) -> Callable[[], Figures]:
-    """Figures of a stage, loaded when they are drawn."""
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.planar.figures import FIGURES
 
-    def load() -> Figures:
-        from femgear.trains.planar.figures import FIGURES
-
-        return FIGURES[name]
-
-    return load
+    return FIGURES
 
 
 def _result_warnings(results: Results) -> Iterator[str]:
@@ -421,7 +416,6 @@ PLANAR = Train(
                 "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
             },
             describe=lambda results: describe_modes(results.modes),
-            figures=_figures("modes"),
             needs=_needs_static,
             check=lambda case: check_planar_case(case, planetary_set(case)),
             tables=_published,
@@ -434,7 +428,6 @@ PLANAR = Train(
             ),
             verdict=_branch_verdict,
             describe=lambda results: describe_branch(results.branch),
-            figures=_figures("branch"),
             unavailable=_lacks("branch"),
             needs=lambda case: ("modes",),
         ),
@@ -446,7 +439,6 @@ PLANAR = Train(
             ),
             verdict=_response_verdict,
             describe=lambda results: describe_response(results.response),
-            figures=_figures("response"),
             unavailable=_lacks("response"),
             needs=lambda case: ("modes",),
         ),
@@ -456,7 +448,7 @@ PLANAR = Train(
     ),
     warnings=set_warnings,
     result_warnings=_result_warnings,
-    figures=case_figures,
+    figures=_figures,
     remarks=remarks,
     cross_check=check_planar,
     notices=planar_notices,

@@ -8,7 +8,7 @@ By what they show:
 - deviations as measuring machines draw them: profiles over the roll angle, pitches over the teeth;
 - mesh phasing: phases round the carrier, what they cancel and excite, spectra of the mesh forces.
 
-`STATIC`, `STRESSES` and `DEVIATIONS` at the end tie the pictures of the report to their captions.
+`FIGURES` at the end ties the pictures of the report to their captions.
 """
 
 from __future__ import annotations
@@ -823,7 +823,7 @@ def _reflected(body):
     )
 
 
-STATIC = Figures(
+_STATIC = Figures(
     {
         "static_transmission_error": (
             "Static transmission error over one mesh period: every mesh along its line of action, and from "
@@ -847,7 +847,7 @@ STATIC = Figures(
 )
 
 
-STRESSES = Figures(
+_STRESSES = Figures(
     {
         "contact_pressure": (
             "Contact pressure of one tooth pair on its way through the mesh: largest value beside the "
@@ -875,4 +875,4 @@ STRESSES = Figures(
 )
 
 
-DEVIATIONS = Figures({}, draw=_deviation_figures)
+FIGURES = {"static": _STATIC, "stress": _STRESSES, "": Figures({}, draw=_deviation_figures)}

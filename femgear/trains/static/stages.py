@@ -20,7 +20,7 @@ from femgear.case.sections import Case
 from femgear.contact.load_spectrum import load_spectrum, loaded_teeth, root_ranges
 from femgear.errors import GeometryError
 from femgear.threads import one_blas_thread
-from femgear.trains.protocol import Figures, Progress, Stage
+from femgear.trains.protocol import Progress, Stage
 from femgear.trains.static.checks import check_motions
 from femgear.trains.static.results import (
     NominalStresses,
@@ -282,32 +282,12 @@ def response_verdict(result) -> dict:
     }
 
 
-def _static_figures() -> Figures:
-    from femgear.trains.static.figures import STATIC
-
-    return STATIC
-
-
-def _stress_figures() -> Figures:
-    from femgear.trains.static.figures import STRESSES
-
-    return STRESSES
-
-
-def case_figures() -> Figures:
-    """Charts of the deviations of a case."""
-    from femgear.trains.static.figures import DEVIATIONS
-
-    return DEVIATIONS
-
-
 STATIC = Stage(
     name="static",
     title="Static",
     solve=lambda case, _, context: solve_static(case, cache=context.cache, progress=context.progress),
     verdict=static_verdict,
     describe=lambda results: describe_static(results.static),
-    figures=_static_figures,
     check=planetary_set,
 )
 
@@ -320,7 +300,6 @@ STRESS = Stage(
         "root_points": sum(len(root.arc) for root in result.roots), "iso": result.nominal.message,
     },
     describe=lambda results: describe_stress(results.stress),
-    figures=_stress_figures,
     wanted=lambda case: case.static.stresses,
     needs=lambda case: ("static",),
 )  # fmt: skip
