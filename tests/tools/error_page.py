@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""Write docs/errors.md: every error code, what it means, and the refusals of the package that carry it.
+
+Meanings are those of `femgear.errors.CODES`; messages, limits and remedies are read from the source::
+
+    python tests/tools/error_page.py -o docs/errors.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+CODE = re.compile(r"E-[A-Z0-9]+(?:-[A-Z0-9]+)*")
+HEAD = """# Errors
+
+Every refusal names the file and the key where there are any, the value found, what is allowed and what to do. Its code is
+stable: scripts may test `error.code` of a `femgear.errors.FemgearError`. Exit codes of the command line are 2 for input that
+cannot be used, 3 for computations that have no trustworthy result, 4 for results that cannot be written or read.
+
+Below are all codes with the messages that carry them; `…` stands for numbers and names. This page is written by
+`python tests/tools/error_page.py -o docs/errors.md`.
+"""
+
+
+def refusals(folder: Path = ROOT / "femgear") -> dict[str, list[tuple[str, str, str]]]:
+    """Messages, limits and remedies of all refusals by their code, in the order of the source."""
+    found = defaultdict(list)
+    for path in sorted(folder.rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call):
+                words = {word.arg: word.value for word in node.keywords if word.arg}
+                for code in _codes(words.get("code")):
+                    message = _text(node.args[0]) if node.args else ""
+                    entry = (message, _text(words.get("limit")), _text(words.get("remedy")))
+                    if entry not in found[code]:
+                        found[code].append(entry)
+    return dict(found)
+
+
+def named_codes(folder: Path = ROOT / "femgear") -> set[str]:
+    """Codes that stand in the source as texts, docstrings left out."""
+    found = set()
+    for path in folder.rglob("*.py"):
+        if path.name != "errors.py":
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Constant) and CODE.fullmatch(str(node.value)):
+                    found.add(node.value)
+    return found
+
+
+def _codes(node: ast.expr | None) -> set[str]:
+    """Codes in an expression: of a condition both."""
+    texts = {n.value for n in ast.walk(node) if isinstance(n, ast.Constant)} if node else set()
+    return {text for text in texts if isinstance(text, str) and CODE.fullmatch(text)}
+
+
+def _text(node: ast.expr | None) -> str:
+    """Text of an expression, with an ellipsis for what is only known when it runs."""
+    if node is None:
+        return ""
+    if isinstance(node, ast.Constant):
+        return str(node.value) if isinstance(node.value, str) else ""
+    if isinstance(node, ast.JoinedStr):
+        return "".join("…" if isinstance(part, ast.FormattedValue) else part.value for part in node.values)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        return _text(node.left) + _text(node.right)
+    if isinstance(node, ast.IfExp):
+        return " / ".join(text for text in (_text(node.body), _text(node.orelse)) if text)
+    return "…"
+
+
+def page(meanings: dict[str, str]) -> str:
+    """Text of docs/errors.md."""
+    found, parts = refusals(), [HEAD]
+    for code in sorted(meanings):
+        parts.append(f"## {code}\n\n{meanings[code]}\n")
+        rows = [row for row in found.get(code, []) if row[0].strip("… :")]
+        if rows:
+            cells = (" | ".join(_cell(text) for text in row) for row in rows)
+            table = "\n".join(f"| {row} |" for row in cells)
+            parts.append(f"| message | allowed | remedy |\n|---|---|---|\n{table}\n")
+    return "\n".join(parts)
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.replace("|", "\\|").split()).replace("<", "&lt;")
+
+
+def main() -> int:
+    """Write the page, or print it."""
+    from femgear.errors import CODES
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--output", type=Path)
+    output = parser.parse_args().output
+    text = page(CODES)
+    if output is None:
+        print(text)
+    else:
+        output.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
