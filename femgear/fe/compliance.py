@@ -1,4 +1,4 @@
-"""Body compliance at flank points of a cyclic body: one tooth sector, one factorisation.
+"""Compliance and static displacement of a cyclic body from one tooth sector, factored once.
 
 The body is ``count`` copies of one mirror-symmetric sector. In the frame of each sector the cut
 displacements are tied by ``u_L(k) = Q u_R(k + 1)``, ``Q`` being the rotation by the sector angle
@@ -15,11 +15,17 @@ with ``S`` the Schur complement of the sector on its two cuts.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import GridError
-from femgear.fe.elasticity import symmetric_lu
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import SuperLU
+
+    from femgear.fe.grid import Grid
 
 
 @dataclass(frozen=True)
@@ -48,16 +54,19 @@ class SectorSchur:
     rotation: np.ndarray
 
 
-def symmetric_factor(matrix):
-    """Sparse LU of the stiffness of a sector, see `elasticity.symmetric_lu`.
+def symmetric_factor(matrix) -> SuperLU:
+    """Factor a sparse symmetric stiffness matrix (SuperLU in symmetric mode).
 
     Raises
     ------
     GridError
         When the matrix is singular: the body can move without straining.
     """
+    from scipy.sparse.linalg import splu
+
+    options = {"SymmetricMode": True}
     try:
-        return symmetric_lu(matrix)
+        return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise GridError(
             f"the stiffness matrix of a sector is singular ({error})",
@@ -66,18 +75,18 @@ def symmetric_factor(matrix):
         ) from error
 
 
-def dof_pairs(nodes):
+def dof_pairs(nodes) -> np.ndarray:
     """Degrees of freedom (x then y, node by node) of an array of nodes."""
     nodes = np.asarray(nodes)
     return (2 * nodes[:, None] + np.array([0, 1])).ravel()
 
 
-def boundary_nodes(grid, name):
+def boundary_nodes(grid: Grid, name: str) -> np.ndarray:
     """Sorted unique node numbers of a named boundary."""
     return np.unique(grid.boundaries[name])
 
 
-def mirror_nodes(grid):
+def mirror_nodes(grid: Grid) -> np.ndarray:
     """Permutation that maps every node to its mirror image in the x axis, shape (n,).
 
     Raises
@@ -85,11 +94,10 @@ def mirror_nodes(grid):
     GridError
         When the grid is not mirror-symmetric.
     """
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    points = np.asarray(grid.points)
-    distance, image = cKDTree(points).query(points * np.array([1.0, -1.0]))
-    if distance.max() > 1e-9 * np.abs(points).max():
+    distance, image = KDTree(grid.points).query(grid.points * np.array([1.0, -1.0]))
+    if distance.max() > 1e-9 * np.abs(grid.points).max():
         raise GridError(
             f"the sector grid is not mirror-symmetric (largest offset {distance.max():.2e} m)",
             code="E-GRID-MIRROR",
@@ -98,7 +106,7 @@ def mirror_nodes(grid):
     return image
 
 
-def mirrored_columns(columns, image):
+def mirrored_columns(columns: np.ndarray, image: np.ndarray) -> np.ndarray:
     """Reflect displacement or load columns (2n, m) in the x axis."""
     result = np.empty_like(columns)
     result[2 * image] = columns[0::2]
@@ -106,7 +114,7 @@ def mirrored_columns(columns, image):
     return result
 
 
-def interpolation(grid, points):
+def interpolation(grid: Grid, points: np.ndarray):
     """Quadratic interpolation from the grid nodes to interior points.
 
     Parameters
@@ -126,7 +134,7 @@ def interpolation(grid, points):
     """
     from scipy.sparse import csr_array
 
-    nodes, triangles = np.asarray(grid.points), np.asarray(grid.triangles)
+    nodes, triangles = grid.points, grid.triangles
     corner = nodes[triangles[:, :3]]
     d1, d2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     area = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
@@ -179,16 +187,16 @@ def _curved_coordinates(element_nodes, points, b1, b2):
     return b1, b2
 
 
-def directional(weights, directions):
-    """Displacement columns (2n, m) from interpolation rows (m, n) and unit directions (m, 2)."""
-    dense = weights.toarray() if hasattr(weights, "toarray") else np.asarray(weights)
+def directional(weights, directions: np.ndarray) -> np.ndarray:
+    """Displacement columns (2n, m) from sparse interpolation rows (m, n) and unit directions (m, 2)."""
+    dense = weights.toarray()
     columns = np.empty((2 * dense.shape[1], dense.shape[0]))
     columns[0::2] = dense.T * directions[:, 0]
     columns[1::2] = dense.T * directions[:, 1]
     return columns
 
 
-def split_sector(grid, held):
+def split_sector(grid: Grid, held: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Free interior, right-cut and left-cut degrees of freedom of a sector, cuts ordered by radius."""
     fixed = boundary_nodes(grid, held) if held else np.zeros(0, int)
     cuts = []
@@ -201,14 +209,16 @@ def split_sector(grid, held):
     return dof_pairs(interior), dof_pairs(cuts[0]), dof_pairs(cuts[1])
 
 
-def cut_rotation(count, size):
+def cut_rotation(count: int, size: int) -> np.ndarray:
     """Block rotation (size, size) by the sector angle 2 pi / count."""
     angle = 2 * np.pi / count
     c, s = np.cos(angle), np.sin(angle)
     return np.kron(np.eye(size // 2), np.array([[c, -s], [s, c]]))
 
 
-def condense_sector(grid, stiffness, *, count, held, loads, observations):
+def condense_sector(
+    grid: Grid, stiffness, *, count: int, held: str | None, loads: np.ndarray, observations: np.ndarray
+) -> SectorSchur:
     """Condense a mirror-symmetric sector on its cuts.
 
     Loads and observations are given for the left half (y > 0) only; their mirror images are appended, so
@@ -261,20 +271,20 @@ class InteriorSolution:
 
     Parameters
     ----------
-    factor : object
-        Sparse factor of ``K_ii`` with a method ``solve``.
+    factor : SuperLU
+        Of ``K_ii``.
     coupling : sparse matrix (ni, 2 nb)
         ``K_ib``, right cut first.
     cut, loads : (ni, 2 nb), (ni, m) arrays
     """
 
-    factor: object
-    coupling: object
+    factor: SuperLU
+    coupling: csc_array
     cut: np.ndarray
     loads: np.ndarray
 
 
-def solve_interior(grid, stiffness, parts, loads) -> InteriorSolution:
+def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> InteriorSolution:
     """Factor the interior of a mirror-symmetric sector; the right cut is the mirror image of the left.
 
     Parameters
@@ -288,7 +298,8 @@ def solve_interior(grid, stiffness, parts, loads) -> InteriorSolution:
     """
     interior, right, left = parts
     cut = np.concatenate([right, left])
-    _check_interior(loads, cut)
+    if np.any(loads[cut]):
+        raise GridError("a load acts on a cut of the sector", code="E-GRID-LOAD")
     rows = stiffness.tocsc()[interior]
     K_ii, K_ib = rows[:, interior], rows[:, cut]
     nl = len(left)
@@ -301,11 +312,6 @@ def solve_interior(grid, stiffness, parts, loads) -> InteriorSolution:
     # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
     reflected = mirrored_columns(full, mirror_nodes(grid))[interior] * np.tile([1.0, -1.0], nl // 2)
     return InteriorSolution(factor, K_ib, np.hstack([reflected, solution[:, :nl]]), solution[:, nl:])
-
-
-def _check_interior(loads, cut):
-    if np.abs(loads[cut]).max(initial=0.0) > 0.0:
-        raise GridError("a load acts on a cut of the sector", code="E-GRID-LOAD")
 
 
 def _check_residual(matrix, solution, rhs):
@@ -321,7 +327,7 @@ def _check_residual(matrix, solution, rhs):
         )
 
 
-def cyclic_harmonics(schur, harmonics):
+def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     """Compliance ``H_n`` of each cyclic harmonic, shape (len(harmonics), n_observations, n_loads)."""
     Q, S = schur.rotation, schur.S
     RL, own = S[0, 1] @ Q, S[0, 0] + Q.T @ S[1, 1] @ Q
@@ -349,10 +355,57 @@ def _check_held(tied):
         )
 
 
-def tooth_compliance(schur):
+def tooth_compliance(schur: SectorSchur) -> np.ndarray:
     """Compliance between any two teeth, shape (count, n_observations, n_loads) [m/N].
 
     Entry ``[k]`` is the displacement on tooth ``i`` per unit load on tooth ``i - k``.
     """
     harmonics = cyclic_harmonics(schur, np.arange(schur.count // 2 + 1))
     return np.fft.irfft(harmonics, n=schur.count, axis=0)
+
+
+def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str | None) -> np.ndarray:
+    """Static displacement of every sector in its own frame.
+
+    The loads are transformed over the sectors, each harmonic is solved on the sector with its cuts tied, and
+    the solutions are transformed back.
+
+    Parameters
+    ----------
+    grid : Grid
+        Sector with boundaries ``cut_left``, ``cut_right`` and `held`.
+    stiffness : (2n, 2n) sparse matrix
+        [N/m].
+    loads : (count, 2n) array
+        Nodal forces of each sector in its own frame [N].
+    held : str or None
+        Boundary that cannot move.
+
+    Returns
+    -------
+    (count, n, 2) array
+        [m].
+    """
+    count, size = loads.shape
+    inner, right, left = split_sector(grid, held)
+    cut = np.concatenate([right, left])
+    stiffness = stiffness.tocsc()
+    K_ib = stiffness[inner][:, cut].toarray()
+    harmonics = np.fft.rfft(loads, axis=0)
+    n_h, nb = len(harmonics), len(right)
+    forces = harmonics[:, inner].T
+    solved = symmetric_factor(stiffness[inner][:, inner]).solve(np.hstack([K_ib, forces.real, forces.imag]))
+    X_b, X_f = solved[:, : 2 * nb], solved[:, 2 * nb : 2 * nb + n_h] + 1j * solved[:, 2 * nb + n_h :]
+    S = stiffness[cut][:, cut].toarray() - K_ib.T @ X_b
+    on_cut = harmonics[:, cut] - (K_ib.T @ X_f).T
+    tie = np.empty((n_h, 2 * nb, nb), complex)
+    tie[:, :nb] = np.eye(nb)
+    phase = np.exp(2j * np.pi * np.arange(n_h) / count)
+    tie[:, nb:] = phase[:, None, None] * cut_rotation(count, nb)
+    adjoint = tie.conj().transpose(0, 2, 1)
+    u_right = np.linalg.solve(adjoint @ S @ tie, (adjoint @ on_cut[:, :, None]))
+    u_cut = (tie @ u_right)[:, :, 0]
+    field = np.zeros((n_h, size), complex)
+    field[:, inner] = (X_f - X_b @ u_cut.T).T
+    field[:, cut] = u_cut
+    return np.fft.irfft(field, n=count, axis=0).reshape(count, -1, 2)

@@ -157,9 +157,9 @@ def _join(curves, inner, size):
 
 
 def _check_distinct(points, size):
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    pairs = cKDTree(points).query_pairs(CLOSE * size, output_type="ndarray")
+    pairs = KDTree(points).query_pairs(CLOSE * size, output_type="ndarray")
     if len(pairs):
         a, b = points[pairs[0]]
         raise GridError(

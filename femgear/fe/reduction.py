@@ -8,10 +8,14 @@ for each number ``n`` of nodal diameters (Thomas 1979), whose nodal diameter is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.fe.compliance import cut_rotation, solve_interior, split_sector
+
+if TYPE_CHECKING:
+    from femgear.fe.grid import Grid
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,9 @@ class SectorBasis:
     rotation: np.ndarray
 
 
-def sector_basis(grid, stiffness, mass, *, count, loads, interior_modes=16) -> SectorBasis:
+def sector_basis(
+    grid: Grid, stiffness, mass, *, count: int, loads: np.ndarray, interior_modes: int = 16
+) -> SectorBasis:
     """Reduce one sector to its cuts, `interior_modes` fixed-interface modes and the static load shapes.
 
     Parameters
@@ -96,7 +102,8 @@ def sector_basis(grid, stiffness, mass, *, count, loads, interior_modes=16) -> S
     K_ii, M_ii = stiffness[inner][:, inner], mass[inner][:, inner]
     solution = solve_interior(grid, stiffness, (inner, right, left), loads)
     constraint, static = -solution.cut, solution.loads
-    inverse = LinearOperator(K_ii.shape, matvec=solution.factor.solve, dtype=float)
+    # the types that scipy's constructor shows are those of a subclass
+    inverse = LinearOperator(K_ii.shape, matvec=solution.factor.solve, dtype=float)  # type: ignore[call-arg]
     start = np.cos(np.arange(len(inner)) + 1.0)
     _, modes = eigsh(K_ii, k=interior_modes, M=M_ii, sigma=0.0, OPinv=inverse, v0=start)
     static = static - modes @ (modes.T @ (M_ii @ static))
@@ -171,7 +178,7 @@ def _one_diameter(basis: SectorBasis, count, n, loads, max_frequency, static_cor
     T[: 2 * nb, :nb], T[2 * nb :, nb:] = tie, np.eye(nv)
     M = T.conj().T @ basis.mass @ T
     if n == 0 or 2 * n == count:
-        K, M, T = K.real, M.real, T.real
+        K, M, T = np.real(K), np.real(M), np.real(T)
     values, vectors = eigh(K, M)
     kept = max(int(np.searchsorted(values, (2 * np.pi * max_frequency) ** 2)), 1)
     chosen = vectors[:, :kept]
