@@ -103,7 +103,7 @@ def mirror_nodes(grid: Grid) -> np.ndarray:
             code="E-GRID-MIRROR",
             remedy="make the sector by mirroring the grid of half a sector",
         )
-    return image
+    return np.asarray(image)
 
 
 def mirrored_columns(columns: np.ndarray, image: np.ndarray) -> np.ndarray:
@@ -243,24 +243,20 @@ def condense_sector(
     -------
     SectorSchur
     """
-    interior, right, left = split_sector(grid, held)
+    interior, _, left = parts = split_sector(grid, held)
     image = mirror_nodes(grid)
     adjoint = np.hstack([observations, mirrored_columns(observations, image)])[interior]
-    cut = np.concatenate([right, left])
-    solution = solve_interior(grid, stiffness, (interior, right, left), loads)
-    K_ib, X_b = solution.coupling, solution.cut
+    solution = solve_interior(grid, stiffness, parts, loads)
     full = np.zeros((stiffness.shape[0], loads.shape[1]))
     full[interior] = solution.loads
     X_f = np.hstack([solution.loads, mirrored_columns(full, image)[interior]])
-    S = stiffness.tocsc()[cut][:, cut].toarray() - K_ib.T @ X_b
-    S = 0.5 * (S + S.T)
     nl = len(left)
     return SectorSchur(
         count=count,
-        S=S.reshape(2, nl, 2, nl).transpose(0, 2, 1, 3),
+        S=solution.schur.reshape(2, nl, 2, nl).transpose(0, 2, 1, 3),
         C=adjoint.T @ X_f,
-        load_cut=-(K_ib.T @ X_f).reshape(2, nl, -1),
-        observation_cut=-(X_b.T @ adjoint).reshape(2, nl, -1),
+        load_cut=-(solution.coupling.T @ X_f).reshape(2, nl, -1),
+        observation_cut=-(solution.cut.T @ adjoint).reshape(2, nl, -1),
         rotation=cut_rotation(count, nl),
     )
 
@@ -276,12 +272,15 @@ class InteriorSolution:
     coupling : sparse matrix (ni, 2 nb)
         ``K_ib``, right cut first.
     cut, loads : (ni, 2 nb), (ni, m) arrays
+    schur : (2 nb, 2 nb) array
+        Stiffness of the sector on its cuts, ``K_bb - K_ib^T K_ii^-1 K_ib`` [N/m].
     """
 
     factor: SuperLU
     coupling: csc_array
     cut: np.ndarray
     loads: np.ndarray
+    schur: np.ndarray
 
 
 def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> InteriorSolution:
@@ -295,29 +294,24 @@ def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> InteriorS
         Interior, right and left degrees of freedom, see `split_sector`.
     loads : (2n, m) array
         They must not act on the cuts.
+
+    Raises
+    ------
+    GridError
+        A load on a cut (E-GRID-LOAD), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
     interior, right, left = parts
     cut = np.concatenate([right, left])
     if np.any(loads[cut]):
         raise GridError("a load acts on a cut of the sector", code="E-GRID-LOAD")
-    rows = stiffness.tocsc()[interior]
+    stiffness = stiffness.tocsc()
+    rows = stiffness[interior]
     K_ii, K_ib = rows[:, interior], rows[:, cut]
     nl = len(left)
     rhs = np.hstack([K_ib[:, nl:].toarray(), loads[interior]])
     factor = symmetric_factor(K_ii)
     solution = factor.solve(rhs)
-    _check_residual(K_ii, solution, rhs)
-    full = np.zeros((stiffness.shape[0], nl))
-    full[interior] = solution[:, :nl]
-    # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
-    reflected = mirrored_columns(full, mirror_nodes(grid))[interior] * np.tile([1.0, -1.0], nl // 2)
-    return InteriorSolution(factor, K_ib, np.hstack([reflected, solution[:, :nl]]), solution[:, nl:])
-
-
-def _check_residual(matrix, solution, rhs):
-    """Refuse a solution that is not finite or does not satisfy the equations."""
-    scale = np.abs(rhs).max()
-    residual = np.abs(matrix @ solution - rhs).max() / scale if scale else 0.0
+    residual = np.abs(K_ii @ solution - rhs).max() / np.abs(rhs).max()
     if not np.isfinite(residual) or residual > 1e-8:
         raise GridError(
             f"the sector solution has a relative residual of {residual:.1e}",
@@ -325,6 +319,13 @@ def _check_residual(matrix, solution, rhs):
             limit="1e-8",
             remedy="the body is not held, or its grid is distorted",
         )
+    full = np.zeros((stiffness.shape[0], nl))
+    full[interior] = solution[:, :nl]
+    # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
+    reflected = mirrored_columns(full, mirror_nodes(grid))[interior] * np.tile([1.0, -1.0], nl // 2)
+    X_b = np.hstack([reflected, solution[:, :nl]])
+    S = stiffness[cut][:, cut].toarray() - K_ib.T @ X_b
+    return InteriorSolution(factor, K_ib, X_b, solution[:, nl:], 0.5 * (S + S.T))
 
 
 def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
@@ -337,22 +338,17 @@ def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
         phase = np.exp(2j * np.pi * n / schur.count)
         A = own + phase * RL + np.conj(phase) * RL.T
         if n % schur.count in (0, 1, schur.count - 1):  # rotation is the harmonic 0, translation the first
-            _check_held(A)
+            values = np.linalg.eigvalsh(A)
+            if values[0] < 1e-13 * values[-1]:
+                raise GridError(
+                    "the body can move without straining: nothing holds it",
+                    code="E-GRID-FREE",
+                    remedy="hold its bore or its rim, or put it on a foundation",
+                )
         P_f = schur.load_cut[0] + np.conj(phase) * tied_load
         P_d = schur.observation_cut[0] + np.conj(phase) * tied_observation
         result[row] = schur.C + P_d.conj().T @ np.linalg.solve(A, P_f)
     return result
-
-
-def _check_held(tied):
-    """Refuse a body that can move as a whole: a tied sector without stiffness in some direction."""
-    values = np.linalg.eigvalsh(tied)
-    if values[0] < 1e-13 * values[-1]:
-        raise GridError(
-            "the body can move without straining: nothing holds it",
-            code="E-GRID-FREE",
-            remedy="hold its bore or its rim, or put it on a foundation",
-        )
 
 
 def tooth_compliance(schur: SectorSchur) -> np.ndarray:
@@ -377,7 +373,7 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
     stiffness : (2n, 2n) sparse matrix
         [N/m].
     loads : (count, 2n) array
-        Nodal forces of each sector in its own frame [N].
+        Nodal forces of each sector in its own frame [N], none on the cuts.
     held : str or None
         Boundary that cannot move.
 
@@ -387,25 +383,20 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
         [m].
     """
     count, size = loads.shape
-    inner, right, left = split_sector(grid, held)
-    cut = np.concatenate([right, left])
-    stiffness = stiffness.tocsc()
-    K_ib = stiffness[inner][:, cut].toarray()
-    harmonics = np.fft.rfft(loads, axis=0)
-    n_h, nb = len(harmonics), len(right)
-    forces = harmonics[:, inner].T
-    solved = symmetric_factor(stiffness[inner][:, inner]).solve(np.hstack([K_ib, forces.real, forces.imag]))
-    X_b, X_f = solved[:, : 2 * nb], solved[:, 2 * nb : 2 * nb + n_h] + 1j * solved[:, 2 * nb + n_h :]
-    S = stiffness[cut][:, cut].toarray() - K_ib.T @ X_b
-    on_cut = harmonics[:, cut] - (K_ib.T @ X_f).T
+    inner, right, left = parts = split_sector(grid, held)
+    forces = np.fft.rfft(loads, axis=0).T
+    n_h, nb = forces.shape[1], len(right)
+    solution = solve_interior(grid, stiffness, parts, np.hstack([forces.real, forces.imag]))
+    X_f = solution.loads[:, :n_h] + 1j * solution.loads[:, n_h:]
+    on_cut = -(solution.coupling.T @ X_f).T
     tie = np.empty((n_h, 2 * nb, nb), complex)
     tie[:, :nb] = np.eye(nb)
     phase = np.exp(2j * np.pi * np.arange(n_h) / count)
     tie[:, nb:] = phase[:, None, None] * cut_rotation(count, nb)
     adjoint = tie.conj().transpose(0, 2, 1)
-    u_right = np.linalg.solve(adjoint @ S @ tie, (adjoint @ on_cut[:, :, None]))
+    u_right = np.linalg.solve(adjoint @ solution.schur @ tie, adjoint @ on_cut[:, :, None])
     u_cut = (tie @ u_right)[:, :, 0]
     field = np.zeros((n_h, size), complex)
-    field[:, inner] = (X_f - X_b @ u_cut.T).T
-    field[:, cut] = u_cut
+    field[:, inner] = (X_f - solution.cut @ u_cut.T).T
+    field[:, np.concatenate([right, left])] = u_cut
     return np.fft.irfft(field, n=count, axis=0).reshape(count, -1, 2)

@@ -154,7 +154,7 @@ def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness
 
 def mass(grid: Grid, material: Material, thickness=1.0):
     """Consistent mass matrix, shape (2n, 2n) [kg]; arguments as in `stiffness`."""
-    from scipy.sparse import csc_array
+    from scipy.sparse import csc_array, kron
     from skfem import BilinearForm
 
     scalar = basis(grid)
@@ -162,25 +162,12 @@ def mass(grid: Grid, material: Material, thickness=1.0):
     weight = (material.density * _per_element(grid, thickness))[:, None]
     form = BilinearForm(lambda u, v, w: w.weight * u * v)
     one = form.assemble(scalar, weight=np.broadcast_to(weight, scalar.dx.shape)).tocoo()
-    rows, columns = 2 * nodes[one.row], 2 * nodes[one.col]
-    size = 2 * grid.n_nodes
-    return csc_array(
-        (
-            np.concatenate([one.data, one.data]),
-            (np.concatenate([rows, rows + 1]), np.concatenate([columns, columns + 1])),
-        ),
-        shape=(size, size),
-    )
+    shape = (grid.n_nodes, grid.n_nodes)
+    return kron(csc_array((one.data, (nodes[one.row], nodes[one.col])), shape=shape), np.eye(2), format="csc")
 
 
 def _per_element(grid: Grid, value) -> np.ndarray:
-    """One number for each element, from a number or a mapping of region to number, shape (m,).
-
-    Raises
-    ------
-    GridError
-        When the mapping names a region that is not there or leaves elements out.
-    """
+    """One number for each element, from a number or a mapping of all regions to numbers, shape (m,)."""
     result = np.full(len(grid.triangles), np.nan)
     for name, number in _by_region(value).items():
         if name is None:
@@ -320,7 +307,15 @@ def tangential_stress(grid: Grid, material: Material, boundary, *, state: str) -
         When there is no such boundary, the boundaries are not one open chain, or they have less than two
         edges; when the state is unknown.
     """
-    edges = _chain(grid, (boundary,) if isinstance(boundary, str) else tuple(boundary))
+    names = (boundary,) if isinstance(boundary, str) else tuple(boundary)
+    edges = np.vstack([boundary_edges(grid, name) for name in names])
+    if len(edges) < 2 or np.any(edges[1:, 0] != edges[:-1, 1]):
+        raise GridError(
+            f"the boundaries {', '.join(names)} are not one chain of at least two edges",
+            code="E-GRID-BOUNDARY",
+            key=names[0],
+            remedy="name them in the order in which the body lies to their left",
+        )
     weights, gauss, arc = _edge_strain(grid, edges)
     nodes = np.append(edges[:, 0], edges[-1, 1])
     columns = plane_modulus(material, state) * (weights @ _cubic(gauss, arc).T)
@@ -336,19 +331,6 @@ def plane_modulus(material: Material, state: str) -> float:
     """Stress over strain along a free edge [Pa]: ``E`` in plane stress, ``E/(1 - nu^2)`` in plane strain."""
     lam, mu = material.lame(state)
     return 4.0 * mu * (lam + mu) / (lam + 2.0 * mu)
-
-
-def _chain(grid: Grid, names) -> np.ndarray:
-    """Edges of consecutive boundaries (k, 3): start, end, mid."""
-    edges = np.vstack([boundary_edges(grid, name) for name in names])
-    if len(edges) < 2 or np.any(edges[1:, 0] != edges[:-1, 1]):
-        raise GridError(
-            f"the boundaries {', '.join(names)} are not one chain of at least two edges",
-            code="E-GRID-BOUNDARY",
-            key=names[0],
-            remedy="name them in the order in which the body lies to their left",
-        )
-    return edges
 
 
 def _edge_strain(grid: Grid, edges):

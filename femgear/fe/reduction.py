@@ -96,11 +96,11 @@ def sector_basis(
     """
     from scipy.sparse.linalg import LinearOperator, eigsh
 
-    inner, right, left = split_sector(grid, None)
+    inner, right, left = parts = split_sector(grid, None)
     cut = np.concatenate([right, left])
     stiffness, mass = stiffness.tocsc(), mass.tocsc()
     K_ii, M_ii = stiffness[inner][:, inner], mass[inner][:, inner]
-    solution = solve_interior(grid, stiffness, (inner, right, left), loads)
+    solution = solve_interior(grid, stiffness, parts, loads)
     constraint, static = -solution.cut, solution.loads
     # the types that scipy's constructor shows are those of a subclass
     inverse = LinearOperator(K_ii.shape, matvec=solution.factor.solve, dtype=float)  # type: ignore[call-arg]
@@ -113,11 +113,10 @@ def sector_basis(
     full_c[inner], full_c[cut] = constraint, np.eye(len(cut))
     full_i = np.zeros((stiffness.shape[0], interior.shape[1]))
     full_i[inner] = interior
-    S = stiffness[cut][:, cut].toarray() + solution.coupling.T @ constraint
     basis = np.hstack([full_c, full_i])
     reduced_mass = basis.T @ (mass @ basis)
     return SectorBasis(
-        stiffness_cut=0.5 * (S + S.T),
+        stiffness_cut=solution.schur,
         stiffness_interior=interior.T @ (K_ii @ interior),
         mass=0.5 * (reduced_mass + reduced_mass.T),
         constraint=full_c,
