@@ -18,7 +18,7 @@ from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import mirror
 from femgear.fe.meshing import mesh_outline
 from femgear.gears.checks import check_set
-from femgear.gears.deviation_checks import check_deviations
+from femgear.gears.deviations import check_deviations
 from femgear.gears.tooth import half_sector
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.stages import solve_static

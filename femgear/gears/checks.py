@@ -2,11 +2,6 @@
 
 `check_set` looks at assembly, neighbours, play, contact ratios and clearances, and at contact that a mesh
 must not have (`check_interference`): below the involute, on root fillets, between passing tips.
-
-`unheld_members` tells whether the flanks of the planets alone keep members without a support in place.
-Contacts only push: forces of the loaded flanks, none below zero, must balance the torque and leave no force
-on a member that floats. By Farkas' lemma (1902) there are such forces, or there is a motion that the load
-drives and no flank stops. A member that floats alone must not slide past all flanks either.
 """
 
 from __future__ import annotations
@@ -18,15 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears import involute
-from femgear.gears.deviations import mesh_normals
-from femgear.gears.fillet import fillet_point
+from femgear.gears import profile
 from femgear.gears.gear import GeometryWarning, half_thickness_angle, tooth_thickness, working_half_angles
-from femgear.gears.planetary import BACKLASH_TOLERANCE
+from femgear.gears.planetary import BACKLASH_TOLERANCE, assembly_positions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
 
@@ -34,10 +25,6 @@ FILLET_TOLERANCE = 1e-4
 """Overlap of a tip corner with a root fillet, in modules, that is warned about instead of refused."""
 # overlap [m] below which there is nothing to warn of
 _SEEN = 1e-9
-ASSEMBLY_TOLERANCE = 1e-6
-"""Part of a tooth pitch by which planet angles may miss an assembly position."""
-TOLERANCE = 1e-9
-"""Of the forces of flanks for a unit load, and of singular values of matrices whose columns are near one."""
 
 
 def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
@@ -59,35 +46,16 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
         E-ASSEMBLY, E-NEIGHBOURS, E-BACKLASH, E-INTERFERENCE, E-FILLET, E-TROCHOID, E-CLEARANCE,
         E-CONTACT-RATIO.
     """
+    found = [*_planets(planetary), *_neighbours(planetary)]
+    assembly_positions(planetary.sun.teeth, planetary.ring.teeth, planetary.planet_angles)
     return (
-        *_planets(planetary),
-        *_neighbours(planetary),
-        *_assembly(planetary),
+        *found,
         *_backlash(planetary),
         *check_interference(planetary),
         *_clearances(planetary),
         *_contact_ratios(planetary),
         *_single_gears(planetary),
     )
-
-
-def feasible_angles(teeth_sum: int, angles: tuple[float, ...]) -> tuple[float, ...]:
-    """Assembly positions [rad] nearest to wanted planet angles, counted from the first planet.
-
-    Planets fit at multiples of ``2 pi / (z_s + z_r)`` from each other (Mueller, Epicyclic Drive Trains);
-    ``teeth_sum`` is z_s + z_r.
-    """
-    step = 2.0 * math.pi / teeth_sum
-    return tuple(angles[0] + math.floor((a - angles[0]) / step + 0.5 + 1e-9) * step for a in angles)
-
-
-def neighbour_limit(sun_teeth: int, planet_teeth: int) -> float:
-    """Number of equal planets, unshifted, whose tip circles would just touch.
-
-    ``pi / asin((z_p + 2)/(z_s + z_p))``; infinite where the ratio exceeds one it is 1: not even two fit.
-    """
-    ratio = (planet_teeth + 2) / (sun_teeth + planet_teeth)
-    return math.pi / math.asin(ratio) if ratio < 1.0 else 1.0
 
 
 def tip_clearances(planetary: PlanetarySet) -> dict[str, float]:
@@ -140,26 +108,6 @@ def _neighbours(s: PlanetarySet):
             room,
             ">= one module",
         )
-
-
-def _assembly(s: PlanetarySet):
-    total = s.sun.teeth + s.ring.teeth
-    turns = [(a - s.planet_angles[0]) * total / (2.0 * math.pi) for a in s.planet_angles]
-    worst = max(abs(t - round(t)) for t in turns)
-    if worst > ASSEMBLY_TOLERANCE:
-        wanted = feasible_angles(total, s.planet_angles)
-        listing = ", ".join(f"{math.degrees(a):.6f}" for a in wanted[:24])
-        raise GeometryError(
-            f"{s.n_planets} planets do not assemble at these angles: {s.sun.teeth} + {s.ring.teeth} teeth "
-            f"times the angle over one turn must be whole, one planet misses by {worst:.4f} teeth "
-            f"((z_s + z_r)/N = {total / s.n_planets:.6g})",
-            code="E-ASSEMBLY",
-            key="set.planet_angles",
-            value=f"{total / s.n_planets:.6g} teeth a planet",
-            limit=f"multiples of {360.0 / total:.6f} deg from the first planet",
-            remedy=f"nearest planet_angles that assemble: {listing} deg",
-        )
-    return ()
 
 
 def _backlash(s: PlanetarySet):
@@ -242,7 +190,7 @@ def _single_gears(s: PlanetarySet):
                 f"{gear.name}.profile_shift",
                 f"{gear.teeth} teeth are undercut: the involute ends at {gear.form_radius * 1e3:.4f} mm; "
                 f"this tool needs x >= {gear.undercut_shift:.4f} (a tool flank one module deep: "
-                f"{involute.undercut_shift(gear.teeth, gear.pressure_angle):.4f})",
+                f"{profile.undercut_shift(gear.teeth, gear.pressure_angle):.4f})",
                 gear.profile_shift,
                 f">= {gear.undercut_shift:.4f}",
             )
@@ -327,7 +275,7 @@ def fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
     centre = -centre_distance if partner.internal else centre_distance
     corner = eta_partner - tip if internal else math.pi - eta_partner + tip
     ratio = (1.0 if internal else -1.0) * gear.teeth / partner.teeth
-    radius, angle = fillet_point(gear.tool, np.linspace(0.0, gear.fillet_end, 4001))
+    radius, angle = gear.tool.fillet_point(np.linspace(0.0, gear.fillet_end, 4001))
     order = np.argsort(radius)
 
     def depth(turn):
@@ -356,7 +304,7 @@ def allowed_tip_radius(gear: Gear, partner: Gear, reach: float) -> float:
 
 def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None:
     """Refuse an internal pair whose tips strike each other outside the path of contact (E-TROCHOID)."""
-    margin = involute.trochoid_interference(
+    margin = profile.trochoid_interference(
         planet.teeth,
         ring.teeth,
         planet.tip_radius,
@@ -437,60 +385,3 @@ def _rounded_up(radius: float) -> str:
 def _rounded_down(radius: float) -> str:
     """The same of the largest one."""
     return f"{math.floor(2e7 * radius) / 1e4:.4f}"
-
-
-def unheld_members(
-    planetary_set: PlanetarySet, floating: Sequence[str], *, both_flanks: bool = False
-) -> tuple[str, ...]:
-    """Members that float without being held by the planets.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    floating : sequence of str
-        Members without a radial support: any of "sun", "carrier" and "ring".
-    both_flanks : bool
-        The back flanks carry too.
-
-    Returns
-    -------
-    tuple of str
-        The first member that the planets cannot hold though the others stand still; all of `floating` when
-        they can hold each but not all at once; empty when everything is held.
-    """
-    if not floating:
-        return ()
-    for name in floating:
-        if not _held(planetary_set, (name,), both_flanks):
-            return (name,)
-    # sun and carrier may slide together at constant loads: these are known, their common place is free
-    if len(floating) < 2 or _held(planetary_set, tuple(floating), both_flanks):
-        return ()
-    return tuple(floating)
-
-
-def _held(s: PlanetarySet, floating: tuple[str, ...], both_flanks: bool) -> bool:
-    """Whether forces of the flanks keep the members in equilibrium, and a single one from sliding."""
-    from scipy.optimize import nnls
-
-    approach = np.vstack([_approach(s, floating, back) for back in (False, True)[: 1 + both_flanks]])
-    slides = np.linalg.matrix_rank(approach, tol=TOLERANCE) < approach.shape[1]
-    if len(floating) == 1 and slides:
-        return False
-    load = np.zeros(approach.shape[1])
-    load[s.n_planets] = 1.0  # the torque of the sun, which everything else must pass on
-    return bool(nnls(approach.T, load)[1] < TOLERANCE)
-
-
-def _approach(s: PlanetarySet, floating: tuple[str, ...], back: bool) -> np.ndarray:
-    """Approach (2N, N + 1 + 2m) of the flanks per rotation of planets and sun and motion of the members."""
-    N, side = s.n_planets, -1.0 if back else 1.0
-    normals, zero = mesh_normals(s, back=back), np.zeros((N, 2))
-    on_planet, on_ring = normals[:N], normals[N:]
-    turns = np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
-    motions = {
-        "sun": np.vstack([on_planet, zero]),
-        "carrier": np.vstack([-on_planet, on_ring]),
-        "ring": np.vstack([zero, -on_ring]),
-    }
-    return np.hstack([side * turns, *(motions[name] for name in floating)])

@@ -14,18 +14,17 @@ from functools import cached_property
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.fillet import (
+from femgear.gears.profile import (
     ISO_53_C,
     BasicRack,
     CutterTip,
     PinionCutter,
     RackTip,
-    default_cutter,
-    fillet_point,
-    junction_roll,
-    undercut_end,
+    arcinv,
+    inv,
+    pressure_angle_at,
+    roll,
 )
-from femgear.gears.involute import arcinv, inv, pressure_angle_at, roll
 
 TEETH_RANGE = (5, 5000)
 MODULE_RANGE = (0.05e-3, 0.1)
@@ -76,7 +75,7 @@ class Gear:
     internal : bool
     rack : BasicRack
     cutter : PinionCutter, optional
-        For internal gears; None takes the cutter of `fillet.default_cutter`.
+        For internal gears; None takes the cutter of `cutter_of`.
     tip_diameter, root_diameter : float, optional
         [m]; None takes ``m (z +- 2 (h + x))`` of the basic rack.
     thickness_allowance : float
@@ -159,18 +158,17 @@ class Gear:
 
     @cached_property
     def fillet_end(self) -> float:
-        """Parameter ``theta`` [rad] of `fillet.fillet_point` where fillet and involute meet."""
-        if self.undercut:
-            return undercut_end(self.tool, self.base_radius, self.base_half_angle)
+        """Parameter ``theta`` [rad] of the tool's `fillet_point` where fillet and involute meet."""
+        if self.undercut and isinstance(self.tool, RackTip):
+            return self.tool.undercut_end(self.base_radius, self.base_half_angle)
         return self.tool.end_angle
 
     @cached_property
     def form_roll(self) -> float:
         """Roll length [m] of the flank's end at the fillet."""
         if self.undercut:
-            radius, _ = fillet_point(self.tool, self.fillet_end)
-            return roll(radius, self.base_radius)
-        return junction_roll(self.tool, self.base_radius)
+            return roll(self.tool.fillet_point(self.fillet_end)[0], self.base_radius)
+        return self.tool.junction_roll
 
     @property
     def form_radius(self) -> float:
@@ -185,7 +183,7 @@ class Gear:
     @property
     def undercut(self) -> bool:
         """Whether the rack cuts away part of the involute (external gears only)."""
-        return not self.internal and junction_roll(self.tool, self.base_radius) < 0.0
+        return not self.internal and self.tool.junction_roll < 0.0
 
     @property
     def undercut_shift(self) -> float:
@@ -235,8 +233,8 @@ def flank_points(gear: Gear, roll_lengths) -> np.ndarray:
 
 
 def cutter_of(gear: Gear) -> PinionCutter:
-    """Pinion cutter of an internal gear, its own or the default one."""
-    return gear.cutter if gear.cutter is not None else default_cutter(gear.teeth)
+    """Pinion cutter of an internal gear, by default of 30 unshifted teeth, or 12 fewer than the gear's."""
+    return gear.cutter or PinionCutter(teeth=max(5, min(30, gear.teeth - 12)))
 
 
 def generating_tool(gear: Gear, *, rounding: float | None = None) -> RackTip | CutterTip:
@@ -253,17 +251,12 @@ def generating_tool(gear: Gear, *, rounding: float | None = None) -> RackTip | C
     GeometryError
         No working pressure angle exists between the gear and its cutter (E-INVOLUTE).
     """
-    if rounding is None:
-        rounding = gear.rack.root_radius
-        if gear.internal and cutter_of(gear).tip_radius is not None:
-            rounding = cutter_of(gear).tip_radius
-    if gear.internal:
-        return _cutter_tip(gear, cutter_of(gear), rounding * gear.module)
-    return _rack_tip(gear, rounding * gear.module)
+    return _cutter_tip(gear, rounding) if gear.internal else _rack_tip(gear, rounding)
 
 
-def _rack_tip(gear: Gear, rounding: float) -> RackTip:
+def _rack_tip(gear: Gear, rounding: float | None) -> RackTip:
     """Rack of ISO 53, thickened by the allowance and as deep as the root circle asks; lengths in m."""
+    rounding = gear.module * (gear.rack.root_radius if rounding is None else rounding)
     reference = gear.reference_radius
     # depth of the rounding's centre under the tool's datum line
     depth = reference + gear.profile_shift * gear.module - gear.root_radius - rounding
@@ -279,12 +272,15 @@ def _rack_tip(gear: Gear, rounding: float) -> RackTip:
     )
 
 
-def _cutter_tip(gear: Gear, cutter: PinionCutter, rounding: float) -> CutterTip:
+def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
     """Cutter at the centre distance that leaves it no play in the finished gap; lengths in m.
 
     Its shift and that distance give the flank its thickness; its tip radius follows from the root circle.
     """
-    alpha, module = gear.pressure_angle, gear.module
+    alpha, module, cutter = gear.pressure_angle, gear.module, cutter_of(gear)
+    if rounding is None:
+        rounding = gear.rack.root_radius if cutter.tip_radius is None else cutter.tip_radius
+    rounding *= module
     tangent = math.tan(alpha)
     # a thinner tooth is a wider gap: the cutter is fed in as if the flank were shifted further out
     flank_shift = gear.profile_shift + 0.5 * gear.thickness_allowance / (module * tangent)
@@ -437,8 +433,8 @@ def _check_tool(gear: Gear) -> None:
     """Room for the tool's rounding."""
     if gear.internal:
         _check_cutter(gear)
-    room = _room(gear, None)
-    if room < -1e-12:
+    # a length of the rack is taken in modules; an angle of the cutter is one already
+    if gear.tool.room / (1.0 if gear.internal else gear.module) < -1e-12:
         largest, rounding = _largest_rounding(gear), round(gear.tool.rounding / gear.module, 9)
         _refuse(
             gear,
@@ -465,7 +461,7 @@ def _check_cutter(gear: Gear) -> None:
             remedy="choose a smaller cutter; 30 teeth, or 12 fewer than the gear, is the default",
         )
     try:
-        tool = gear.tool
+        tool = _cutter_tip(gear)
     except GeometryError:
         _refuse(
             gear,
@@ -503,20 +499,13 @@ def _check_cutter(gear: Gear) -> None:
         )
 
 
-def _room(gear: Gear, rounding: float | None) -> float:
-    """Space left between the two rounded corners of the tool's tip, relative (negative: none)."""
-    tool = generating_tool(gear, rounding=rounding)
-    if not gear.internal:
-        return tool.centre_offset / gear.module
-    return tool.centre_angle if tool.centre_radius > tool.cutter_base_radius else -1.0
-
-
 def _largest_rounding(gear: Gear) -> float:
     """Largest tool tip rounding [modules] that fits with the same root circle, rounded down to 1e-4."""
     low, high = 0.0, 3.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _room(gear, middle) >= 0.0 else (low, middle)
+        fits = generating_tool(gear, rounding=middle).room >= 0.0
+        low, high = (middle, high) if fits else (low, middle)
     return math.floor(1e4 * low) / 1e4
 
 

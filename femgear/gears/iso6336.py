@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import cutter_of
-from femgear.gears.involute import inv
+from femgear.gears.profile import inv
 
 if TYPE_CHECKING:
     from femgear.gears.gear import Gear

@@ -24,9 +24,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.checks import ASSEMBLY_TOLERANCE, feasible_angles
 from femgear.gears.gear import TEETH_RANGE, is_whole
-from femgear.gears.planetary import check_angles
+from femgear.gears.planetary import assembly_positions, check_angles
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -150,21 +149,7 @@ def mesh_phasing(
     """
     angles = _angles(planet_angles)
     MeshPhasing(sun_teeth, ring_teeth, (0,), rotation, flank, convention, lag)
-    total = sun_teeth + ring_teeth
-    places = (np.array(angles) - angles[0]) * total / (2.0 * math.pi)
-    missed = float(np.abs(places - np.round(places)).max())
-    if missed > ASSEMBLY_TOLERANCE:
-        listing = ", ".join(f"{math.degrees(a):.6f}" for a in feasible_angles(total, angles)[:24])
-        raise GeometryError(
-            f"{len(angles)} planets between {sun_teeth} and {ring_teeth} teeth miss an assembly position by "
-            f"{missed:.3g} teeth; their phases do not belong to teeth that mesh",
-            code="E-ASSEMBLY",
-            key="set.planet_angles",
-            value=f"{total / len(angles):.6g} teeth a planet",
-            limit=f"multiples of {360.0 / total:.6f} deg from the first planet",
-            remedy=f"nearest planet_angles that assemble: {listing} deg",
-        )
-    positions = tuple(int(p) for p in np.round(places))
+    positions = assembly_positions(sun_teeth, ring_teeth, angles)
     return MeshPhasing(sun_teeth, ring_teeth, positions, rotation, flank, convention, lag)
 
 

@@ -16,11 +16,14 @@ from itertools import pairwise
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears import involute
+from femgear.gears import profile
 from femgear.gears.gear import Gear, is_whole, working_half_angles
+from femgear.gears.profile import BasicRack
 
 BACKLASH_TOLERANCE = 1e-4
 """Normal backlash, in modules, that counts as none: what four decimals of profile shifts leave open."""
+ASSEMBLY_TOLERANCE = 1e-6
+"""Part of a tooth pitch by which planet angles may miss an assembly position."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,7 @@ class PlanetarySet:
     def path_sun_planet(self) -> tuple[float, float]:
         """Path coordinates [m] of first (planet tip) and last (sun tip) contact, 0 at the pitch point.
 
-        Undercut shortens the path to what is left of the involute.
+        Undercut shortens the path to what is left of the profile.
         """
         tangent = math.tan(self.working_pressure_angle_sun_planet)
         sun, planet = self.sun.base_radius * tangent, self.planet.base_radius * tangent
@@ -111,7 +114,7 @@ class PlanetarySet:
     def path_planet_ring(self) -> tuple[float, float]:
         """Path coordinates [m] of first (ring tip) and last (planet tip) contact, 0 at the pitch point.
 
-        Undercut shortens the path to what is left of the involute.
+        Undercut shortens the path to what is left of the profile.
         """
         tangent = math.tan(self.working_pressure_angle_planet_ring)
         planet, ring = self.planet.base_radius * tangent, self.ring.base_radius * tangent
@@ -226,6 +229,72 @@ def close_set(
     return PlanetarySet(*(_shifted(g, x) for g, x in shifts), centre_distance, planet_angles)
 
 
+def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, int]:
+    """Whole tooth numbers next to ``z / cos^3(beta)`` of sun, planet and ring."""
+    cube = math.cos(helix_angle) ** 3
+    return tuple(round(gear.teeth / cube) for gear in (gears.sun, gears.planet, gears.ring))
+
+
+def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
+    """Spur gears of the normal section: one planet, whole tooth numbers next to ``z / cos^3(beta)``.
+
+    The normal section cuts the reference cylinder in an ellipse with the radius of curvature
+    ``r / cos^2(beta)`` at the tooth (G. Niemann and H. Winter, Maschinenelemente, vol. 2, section 21.3).
+    Rims keep their thickness beside the roots. The ring's profile shift is found, which takes up that the
+    tooth numbers were rounded.
+
+    Parameters
+    ----------
+    gears : PlanetarySet
+        Of the transverse section.
+    helix_angle : float
+        [rad]
+
+    Returns
+    -------
+    PlanetarySet
+
+    Raises
+    ------
+    GeometryError
+        Where virtual gears cannot be made.
+    """
+    teeth = virtual_teeth(gears, helix_angle)
+    made = (_virtual(gear, z, helix_angle) for gear, z in zip((gears.sun, gears.planet, gears.ring), teeth))
+    return close_set(*made, planet_angles=(0.0,), find=("ring",))
+
+
+def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
+    factor = math.cos(helix_angle)
+    rack, module = gear.rack, gear.module * factor
+    radius = 0.5 * module * teeth
+    made = Gear(
+        teeth=teeth,
+        module=module,
+        pressure_angle=math.atan(math.tan(gear.pressure_angle) * factor),
+        profile_shift=gear.profile_shift / factor,
+        face_width=gear.face_width,
+        # replaced below, once the root circle is known
+        rim_radius=2.0 * radius if gear.internal else 0.2 * radius,
+        internal=gear.internal,
+        rack=BasicRack(
+            addendum=rack.addendum / factor,
+            dedendum=rack.dedendum / factor,
+            root_radius=rack.root_radius / factor,
+        ),
+        tip_diameter=_moved(gear.tip_diameter, gear, radius),
+        root_diameter=_moved(gear.root_diameter, gear, radius),
+        thickness_allowance=gear.thickness_allowance * factor,
+        name=gear.name,
+    )
+    return replace(made, rim_radius=made.root_radius + gear.rim_radius - gear.root_radius)
+
+
+def _moved(diameter: float | None, gear: Gear, radius: float) -> float | None:
+    """A given diameter as far from the virtual reference circle as it was from the true one."""
+    return None if diameter is None else diameter + 2.0 * (radius - gear.reference_radius)
+
+
 def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, float]:
     """Centre distances [m] without play of sun-planet and planet-ring, allowances left aside."""
     alpha = sun.pressure_angle
@@ -233,7 +302,7 @@ def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, f
     for one, two in ((sun, planet), (planet, ring)):
         shifts = one.profile_shift, two.profile_shift
         try:
-            angle = involute.working_pressure_angle(
+            angle = profile.working_pressure_angle(
                 one.teeth, two.teeth, *shifts, alpha, internal=two.internal
             )
         except GeometryError as error:
@@ -246,9 +315,7 @@ def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, f
                 limit=error.limit,
                 remedy=error.remedy,
             ) from None
-        reference = involute.reference_centre_distance(
-            one.teeth, two.teeth, one.module, internal=two.internal
-        )
+        reference = profile.reference_centre_distance(one.teeth, two.teeth, one.module, internal=two.internal)
         out.append(reference * math.cos(alpha) / math.cos(angle))
     return out[0], out[1]
 
@@ -296,6 +363,43 @@ def check_angles(angles: tuple[float, ...]) -> None:
         )
 
 
+def feasible_angles(teeth_sum: int, angles: tuple[float, ...]) -> tuple[float, ...]:
+    """Assembly positions [rad] nearest to wanted planet angles, counted from the first planet.
+
+    Planets fit at multiples of ``2 pi / (z_s + z_r)`` from each other (Mueller, Epicyclic Drive Trains);
+    ``teeth_sum`` is z_s + z_r.
+    """
+    step = 2.0 * math.pi / teeth_sum
+    return tuple(angles[0] + math.floor((a - angles[0]) / step + 0.5 + 1e-9) * step for a in angles)
+
+
+def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...]) -> tuple[int, ...]:
+    """Assembly positions of planets at given angles [rad], whole multiples of ``2 pi / (z_s + z_r)``.
+
+    Raises
+    ------
+    GeometryError
+        A planet that misses its position by more than `ASSEMBLY_TOLERANCE` (E-ASSEMBLY).
+    """
+    total = sun_teeth + ring_teeth
+    turns = [(a - angles[0]) * total / (2.0 * math.pi) for a in angles]
+    worst = max(abs(t - round(t)) for t in turns)
+    if worst > ASSEMBLY_TOLERANCE:
+        listing = ", ".join(f"{math.degrees(a):.6f}" for a in feasible_angles(total, angles)[:24])
+        each = f"{total / len(angles):.6g}"
+        raise GeometryError(
+            f"{len(angles)} planets do not assemble at these angles: {sun_teeth} + {ring_teeth} teeth times "
+            f"the angle over one turn must be whole, one planet misses by {worst:.3g} teeth "
+            f"((z_s + z_r)/N = {each})",
+            code="E-ASSEMBLY",
+            key="set.planet_angles",
+            value=f"{each} teeth a planet",
+            limit=f"multiples of {360.0 / total:.6f} deg from the first planet",
+            remedy=f"nearest planet_angles that assemble: {listing} deg",
+        )
+    return tuple(round(t) for t in turns)
+
+
 def check_roles(planetary: PlanetarySet) -> None:
     """Refuse gears that cannot be sun, planet and ring of one set (E-ROLE, E-MODULE)."""
     sun, planet, ring = planetary.sun, planetary.planet, planetary.ring
@@ -322,7 +426,7 @@ def check_roles(planetary: PlanetarySet) -> None:
 
 
 def _working_angle(one: Gear, two: Gear, distance: float) -> float:
-    return involute.angle_at_centre_distance(
+    return profile.angle_at_centre_distance(
         one.teeth, two.teeth, one.module, one.pressure_angle, distance, internal=two.internal
     )
 
@@ -360,7 +464,7 @@ def _planet_lag(planetary: PlanetarySet) -> float:
 
 
 def _required_shift(one: Gear, two: Gear, distance: float) -> float:
-    return involute.shift_for_angle(
+    return profile.shift_for_angle(
         one.teeth, two.teeth, one.pressure_angle, _working_angle(one, two, distance), internal=two.internal
     )
 

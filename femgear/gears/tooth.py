@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.fillet import fillet_point
 from femgear.gears.gear import Gear, flank_points, half_thickness_angle
 
 # point spacing in modules, before `refine`: about 1200 triangles in the half sector of the reference sun
@@ -164,12 +163,12 @@ def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tu
 
     Bits of involute or root arc that are too short for an edge of their own belong to it.
     """
-    corner = float(fillet_point(gear.tool, 0.0)[1])
+    corner = float(gear.tool.fillet_point(0.0)[1])
     land = math.pi / gear.teeth - corner
 
     def point(p):
         # p in -1 .. 0: rest of the involute, 0 .. 1: generated fillet, 1 .. 2: short root arc
-        radius, angle = fillet_point(gear.tool, gear.fillet_end * (1.0 - np.clip(p, 0.0, 1.0)))
+        radius, angle = gear.tool.fillet_point(gear.fillet_end * (1.0 - np.clip(p, 0.0, 1.0)))
         angle = np.where(p > 1.0, corner + land * (p - 1.0), angle)
         generated = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
         involute = flank_points(gear, gear.form_roll + (end_roll - gear.form_roll) * np.maximum(-p, 0.0))

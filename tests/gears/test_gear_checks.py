@@ -5,19 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.reference.gear_limits import neighbour_limit
 
 from femgear.errors import GeometryError
-from femgear.gears.checks import (
-    check_passing_tips,
-    check_set,
-    feasible_angles,
-    neighbour_limit,
-    tip_clearances,
-)
-from femgear.gears.fillet import BasicRack
+from femgear.gears.checks import check_passing_tips, check_set, tip_clearances
 from femgear.gears.gear import Gear
-from femgear.gears.involute import trochoid_interference
-from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles, feasible_angles
+from femgear.gears.profile import BasicRack, trochoid_interference
 
 ALPHA = math.radians(20.0)
 

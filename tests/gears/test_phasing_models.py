@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from femgear.gears.checks import feasible_angles
 from femgear.gears.phasing import (
     MEMBERS,
     cyclic_shares,
@@ -12,7 +11,7 @@ from femgear.gears.phasing import (
     phase_factors,
     phasing_table,
 )
-from femgear.gears.planetary import equal_planet_angles
+from femgear.gears.planetary import equal_planet_angles, feasible_angles
 from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.system.assembler import mesh_directions, pin_directions, planar_system
 from femgear.system.lumped import PlanarBody, PlanarSet

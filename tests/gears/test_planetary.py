@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears.fillet import BasicRack
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles, free_centre_distances
+from femgear.gears.profile import BasicRack
 
 ALPHA = math.radians(20.0)
 RACK = BasicRack(root_radius=0.15)  # with 0.25 the ring's tips touch some of these planets' fillets

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from validation.reference.gear_limits import neighbour_limit
 
 from femgear.errors import GeometryError
-from femgear.gears.checks import feasible_angles, neighbour_limit
 from femgear.gears.phasing import KINDS, MeshPhasing, mesh_phasing, phasing_table
-from femgear.gears.planetary import equal_planet_angles
+from femgear.gears.planetary import equal_planet_angles, feasible_angles
 from femgear.gears.teeth_numbers import check_teeth, neighbouring_teeth
 
 

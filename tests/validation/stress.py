@@ -12,10 +12,10 @@ from femgear.fe.compliance import dof_pairs, symmetric_factor
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
 from femgear.fe.meshing import mesh_outline
-from femgear.gears.fillet import BasicRack
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import nominal_contact_stress, nominal_root_stress
 from femgear.gears.planetary import PlanetarySet
+from femgear.gears.profile import BasicRack
 from femgear.gears.tooth import half_sector
 from validation.contact import HERTZ
 from validation.planetary import ALPHA, KISSSOFT, nrel_set
