@@ -238,10 +238,6 @@ def condense_sector(
         Nodal forces of the left loads.
     observations : (2n, mo) array
         Displacement functionals of the left observations.
-
-    Returns
-    -------
-    SectorSchur
     """
     interior, _, left = parts = split_sector(grid, held)
     image = mirror_nodes(grid)

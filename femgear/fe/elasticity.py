@@ -297,10 +297,6 @@ def tangential_stress(grid: Grid, material: Material, boundary, *, state: str) -
     state : str
         ``"plane strain"`` or ``"plane stress"``.
 
-    Returns
-    -------
-    BoundaryStress
-
     Raises
     ------
     GridError

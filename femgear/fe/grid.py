@@ -58,11 +58,6 @@ class Grid:
 def ordered_nodes(grid: Grid, name: str) -> np.ndarray:
     """Nodes along a connected boundary: start, mid, end, mid, ... in the order of its edges.
 
-    Parameters
-    ----------
-    grid : Grid
-    name : str
-
     Returns
     -------
     (2 k + 1,) int array

@@ -65,10 +65,6 @@ def check_outline(outline) -> Plan:
     outline : Outline
         Or any object with the same fields; ``regions`` may be absent.
 
-    Returns
-    -------
-    Plan
-
     Raises
     ------
     GridError

@@ -141,10 +141,6 @@ def cyclic_modes(
         [Hz]; at least one mode is kept for each nodal diameter.
     static_correction : bool
         Append the part of the static response to the loads that the kept modes miss.
-
-    Returns
-    -------
-    CyclicModes
     """
     recovery = np.hstack([basis.constraint, basis.interior])
     on_basis = recovery.T @ loads

@@ -1,7 +1,7 @@
 """Can the set be assembled, and does it run: refusals with numbers, and warnings.
 
 `check_set` looks at assembly, neighbours, play, contact ratios and clearances, and at contact that a mesh
-must not have (`check_interference`): below the involute, on root fillets, between passing tips.
+must not have: below the involute, on root fillets, between passing tips.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears import profile
 from femgear.gears.gear import GeometryWarning, half_thickness_angle, tooth_thickness, working_half_angles
 from femgear.gears.planetary import BACKLASH_TOLERANCE, assembly_positions
+from femgear.gears.profile import inv, pressure_angle_at, undercut_shift
 
 if TYPE_CHECKING:
     from femgear.gears.gear import Gear
@@ -29,10 +29,6 @@ _SEEN = 1e-9
 
 def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
     """Refuse a set that cannot be assembled or run, and list what deserves a warning.
-
-    Parameters
-    ----------
-    planetary : PlanetarySet
 
     Returns
     -------
@@ -51,7 +47,7 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
     return (
         *found,
         *_backlash(planetary),
-        *check_interference(planetary),
+        *_interference(planetary),
         *_clearances(planetary),
         *_contact_ratios(planetary),
         *_single_gears(planetary),
@@ -190,7 +186,7 @@ def _single_gears(s: PlanetarySet):
                 f"{gear.name}.profile_shift",
                 f"{gear.teeth} teeth are undercut: the involute ends at {gear.form_radius * 1e3:.4f} mm; "
                 f"this tool needs x >= {gear.undercut_shift:.4f} (a tool flank one module deep: "
-                f"{profile.undercut_shift(gear.teeth, gear.pressure_angle):.4f})",
+                f"{undercut_shift(gear.teeth, gear.pressure_angle):.4f})",
                 gear.profile_shift,
                 f">= {gear.undercut_shift:.4f}",
             )
@@ -229,27 +225,30 @@ def _rim_held(gear: Gear) -> str:
     )
 
 
-def check_interference(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
-    """Refuse involute, fillet and trochoid interference of a set; see `check_set`."""
-    warnings = []
-    for gear, partner, reach in active_limits(planetary):
+def _interference(s: PlanetarySet):
+    """Involute and fillet interference of both meshes, and passing tips of planet and ring."""
+    for gear, partner, reach in _active_limits(s):
         if reach < 0.0 and partner.internal:
-            _involute_interference(gear, partner, reach)
+            allowed = math.hypot(partner.base_radius, partner.tip_roll - reach)
+            raise GeometryError(
+                f"involute interference: the {partner.name}'s tip meets the {gear.name} "
+                f"{-reach * 1e3:.4f} mm beyond the end of the line of action, inside the {gear.name}'s base "
+                "circle",
+                code="E-INTERFERENCE",
+                key=f"{partner.name}.tip_diameter",
+                value=2.0 * partner.tip_radius,
+                limit=f"tip diameter {_tip_limit(partner, allowed)} mm",
+                remedy=f"give that tip_diameter, more teeth to the {gear.name}, or profile shifts",
+            )
         excess = reach - gear.form_roll if gear.internal else gear.form_roll - reach
         # undercut has removed the flank that a partner's tip would reach: the path of contact is shorter
         if excess > 0.0 and not gear.undercut:
-            overlap = fillet_overlap(gear, partner, planetary.centre_distance)
-            if overlap > FILLET_TOLERANCE * gear.module:
-                _fillet_interference(gear, partner, reach, overlap)
-            if overlap > _SEEN:
-                warnings.append(_fillet_warning(gear, partner, reach, overlap))
-    check_passing_tips(planetary.planet, planetary.ring, planetary.centre_distance)
-    return tuple(warnings)
+            yield from _fillet_contact(gear, partner, reach, s.centre_distance)
+    check_passing_tips(s.planet, s.ring, s.centre_distance)
 
 
-def active_limits(planetary: PlanetarySet):
+def _active_limits(s: PlanetarySet):
     """Gear, partner and roll length [m] on the gear's flank that the partner's tip reaches, four times."""
-    s = planetary
     sun_planet = s.centre_distance * math.sin(s.working_pressure_angle_sun_planet)
     planet_ring = s.centre_distance * math.sin(s.working_pressure_angle_planet_ring)
     return (
@@ -260,7 +259,43 @@ def active_limits(planetary: PlanetarySet):
     )
 
 
-def fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
+def _fillet_contact(gear: Gear, partner: Gear, reach: float, centre_distance: float):
+    """Contact of the partner's tip with the gear's root fillet."""
+    overlap = _fillet_overlap(gear, partner, centre_distance)
+    if overlap <= _SEEN:
+        return
+    where = math.hypot(gear.base_radius, max(reach, 0.0))
+    below = "" if reach >= 0.0 else f" and {-reach * 1e3:.4f} mm beyond the end of the line of action"
+    message = (
+        f"the {partner.name}'s tip runs into the {gear.name}'s root fillet: it reaches radius "
+        f"{where * 1e3:.4f} mm{below}; the involute {'ends' if gear.internal else 'begins'} at "
+        f"{gear.form_radius * 1e3:.4f} mm (overlap {overlap * 1e6:.3f} um)"
+    )
+    # the partner's tip then reaches just the end of the gear's involute
+    missing = (reach - gear.form_roll) * (-1.0 if gear.internal or partner.internal else 1.0)
+    limit = _tip_limit(partner, math.hypot(partner.base_radius, partner.tip_roll + missing))
+    if overlap > FILLET_TOLERANCE * gear.module:
+        raise GeometryError(
+            message,
+            code="E-FILLET",
+            key="rack.root_radius",
+            value=round(gear.tool.rounding / gear.module, 9),
+            limit=f"active profile {'up' if gear.internal else 'down'} to {gear.form_radius * 1e3:.4f} mm",
+            remedy=f"reduce root_radius, or give the {partner.name} a tip_diameter {limit} mm",
+        )
+    yield GeometryWarning(
+        "W-FILLET", f"{partner.name}.tip_diameter", message, 2.0 * partner.tip_radius, f"{limit} mm"
+    )
+
+
+def _tip_limit(partner: Gear, radius: float) -> str:
+    """Allowed tip diameters in mm, to be typed as they stand: above that of a ring, below that of others."""
+    if partner.internal:
+        return f">= {math.ceil(2e7 * radius) / 1e4:.4f}"
+    return f"<= {math.floor(2e7 * radius) / 1e4:.4f}"
+
+
+def _fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
     """Depth [m] to which the partner's tip corner enters the gear's fillet, as an arc.
 
     The corner is followed through the mesh from pitch-point contact of the loaded flanks, seen from the gear,
@@ -293,26 +328,28 @@ def fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
     return float(np.max(arc))
 
 
-def allowed_tip_radius(gear: Gear, partner: Gear, reach: float) -> float:
-    """Tip radius [m] of the partner that reaches just the end of the gear's involute."""
-    missing = reach - gear.form_roll
-    roll = (
-        partner.tip_roll + missing if not (gear.internal or partner.internal) else partner.tip_roll - missing
-    )
-    return math.hypot(partner.base_radius, roll)
+def tip_margin(planet: Gear, ring: Gear, centre_distance: float) -> float:
+    """Angle [rad] at the ring by which the tip corners of a planet in a ring miss each other.
+
+    ``z1/z2 (phi1 + inv(aa1) - inv(aw)) + inv(aw) - inv(aa2) - phi2`` with the angles phi1, phi2 of the
+    crossing of both tip circles at the two centres (Colbourne, The Geometry of Involute Gears, ch. 8):
+    negative means that the teeth strike each other outside the path of contact. ``inf`` when the tip
+    circles do not cross.
+    """
+    a, tip_1, tip_2 = centre_distance, planet.tip_radius, ring.tip_radius
+    cos_1 = (tip_2**2 - tip_1**2 - a**2) / (2.0 * a * tip_1)
+    cos_2 = (tip_2**2 - tip_1**2 + a**2) / (2.0 * a * tip_2)
+    if abs(cos_1) >= 1.0 or abs(cos_2) >= 1.0:
+        return math.inf
+    working = inv(pressure_angle_at(a, ring.base_radius - planet.base_radius))
+    angle_1 = math.acos(cos_1) + inv(pressure_angle_at(tip_1, planet.base_radius)) - working
+    angle_2 = math.acos(cos_2) + inv(pressure_angle_at(tip_2, ring.base_radius)) - working
+    return angle_1 * planet.teeth / ring.teeth - angle_2
 
 
 def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None:
     """Refuse an internal pair whose tips strike each other outside the path of contact (E-TROCHOID)."""
-    margin = profile.trochoid_interference(
-        planet.teeth,
-        ring.teeth,
-        planet.tip_radius,
-        ring.tip_radius,
-        planet.base_radius,
-        ring.base_radius,
-        centre_distance,
-    )
+    margin = tip_margin(planet, ring, centre_distance)
     if margin < 0.0:
         raise GeometryError(
             f"the tips of planet ({planet.teeth} teeth) and ring ({ring.teeth}) strike each other outside "
@@ -323,65 +360,3 @@ def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None
             limit="corners of the tips pass each other",
             remedy="increase the difference of the tooth numbers, or shorten the tips (tip_diameter)",
         )
-
-
-def _involute_interference(gear: Gear, partner: Gear, reach: float):
-    allowed = math.hypot(partner.base_radius, partner.tip_roll - reach)
-    raise GeometryError(
-        f"involute interference: the {partner.name}'s tip meets the {gear.name} {-reach * 1e3:.4f} mm beyond "
-        f"the end of the line of action, inside the {gear.name}'s base circle",
-        code="E-INTERFERENCE",
-        key=f"{partner.name}.tip_diameter",
-        value=2.0 * partner.tip_radius,
-        limit=f"tip diameter >= {_rounded_up(allowed)} mm",
-        remedy=f"give that tip_diameter, more teeth to the {gear.name}, or profile shifts",
-    )
-
-
-def _fillet_interference(gear: Gear, partner: Gear, reach: float, overlap: float):
-    allowed = allowed_tip_radius(gear, partner, reach)
-    raise GeometryError(
-        _fillet_message(gear, reach, partner, overlap),
-        code="E-FILLET",
-        key="rack.root_radius",
-        value=round(gear.tool.rounding / gear.module, 9),
-        limit=f"active profile {'up' if gear.internal else 'down'} to {gear.form_radius * 1e3:.4f} mm",
-        remedy=f"reduce root_radius, or give the {partner.name} a tip_diameter "
-        f"{_tip_limit(partner, allowed)} mm",
-    )
-
-
-def _fillet_warning(gear: Gear, partner: Gear, reach: float, overlap: float) -> GeometryWarning:
-    allowed = allowed_tip_radius(gear, partner, reach)
-    return GeometryWarning(
-        "W-FILLET",
-        f"{partner.name}.tip_diameter",
-        _fillet_message(gear, reach, partner, overlap),
-        2.0 * partner.tip_radius,
-        f"{_tip_limit(partner, allowed)} mm",
-    )
-
-
-def _fillet_message(gear: Gear, reach: float, partner: Gear, overlap: float) -> str:
-    where = math.hypot(gear.base_radius, max(reach, 0.0))
-    below = "" if reach >= 0.0 else f" and {-reach * 1e3:.4f} mm beyond the end of the line of action"
-    return (
-        f"the {partner.name}'s tip runs into the {gear.name}'s root fillet: it reaches radius "
-        f"{where * 1e3:.4f} mm{below}; the involute {'ends' if gear.internal else 'begins'} at "
-        f"{gear.form_radius * 1e3:.4f} mm (overlap {overlap * 1e6:.3f} um)"
-    )
-
-
-def _tip_limit(partner: Gear, allowed: float) -> str:
-    """Allowed tip diameters in mm: above that of a ring, below that of the others."""
-    return f">= {_rounded_up(allowed)}" if partner.internal else f"<= {_rounded_down(allowed)}"
-
-
-def _rounded_up(radius: float) -> str:
-    """Diameter in mm of the smallest tip circle [m] that is allowed, to be typed as it stands."""
-    return f"{math.ceil(2e7 * radius) / 1e4:.4f}"
-
-
-def _rounded_down(radius: float) -> str:
-    """The same of the largest one."""
-    return f"{math.floor(2e7 * radius) / 1e4:.4f}"

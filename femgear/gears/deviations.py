@@ -382,10 +382,6 @@ def mirrored_deviations(
         Planet angles ``2 psi_1 - psi``, ascending from the first planet.
     order : (N,) integer array
         Mirrored planet ``i`` is original planet ``order[i]``.
-
-    Returns
-    -------
-    SetDeviations
     """
     d, s, order = deviations, planetary_set, [int(n) for n in order]
     axis = 2.0 * s.planet_angles[0]
@@ -427,11 +423,6 @@ def _reflected(runout: Runout, axis: float) -> Runout:
 
 def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[GeometryWarning, ...]:
     """Refuse deviations that do not belong to the set, and list what deserves a warning.
-
-    Parameters
-    ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
 
     Returns
     -------

@@ -65,10 +65,6 @@ def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations
     position : float
         tau, fraction of one mesh period (may exceed 1): the sun turns by ``+2 pi tau / z_s``, a planet by
         ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``.
-
-    Returns
-    -------
-    Orientations
     """
     s = planetary
     psi, phase = s.planet_angles, s.mesh_phases.tolist()

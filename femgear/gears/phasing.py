@@ -322,16 +322,12 @@ def phasing_table(phasing: MeshPhasing, harmonics=range(1, 7)) -> PhasingTable:
     phasing : MeshPhasing
     harmonics : (H,) sequence of int
 
-    Returns
-    -------
-    PhasingTable
-
     Raises
     ------
     GeometryError
         Harmonics that are no whole numbers from 1 (E-HARMONICS).
     """
-    harmonics = _checked_harmonics(harmonics)
+    harmonics = check_harmonics(harmonics)
     turns, N = np.array(phasing.turns), phasing.n_planets
     positions = np.array([phasing.positions] * 2)
     total = np.full(2, phasing.teeth_sum)
@@ -352,54 +348,9 @@ def phasing_table(phasing: MeshPhasing, harmonics=range(1, 7)) -> PhasingTable:
     )
 
 
-def cyclic_shares(phasing: MeshPhasing, harmonics=range(1, 7)) -> np.ndarray:
-    """Shares of the motions ``exp(i j psi_n)``, j = 0 to N // 2 and both senses, in the phase pattern.
-
-    Parameters
-    ----------
-    phasing : MeshPhasing
-    harmonics : (H,) sequence of int
-
-    Returns
-    -------
-    (H, N // 2 + 1) array
-        The larger of sun and ring meshes. With equal spacing one entry of a row is 1, at ``min(k, N - k)``
-        with k = mod(h z_s, N): which of the planet modes of `phase_shares` it can excite.
-        At unequal spacing the motions overlap, and several entries differ from 0.
-    """
-    harmonics, N = _checked_harmonics(harmonics), phasing.n_planets
-    orders = np.arange(N // 2 + 1)
-    size = [
-        np.abs(planet_sums(turns, phasing.positions, phasing.teeth_sum, harmonics, sense * orders))
-        for turns in phasing.turns
-        for sense in (1, -1)
-    ]
-    shares = np.max(size, axis=0)
-    return np.where(shares < ZERO, 0.0, shares)
-
-
-def mesh_loads(directions, phasing: MeshPhasing, harmonics) -> np.ndarray:
-    """Loads of unit mesh forces with their phases on all coordinates of a model, by family of meshes.
-
-    Parameters
-    ----------
-    directions : (n, 2N) array
-        Mesh columns of a model, such as `femgear.system.assembler.mesh_directions`.
-    phasing : MeshPhasing
-    harmonics : (H,) sequence of int
-
-    Returns
-    -------
-    (H, 2, n) complex array
-        Loads by the sun meshes and by the ring meshes.
-    """
-    directions, N = np.asarray(directions), phasing.n_planets
-    factors = phase_factors(phasing, harmonics).reshape(-1, 2, N)
-    return np.einsum("nfj,hfj->hfn", directions.reshape(len(directions), 2, N), factors)
-
-
 def check_harmonics(harmonics) -> np.ndarray:
     """Harmonics as whole numbers from 1, (H,); refuses others (E-HARMONICS)."""
+    harmonics = list(harmonics) if isinstance(harmonics, range) else harmonics
     found = np.atleast_1d(np.asarray(harmonics))
     if found.ndim != 1 or not len(found) or found.dtype.kind not in "iu" or found.min() < 1:
         raise GeometryError(
@@ -407,11 +358,6 @@ def check_harmonics(harmonics) -> np.ndarray:
             limit="whole numbers from 1", remedy="for instance range(1, 7)",
         )  # fmt: skip
     return found.astype(np.int64)
-
-
-def _checked_harmonics(harmonics) -> np.ndarray:
-    """`check_harmonics`, whose refusal tells a range by its numbers."""
-    return check_harmonics(list(harmonics) if isinstance(harmonics, range) else harmonics)
 
 
 def _planet_resultants(phasing: MeshPhasing, harmonics: np.ndarray) -> np.ndarray:

@@ -250,10 +250,6 @@ def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
     helix_angle : float
         [rad]
 
-    Returns
-    -------
-    PlanetarySet
-
     Raises
     ------
     GeometryError

@@ -193,33 +193,6 @@ def undercut_shift(teeth: int, pressure_angle: float) -> float:
     return 1.0 - 0.5 * teeth * math.sin(pressure_angle) ** 2
 
 
-def trochoid_interference(
-    teeth_1: int,
-    teeth_2: int,
-    tip_1: float,
-    tip_2: float,
-    base_1: float,
-    base_2: float,
-    centre_distance: float,
-) -> float:
-    """Angle [rad] at the internal gear by which the tip corners of an internal pair miss each other.
-
-    ``z1/z2 (phi1 + inv(aa1) - inv(aw)) + inv(aw) - inv(aa2) - phi2`` with the angles phi1, phi2 of the
-    crossing of both tip circles at the two centres (Colbourne, The Geometry of Involute Gears, ch. 8):
-    negative means that the teeth strike each other outside the path of contact. ``inf`` when the tip
-    circles do not cross.
-    """
-    a = centre_distance
-    cos_1 = (tip_2**2 - tip_1**2 - a**2) / (2.0 * a * tip_1)
-    cos_2 = (tip_2**2 - tip_1**2 + a**2) / (2.0 * a * tip_2)
-    if abs(cos_1) >= 1.0 or abs(cos_2) >= 1.0:
-        return math.inf
-    working = inv(pressure_angle_at(a, base_2 - base_1))
-    angle_1 = math.acos(cos_1) + inv(pressure_angle_at(tip_1, base_1)) - working
-    angle_2 = math.acos(cos_2) + inv(pressure_angle_at(tip_2, base_2)) - working
-    return angle_1 * teeth_1 / teeth_2 - angle_2
-
-
 def transverse_angle(normal_pressure_angle: float, helix_angle: float) -> float:
     """Transverse pressure angle [rad], ``tan(alpha_t) = tan(alpha_n) / cos(beta)``."""
     return math.atan(math.tan(normal_pressure_angle) / math.cos(helix_angle))

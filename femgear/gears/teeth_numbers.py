@@ -45,8 +45,6 @@ class ToothChoices:
         moment), 0 to 1.
     common_sun_planet, common_planet_ring : (C,) int array
         Common divisors; with 1 every tooth meets every tooth of the other gear.
-    common_sun_planets, common_ring_planets : (C,) int array
-        Of the teeth of sun (ring) and N: several planets then hit one tooth at the same moment of its cycle.
     room : (C,) array
         Between the tip circles of the two nearest planets [modules], negative where they overlap.
     """
@@ -62,8 +60,6 @@ class ToothChoices:
     sums: np.ndarray
     common_sun_planet: np.ndarray
     common_planet_ring: np.ndarray
-    common_sun_planets: np.ndarray
-    common_ring_planets: np.ndarray
     room: np.ndarray
 
     def __len__(self) -> int:
@@ -89,12 +85,6 @@ class ToothChoices:
     def only(self, chosen) -> ToothChoices:
         """The choices of a mask (C,) or of indices, in their order."""
         return ToothChoices(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
-
-    def phasing(self, choice: int, **options) -> MeshPhasing:
-        """Mesh phases of one choice; options as in `MeshPhasing`, with the lag of unshifted planets."""
-        sun, planet, ring = (int(z) for z in self.teeth[choice])
-        options = {"lag": standard_lag(planet)} | options
-        return MeshPhasing(sun, ring, tuple(int(m) for m in self.positions[choice]), **options)
 
 
 def neighbouring_teeth(
@@ -128,10 +118,6 @@ def neighbouring_teeth(
         H
     fitting : bool
         Leaves out sets whose neighbouring planets overlap.
-
-    Returns
-    -------
-    ToothChoices
 
     Raises
     ------
@@ -225,8 +211,6 @@ def _described(teeth, ratio, change, planets: int, harmonics) -> ToothChoices:
         sums=np.stack([sums[..., 0], sums[..., 1:].max(axis=-1)], axis=-1),
         common_sun_planet=np.gcd(sun, planet),
         common_planet_ring=np.gcd(planet, ring),
-        common_sun_planets=np.gcd(sun, planets),
-        common_ring_planets=np.gcd(ring, planets),
         room=_room(teeth, positions, total),
     )
 

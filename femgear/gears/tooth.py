@@ -66,10 +66,6 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     refine : float
         Divides every spacing, that of the flank included.
 
-    Returns
-    -------
-    HalfSector
-
     Raises
     ------
     GeometryError

@@ -15,9 +15,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from published.iso6336_stiffness import mesh_stiffness_method_b
 
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from femgear.system.assembler import planar_meshes

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from published.iso6336_stiffness import theoretical_single_stiffness
 from published.planetary_sets import kahraman_set
 from scipy.integrate import quad
 
 from femgear.contact.cycle import cycle_without_load
 from femgear.errors import CaseError
 from femgear.gears import profile
-from femgear.gears.iso6336 import theoretical_single_stiffness
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import contact_line_width, helical_excitation, slice_phases
 
