@@ -265,7 +265,7 @@ def body_separation(
     if back:
         others = np.repeat([d.sun_thickness, d.ring_thickness], s.n_planets)
         thinner = others + np.tile(d.planet_thickness, 2) - thinner
-    return (normals.conj()[:, None] * moved).real + thinner[:, None] * math.cos(s.sun.pressure_angle)
+    return np.real(normals.conj()[:, None] * moved) + thinner[:, None] * math.cos(s.sun.pressure_angle)
 
 
 def _relative_displacements(d: SetDeviations, s: PlanetarySet, position: np.ndarray) -> np.ndarray:

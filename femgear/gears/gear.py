@@ -10,6 +10,7 @@ import math
 import operator
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 
@@ -357,11 +358,11 @@ def _check_numbers(gear: Gear) -> None:
 
 def is_whole(value) -> bool:
     """Whether a value is a whole number, and no truth value."""
-    return isinstance(value, int | np.integer) and not isinstance(value, bool | np.bool_)
+    return isinstance(value, Integral) and not isinstance(value, bool)
 
 
 def _within(value, low: float, high: float) -> bool:
-    return isinstance(value, float | int | np.floating) and low <= value <= high
+    return isinstance(value, float | int | np.floating) and bool(low <= value <= high)
 
 
 def _check_rack(gear: Gear) -> None:
@@ -538,7 +539,7 @@ def _check_flank(gear: Gear) -> None:
         )
 
 
-def _refuse(gear: Gear, entry: str, message: str, *, code: str, value, limit: str, remedy: str):
+def _refuse(gear: Gear, entry: str, message: str, *, code: str, value, limit: str | None, remedy: str):
     key = entry if entry.startswith("rack.") else f"{gear.name}.{entry}"
     raise GeometryError(
         f"{gear.name}: {message}", code=code, key=key, value=value, limit=limit, remedy=remedy

@@ -101,7 +101,11 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
     GeometryError
         Not one input and one fixed member (E-MECHANISM), or a speed that is not finite.
     """
-    _check_mechanism(input, fixed)
+    for member in (input, fixed):
+        if member not in MEMBERS:
+            _refuse_mechanism(f"{member!r} is no member that can be driven or held", member)
+    if input == fixed:
+        _refuse_mechanism(f"the {input} is both driven and held, which leaves two members free", input)
     if not math.isfinite(speed):
         raise GeometryError(
             f"a speed of {speed} rad/s", code="E-VALUE", key="operation.speeds", value=speed, limit="finite"
@@ -133,7 +137,7 @@ def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
         Unknown member (E-MECHANISM) or a torque that is not finite (E-VALUE).
     """
     if member not in MEMBERS:
-        _mechanism_error(f"the torque acts on {member!r}", member)
+        _refuse_mechanism(f"the torque acts on {member!r}", member)
     if not math.isfinite(torque):
         raise GeometryError(
             f"a torque of {torque} N m", code="E-VALUE", key="operation.torque", value=torque, limit="finite"
@@ -144,15 +148,7 @@ def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
     return Torques(sun=sun, ring=sun * share["ring"], carrier=sun * share["carrier"])
 
 
-def _check_mechanism(input: str, fixed: str) -> None:
-    for member in (input, fixed):
-        if member not in MEMBERS:
-            _mechanism_error(f"{member!r} is no member that can be driven or held", member)
-    if input == fixed:
-        _mechanism_error(f"the {input} is both driven and held, which leaves two members free", input)
-
-
-def _mechanism_error(message: str, value):
+def _refuse_mechanism(message: str, value: str):
     raise GeometryError(
         message,
         code="E-MECHANISM",

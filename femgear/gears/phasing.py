@@ -263,9 +263,6 @@ class PhasingTable:
         One of `KINDS` for every harmonic, the same for sun and ring meshes.
     cyclic : (H,) int array
         k = mod(h z_s, N); -1 for unequally spaced planets.
-    sums : (H, 2, 3) complex array
-        Mean over the planets of ``exp(2 pi i h gamma_n) exp(i q psi_n)`` for sun and ring meshes, q = 0, 1
-        and -1.
     members : (H, 3, 4) array
         Resultants on `MEMBERS` by `RESULTANTS` as shares of what they were if all planets acted alike and in
         the worst direction: 0 cancelled, 1 everything adds up.
@@ -281,7 +278,6 @@ class PhasingTable:
     harmonics: np.ndarray
     kind: tuple[str, ...]
     cyclic: np.ndarray
-    sums: np.ndarray
     members: np.ndarray
     planets: np.ndarray
     modes: np.ndarray
@@ -331,8 +327,7 @@ def phasing_table(phasing: MeshPhasing, harmonics=range(1, 7)) -> PhasingTable:
     turns, N = np.array(phasing.turns), phasing.n_planets
     positions = np.array([phasing.positions] * 2)
     total = np.full(2, phasing.teeth_sum)
-    sums = planet_sums(turns, positions, total, harmonics, (0, 1, -1)).swapaxes(0, 1)
-    size = np.abs(sums)
+    size = np.abs(planet_sums(turns, positions, total, harmonics, (0, 1, -1)).swapaxes(0, 1))
     plain, turning = size[..., 0], size[..., 1:].max(axis=-1)  # (H, 2)
     both = [np.column_stack([part, part.max(axis=1)]) for part in (plain, turning)]
     kinds = phase_kinds(turns[0], positions[0], total[0], harmonics)
@@ -340,7 +335,6 @@ def phasing_table(phasing: MeshPhasing, harmonics=range(1, 7)) -> PhasingTable:
         harmonics=harmonics,
         kind=tuple(KINDS[k] for k in kinds),
         cyclic=cyclic_harmonic(phasing, harmonics),
-        sums=sums,
         members=np.stack([both[0], both[1], both[0], both[1]], axis=-1),
         planets=_planet_resultants(phasing, harmonics),
         modes=_mode_shares(phase_factors(phasing, harmonics).reshape(-1, 2, N), phasing.planet_angles, size),

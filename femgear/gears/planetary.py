@@ -122,26 +122,14 @@ class PlanetarySet:
         return start, self.planet.tip_roll - planet
 
     @property
-    def circumferential_backlash_sun_planet(self) -> float:
-        """Play [m] on the working pitch circles, pitch minus both tooth thicknesses."""
-        return _backlash(self.sun, self.planet, self.working_pressure_angle_sun_planet)
-
-    @property
-    def circumferential_backlash_planet_ring(self) -> float:
-        """Play [m] on the working pitch circles, pitch minus both tooth thicknesses."""
-        return _backlash(self.planet, self.ring, self.working_pressure_angle_planet_ring)
-
-    @property
     def backlash_sun_planet(self) -> float:
         """Normal play [m] along the line of action."""
-        angle = self.working_pressure_angle_sun_planet
-        return self.circumferential_backlash_sun_planet * math.cos(angle)
+        return _backlash(self.sun, self.planet, self.working_pressure_angle_sun_planet)
 
     @property
     def backlash_planet_ring(self) -> float:
         """Normal play [m] along the line of action."""
-        angle = self.working_pressure_angle_planet_ring
-        return self.circumferential_backlash_planet_ring * math.cos(angle)
+        return _backlash(self.planet, self.ring, self.working_pressure_angle_planet_ring)
 
     @property
     def mesh_phases(self) -> np.ndarray:
@@ -225,14 +213,14 @@ def close_set(
         x_planet = x_ring - difference if "sun" in find else total - x_sun
     x_sun = total - x_planet if "sun" in find else x_sun
     x_ring = difference + x_planet if "ring" in find else x_ring
-    shifts = ((sun, x_sun), (planet, x_planet), (ring, x_ring))
-    return PlanetarySet(*(_shifted(g, x) for g, x in shifts), centre_distance, planet_angles)
+    gears = _shifted(sun, x_sun), _shifted(planet, x_planet), _shifted(ring, x_ring)
+    return PlanetarySet(*gears, centre_distance, planet_angles)
 
 
 def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, int]:
     """Whole tooth numbers next to ``z / cos^3(beta)`` of sun, planet and ring."""
     cube = math.cos(helix_angle) ** 3
-    return tuple(round(gear.teeth / cube) for gear in (gears.sun, gears.planet, gears.ring))
+    return round(gears.sun.teeth / cube), round(gears.planet.teeth / cube), round(gears.ring.teeth / cube)
 
 
 def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
@@ -255,15 +243,25 @@ def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
     GeometryError
         Where virtual gears cannot be made.
     """
-    teeth = virtual_teeth(gears, helix_angle)
-    made = (_virtual(gear, z, helix_angle) for gear, z in zip((gears.sun, gears.planet, gears.ring), teeth))
-    return close_set(*made, planet_angles=(0.0,), find=("ring",))
+    sun, planet, ring = virtual_teeth(gears, helix_angle)
+    return close_set(
+        _virtual(gears.sun, sun, helix_angle),
+        _virtual(gears.planet, planet, helix_angle),
+        _virtual(gears.ring, ring, helix_angle),
+        planet_angles=(0.0,),
+        find=("ring",),
+    )
 
 
 def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
     factor = math.cos(helix_angle)
     rack, module = gear.rack, gear.module * factor
     radius = 0.5 * module * teeth
+
+    def moved(diameter: float | None) -> float | None:
+        """A given diameter as far from the virtual reference circle as it was from the true one."""
+        return None if diameter is None else diameter + 2.0 * (radius - gear.reference_radius)
+
     made = Gear(
         teeth=teeth,
         module=module,
@@ -278,17 +276,12 @@ def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
             dedendum=rack.dedendum / factor,
             root_radius=rack.root_radius / factor,
         ),
-        tip_diameter=_moved(gear.tip_diameter, gear, radius),
-        root_diameter=_moved(gear.root_diameter, gear, radius),
+        tip_diameter=moved(gear.tip_diameter),
+        root_diameter=moved(gear.root_diameter),
         thickness_allowance=gear.thickness_allowance * factor,
         name=gear.name,
     )
     return replace(made, rim_radius=made.root_radius + gear.rim_radius - gear.root_radius)
-
-
-def _moved(diameter: float | None, gear: Gear, radius: float) -> float | None:
-    """A given diameter as far from the virtual reference circle as it was from the true one."""
-    return None if diameter is None else diameter + 2.0 * (radius - gear.reference_radius)
 
 
 def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, float]:
@@ -433,9 +426,10 @@ def _undercut_roll(gear: Gear) -> float:
 
 
 def _backlash(one: Gear, two: Gear, angle: float) -> float:
+    """Pitch minus both tooth thicknesses on the working pitch circles, taken along the normal [m]."""
     eta_1, eta_2 = working_half_angles(one, two, angle)
     r_1, r_2 = one.base_radius / math.cos(angle), two.base_radius / math.cos(angle)
-    return one.pitch_angle * r_1 - 2.0 * (r_1 * eta_1 + r_2 * eta_2)
+    return (one.pitch_angle * r_1 - 2.0 * (r_1 * eta_1 + r_2 * eta_2)) * math.cos(angle)
 
 
 def _fraction(value: np.ndarray) -> np.ndarray:
