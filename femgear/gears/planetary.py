@@ -16,9 +16,8 @@ from itertools import pairwise
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears import profile
 from femgear.gears.gear import Gear, is_whole, working_half_angles
-from femgear.gears.profile import BasicRack
+from femgear.gears.profile import BasicRack, arcinv, inv, pressure_angle_at
 
 BACKLASH_TOLERANCE = 1e-4
 """Normal backlash, in modules, that counts as none: what four decimals of profile shifts leave open."""
@@ -75,12 +74,12 @@ class PlanetarySet:
     @property
     def working_pressure_angle_sun_planet(self) -> float:
         """[rad]"""
-        return _working_angle(self.sun, self.planet, self.centre_distance)
+        return working_pressure_angle(self.sun, self.planet, self.centre_distance)
 
     @property
     def working_pressure_angle_planet_ring(self) -> float:
         """[rad]"""
-        return _working_angle(self.planet, self.ring, self.centre_distance)
+        return working_pressure_angle(self.planet, self.ring, self.centre_distance)
 
     @property
     def contact_ratio_sun_planet(self) -> float:
@@ -206,8 +205,8 @@ def close_set(
     _check_find(find, centre_distance)
     if centre_distance is None:
         centre_distance = _free_distance(sun, planet, ring, find)
-    total = _required_shift(sun, planet, centre_distance)  # x_sun + x_planet
-    difference = _required_shift(planet, ring, centre_distance)  # x_ring - x_planet
+    total = required_shift(sun, planet, centre_distance)  # x_sun + x_planet
+    difference = required_shift(planet, ring, centre_distance)  # x_ring - x_planet
     x_sun, x_planet, x_ring = sun.profile_shift, planet.profile_shift, ring.profile_shift
     if "planet" in find:
         x_planet = x_ring - difference if "sun" in find else total - x_sun
@@ -284,29 +283,69 @@ def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
     return replace(made, rim_radius=made.root_radius + gear.rim_radius - gear.root_radius)
 
 
-def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, float]:
-    """Centre distances [m] without play of sun-planet and planet-ring, allowances left aside."""
-    alpha = sun.pressure_angle
-    out = []
-    for one, two in ((sun, planet), (planet, ring)):
-        shifts = one.profile_shift, two.profile_shift
-        try:
-            angle = profile.working_pressure_angle(
-                one.teeth, two.teeth, *shifts, alpha, internal=two.internal
-            )
-        except GeometryError as error:
-            raise GeometryError(
-                f"no centre distance suits profile shifts {shifts[0]:.4f} ({one.name}) and {shifts[1]:.4f} "
-                f"({two.name}): {error.message}",
-                code=error.code,
-                key=f"{two.name}.profile_shift",
-                value=shifts[1],
-                limit=error.limit,
-                remedy=error.remedy,
-            ) from None
-        reference = profile.reference_centre_distance(one.teeth, two.teeth, one.module, internal=two.internal)
-        out.append(reference * math.cos(alpha) / math.cos(angle))
-    return out[0], out[1]
+def _tooth_sum(one: Gear, two: Gear) -> int:
+    """Sum of the teeth of an external pair, difference of an internal one (gear 2)."""
+    return two.teeth - one.teeth if two.internal else one.teeth + two.teeth
+
+
+def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> float:
+    """Working pressure angle [rad] of two gears at a centre distance [m], ``cos(aw) = a0 cos(alpha) / a``.
+
+    Raises
+    ------
+    GeometryError
+        E-CENTRE-DISTANCE: the base circles would overlap (``cos(aw) > 1``).
+    """
+    base = 0.5 * one.module * _tooth_sum(one, two) * math.cos(one.pressure_angle)
+    if not centre_distance >= base:
+        raise GeometryError(
+            f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {one.teeth} and "
+            f"{two.teeth} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
+            code="E-CENTRE-DISTANCE",
+            key="set.centre_distance",
+            value=centre_distance,
+            limit=f">= {math.ceil(base * 1e7) / 1e4:.4f} mm",
+            remedy="increase the centre distance or reduce the tooth numbers or the module",
+        )
+    return pressure_angle_at(centre_distance, base)
+
+
+def free_centre_distance(one: Gear, two: Gear) -> float:
+    """Centre distance [m] at which two gears run without play, allowances left aside.
+
+    External: ``inv(aw) = inv(a) + 2 tan(a) (x1 + x2)/(z1 + z2)`` (ISO 21771, eq. 60); internal (gear 2):
+    ``inv(aw) = inv(a) + 2 tan(a) (x2 - x1)/(z2 - z1)``, shifts positive outwards.
+
+    Raises
+    ------
+    GeometryError
+        E-INVOLUTE: ``inv(aw)`` would be negative.
+    """
+    alpha, total = one.pressure_angle, _tooth_sum(one, two)
+    x_1, x_2 = one.profile_shift, two.profile_shift
+    shift = x_2 - x_1 if two.internal else x_1 + x_2
+    try:
+        angle = arcinv(inv(alpha) + 2.0 * math.tan(alpha) * shift / total)
+    except GeometryError as error:
+        raise GeometryError(
+            f"no centre distance suits profile shifts {x_1:.4f} ({one.name}) and {x_2:.4f} "
+            f"({two.name}): {error.message}",
+            code=error.code,
+            key=f"{two.name}.profile_shift",
+            value=x_2,
+            limit=error.limit,
+            remedy=error.remedy,
+        ) from None
+    return 0.5 * one.module * total * math.cos(alpha) / math.cos(angle)
+
+
+def required_shift(one: Gear, two: Gear, centre_distance: float) -> float:
+    """Sum (external) or difference ``x2 - x1`` (internal) of the shifts that run without play at a distance.
+
+    Inverse of `free_centre_distance` (ISO 21771, eq. 60).
+    """
+    alpha, working = one.pressure_angle, working_pressure_angle(one, two, centre_distance)
+    return _tooth_sum(one, two) * (inv(working) - inv(alpha)) / (2.0 * math.tan(alpha))
 
 
 def equal_planet_angles(planets: int) -> tuple[float, ...]:
@@ -414,12 +453,6 @@ def check_roles(planetary: PlanetarySet) -> None:
                 )
 
 
-def _working_angle(one: Gear, two: Gear, distance: float) -> float:
-    return profile.angle_at_centre_distance(
-        one.teeth, two.teeth, one.module, one.pressure_angle, distance, internal=two.internal
-    )
-
-
 def _undercut_roll(gear: Gear) -> float:
     """Roll length [m] where an undercut flank ends, minus infinity without undercut."""
     return gear.form_roll if gear.undercut else -math.inf
@@ -453,18 +486,12 @@ def _planet_lag(planetary: PlanetarySet) -> float:
     return (math.pi - eta_ps - eta_pr) / planetary.planet.pitch_angle
 
 
-def _required_shift(one: Gear, two: Gear, distance: float) -> float:
-    return profile.shift_for_angle(
-        one.teeth, two.teeth, one.pressure_angle, _working_angle(one, two, distance), internal=two.internal
-    )
-
-
 def _shifted(gear: Gear, shift: float) -> Gear:
     return gear if shift == gear.profile_shift else replace(gear, profile_shift=shift)
 
 
 def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -> float:
-    first, second = free_centre_distances(sun, planet, ring)
+    first, second = free_centre_distance(sun, planet), free_centre_distance(planet, ring)
     if find:
         return second if find == ("sun",) else first
     # what BACKLASH_TOLERANCE leaves open, as a change of the centre distance

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from femgear.gears import profile
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import free_centre_distance, working_pressure_angle
+from femgear.gears.profile import BasicRack
 from validation.reference import gear_limits
 from validation.rows import REPEATED, Row, counted, printed
 
@@ -30,9 +34,13 @@ def _pair(teeth, shifts, degrees, *, internal=False, module=1.0, truncated=False
     """Working angle [rad], centre distance and contact ratio of a pair with addendum one module."""
     alpha = math.radians(degrees)
     cosine = math.cos(alpha)
-    working = profile.working_pressure_angle(*teeth, *shifts, alpha, internal=internal)
-    reference = profile.reference_centre_distance(*teeth, module, internal=internal)
-    distance = reference * cosine / math.cos(working)
+    rack = BasicRack(root_radius=0.1)
+    one, two = (Gear(z, 1e-3 * module, alpha, x, 0.02, 1e-3, rack=rack) for z, x in zip(teeth, shifts))
+    if internal:
+        two = replace(two, internal=True, rim_radius=1.0)
+    distance = 1e3 * free_centre_distance(one, two)
+    working = working_pressure_angle(one, two, 1e-3 * distance)
+    reference = 0.5 * module * (teeth[1] - teeth[0] if internal else sum(teeth))
     cut = sum(shifts) - (distance - reference) / module if truncated else 0.0
     base_1, base_2 = (0.5 * module * z * cosine for z in teeth)
     tip_1 = module * (teeth[0] / 2 + 1 + shifts[0] - cut)

@@ -14,7 +14,13 @@ from femgear.gears import profile as iv
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear, tooth_thickness
 from femgear.gears.kinematics import torques
-from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_angles
+from femgear.gears.planetary import (
+    PlanetarySet,
+    equal_planet_angles,
+    feasible_angles,
+    free_centre_distance,
+    working_pressure_angle,
+)
 from femgear.gears.profile import BasicRack
 from validation.reference import gear_limits as limits
 from validation.reference.gear_limits import neighbour_limit
@@ -26,7 +32,7 @@ def contact_ratio(teeth, alpha, *, internal=False):
     """Unshifted gears of module 1, addendum 1."""
     base = [0.5 * z * math.cos(alpha) for z in teeth]
     tips = 0.5 * teeth[0] + 1.0, 0.5 * teeth[1] + (-1.0 if internal else 1.0)
-    distance = iv.reference_centre_distance(*teeth, 1.0, internal=internal)
+    distance = 0.5 * (teeth[1] - teeth[0] if internal else sum(teeth))
     ratio = limits.contact_ratio_internal if internal else limits.contact_ratio_external
     return ratio(tips[0], base[0], tips[1], base[1], distance, math.pi * math.cos(alpha))
 
@@ -62,9 +68,10 @@ def test_limiting_contact_ratio_of_racks():
 
 def test_shifted_external_pair():
     """m = 3, 20/40, x = .3/.2."""
-    angle = iv.working_pressure_angle(20, 40, 0.3, 0.2, A20)
+    pair = Gear(20, 3e-3, A20, 0.3, 0.02, 1e-3), Gear(40, 3e-3, A20, 0.2, 0.02, 1e-3)
+    distance = 1e3 * free_centre_distance(*pair)
+    angle = working_pressure_angle(*pair, 1e-3 * distance)
     assert math.degrees(angle) == pytest.approx(22.3167069, abs=5e-8)
-    distance = 90.0 * math.cos(A20) / math.cos(angle)
     assert distance == pytest.approx(91.4197646, abs=5e-8)
     base, pitch = (30 * math.cos(A20), 60 * math.cos(A20)), 3 * math.pi * math.cos(A20)
     tips = 33 + 0.9, 63 + 0.6
