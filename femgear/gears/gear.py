@@ -289,17 +289,14 @@ def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
     working = arcinv(inv(alpha) + 2.0 * tangent * shift / (gear.teeth - cutter.teeth))
     base = 0.5 * module * cutter.teeth * math.cos(alpha)
     pitch, cutter_pitch = gear.base_radius / math.cos(working), base / math.cos(working)
-    tip = gear.root_radius - (pitch - cutter_pitch)
-    centre_radius = tip - rounding
+    centre_radius = gear.root_radius - (pitch - cutter_pitch) - rounding
     base_half = (0.5 * math.pi + 2.0 * cutter.profile_shift * tangent) / cutter.teeth + inv(alpha)
     # the parallel of an involute is an involute of the same base circle, begun rounding/rb further in
     centre_angle = base_half - rounding / base - inv(pressure_angle_at(centre_radius, base))
     return CutterTip(
-        cutter_teeth=cutter.teeth,
         pitch_radius=pitch,
         cutter_pitch_radius=cutter_pitch,
         cutter_base_radius=base,
-        cutter_tip_radius=tip,
         centre_distance=pitch - cutter_pitch,
         centre_radius=centre_radius,
         centre_angle=centre_angle,

@@ -260,11 +260,9 @@ class CutterTip:
     ``centre_radius`` and ``centre_angle`` place the rounding's centre in the frame of the cutter tooth.
     """
 
-    cutter_teeth: int
     pitch_radius: float
     cutter_pitch_radius: float
     cutter_base_radius: float
-    cutter_tip_radius: float
     centre_distance: float
     centre_radius: float
     centre_angle: float
