@@ -33,14 +33,6 @@ LONGEST_RECORD = 256
 """Mesh periods that a record spans at most unless told otherwise."""
 LONGEST_SEARCH = 4096
 """Mesh periods that are searched for the least play."""
-_ARRAYS = (
-    "sun_pitch",
-    "planet_pitch",
-    "planet_ring_side_pitch",
-    "ring_pitch",
-    "pin_errors",
-    "planet_thickness",
-)
 
 
 @dataclass(frozen=True)
@@ -126,7 +118,8 @@ class SetDeviations:
     ring_thickness: float = 0.0
 
     def __post_init__(self):
-        for name in _ARRAYS:
+        pitches = ("sun_pitch", "planet_pitch", "planet_ring_side_pitch", "ring_pitch")
+        for name in (*pitches, "pin_errors", "planet_thickness"):
             array = np.array(getattr(self, name), dtype=float)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
