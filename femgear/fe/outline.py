@@ -63,7 +63,7 @@ def check_outline(outline) -> Plan:
     Parameters
     ----------
     outline : Outline
-        Or any object with the same fields; ``regions`` may be absent.
+        Or any object with the same fields.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def check_outline(outline) -> Plan:
     _check_crossing(points, segments, names, size)
     area = _check_area(points[segments[:n_boundary, 0]], size)
     loops = _faces(points, segments, n_boundary, area, names)
-    faces = _name_faces(points, segments, loops, tuple(getattr(outline, "regions", ())))
+    faces = _name_faces(points, segments, loops, tuple(outline.regions))
     return Plan(points, segments, mids, names, n_boundary, loops, faces)
 
 

@@ -58,8 +58,7 @@ class CyclicModes:
     @property
     def norm(self) -> np.ndarray:
         """Factor of every mode that makes its coordinates have unit modal mass."""
-        single = (self.nodal_diameter == 0) | (2 * self.nodal_diameter == self.count)
-        return np.sqrt(np.where(single, 1.0, 2.0) / self.count)
+        return np.sqrt(np.where(self.paired, 2.0, 1.0) / self.count)
 
     @property
     def paired(self) -> np.ndarray:

@@ -1,7 +1,6 @@
 """What a spur gear is: its data, its circles, the tools that cut it, and the numbers that no gear can have.
 
-A gear is checked before anything is computed with it (`check_gear`); the tool is matched to its flank and
-root circle (`generating_tool`).
+A gear is checked before anything is computed with it; the tool is matched to its flank and root circle.
 """
 
 from __future__ import annotations
@@ -106,7 +105,7 @@ class Gear:
     name: str = field(default="gear", compare=False)
 
     def __post_init__(self):
-        check_gear(self)
+        _check_gear(self)
 
     @property
     def reference_radius(self) -> float:
@@ -155,7 +154,7 @@ class Gear:
     @cached_property
     def tool(self) -> RackTip | CutterTip:
         """Rounded tip of the generating tool, matched to this flank and root circle."""
-        return generating_tool(self)
+        return _generating_tool(self)
 
     @cached_property
     def fillet_end(self) -> float:
@@ -238,20 +237,8 @@ def cutter_of(gear: Gear) -> PinionCutter:
     return gear.cutter or PinionCutter(teeth=max(5, min(30, gear.teeth - 12)))
 
 
-def generating_tool(gear: Gear, *, rounding: float | None = None) -> RackTip | CutterTip:
-    """Tool tip that cuts the flank and the root circle of a gear.
-
-    Parameters
-    ----------
-    gear : Gear
-    rounding : float, optional
-        Tip rounding [modules]; None takes that of the gear's rack or cutter.
-
-    Raises
-    ------
-    GeometryError
-        No working pressure angle exists between the gear and its cutter (E-INVOLUTE).
-    """
+def _generating_tool(gear: Gear, rounding: float | None = None) -> RackTip | CutterTip:
+    """Tool tip that cuts flank and root circle of a gear; its rounding [modules] is by default the gear's."""
     return _cutter_tip(gear, rounding) if gear.internal else _rack_tip(gear, rounding)
 
 
@@ -306,7 +293,7 @@ def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
     )
 
 
-def check_gear(gear: Gear) -> None:
+def _check_gear(gear: Gear) -> None:
     """Refuse a gear that cannot be made; see the errors of `Gear`."""
     _check_numbers(gear)
     _check_rack(gear)
@@ -502,7 +489,7 @@ def _largest_rounding(gear: Gear) -> float:
     low, high = 0.0, 3.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        fits = generating_tool(gear, rounding=middle).room >= 0.0
+        fits = _generating_tool(gear, middle).room >= 0.0
         low, high = (middle, high) if fits else (low, middle)
     return math.floor(1e4 * low) / 1e4
 

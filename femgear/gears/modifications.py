@@ -149,7 +149,7 @@ def form_deviation(form: FlankForm, gear: Gear, roll):
 def _removed(modification: Modification, gear: Gear, roll: np.ndarray) -> np.ndarray:
     if isinstance(modification, MeasuredProfile):
         return np.interp(roll, modification.roll, modification.removed)
-    start, end = modification_range(modification, gear)
+    start, end = _modification_range(modification, gear)
     t = (roll - start) / (end - start)
     if isinstance(modification, ProfileSlope):
         return modification.amount * (0.5 - t)
@@ -158,7 +158,7 @@ def _removed(modification: Modification, gear: Gear, roll: np.ndarray) -> np.nda
     return modification.amount * np.maximum(t, 0.0) ** modification.power
 
 
-def modification_range(modification: Modification, gear: Gear) -> tuple[float, float]:
+def _modification_range(modification: Modification, gear: Gear) -> tuple[float, float]:
     """Roll lengths [m] of start and end of a law, of the first and the last point of a measured profile."""
     if isinstance(modification, MeasuredProfile):
         return modification.roll[0], modification.roll[-1]
@@ -229,7 +229,7 @@ def _problem(modification: Modification, gear: Gear):
     relief = isinstance(modification, TipRelief | RootRelief)
     if relief and not 0.1 <= modification.power <= 20.0:
         return "the power of the relief is not plausible", modification.power, "0.1 to 20"
-    start, end = modification_range(modification, gear)
+    start, end = _modification_range(modification, gear)
     low, high = sorted((gear.form_roll, gear.tip_roll))
     tolerance = 1e-6 * gear.module
     for name, value in (("start", start), ("end", end)):
@@ -306,7 +306,7 @@ def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
     rolls = [np.linspace(gear.form_roll, gear.tip_roll, 1001)]
     # laws are monotonic or parabolas between their ends, profiles straight between their points
     rolls += [
-        m.roll if isinstance(m, MeasuredProfile) else modification_range(m, gear) for m in form.modifications
+        m.roll if isinstance(m, MeasuredProfile) else _modification_range(m, gear) for m in form.modifications
     ]
     roll = np.concatenate(rolls)
     removed = form_deviation(form, gear, roll)

@@ -56,7 +56,7 @@ class PlanetarySet:
             gear = getattr(self, name)
             if gear.name != name:
                 object.__setattr__(self, name, replace(gear, name=name))
-        check_roles(self)
+        _check_roles(self)
         check_angles(self.planet_angles)
         # both raise when the base circles would overlap
         _ = self.working_pressure_angle_sun_planet, self.working_pressure_angle_planet_ring
@@ -102,7 +102,7 @@ class PlanetarySet:
     def path_sun_planet(self) -> tuple[float, float]:
         """Path coordinates [m] of first (planet tip) and last (sun tip) contact, 0 at the pitch point.
 
-        Undercut shortens the path to what is left of the profile.
+        Undercut shortens the path to what is left of the involute.
         """
         tangent = math.tan(self.working_pressure_angle_sun_planet)
         sun, planet = self.sun.base_radius * tangent, self.planet.base_radius * tangent
@@ -113,7 +113,7 @@ class PlanetarySet:
     def path_planet_ring(self) -> tuple[float, float]:
         """Path coordinates [m] of first (ring tip) and last (planet tip) contact, 0 at the pitch point.
 
-        Undercut shortens the path to what is left of the profile.
+        Undercut shortens the path to what is left of the involute.
         """
         tangent = math.tan(self.working_pressure_angle_planet_ring)
         planet, ring = self.planet.base_radius * tangent, self.ring.base_radius * tangent
@@ -205,8 +205,8 @@ def close_set(
     _check_find(find, centre_distance)
     if centre_distance is None:
         centre_distance = _free_distance(sun, planet, ring, find)
-    total = required_shift(sun, planet, centre_distance)  # x_sun + x_planet
-    difference = required_shift(planet, ring, centre_distance)  # x_ring - x_planet
+    total = zero_backlash_shift(sun, planet, centre_distance)  # x_sun + x_planet
+    difference = zero_backlash_shift(planet, ring, centre_distance)  # x_ring - x_planet
     x_sun, x_planet, x_ring = sun.profile_shift, planet.profile_shift, ring.profile_shift
     if "planet" in find:
         x_planet = x_ring - difference if "sun" in find else total - x_sun
@@ -310,7 +310,7 @@ def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> floa
     return pressure_angle_at(centre_distance, base)
 
 
-def free_centre_distance(one: Gear, two: Gear) -> float:
+def zero_backlash_distance(one: Gear, two: Gear) -> float:
     """Centre distance [m] at which two gears run without play, allowances left aside.
 
     External: ``inv(aw) = inv(a) + 2 tan(a) (x1 + x2)/(z1 + z2)`` (ISO 21771, eq. 60); internal (gear 2):
@@ -339,10 +339,10 @@ def free_centre_distance(one: Gear, two: Gear) -> float:
     return 0.5 * one.module * total * math.cos(alpha) / math.cos(angle)
 
 
-def required_shift(one: Gear, two: Gear, centre_distance: float) -> float:
+def zero_backlash_shift(one: Gear, two: Gear, centre_distance: float) -> float:
     """Sum (external) or difference ``x2 - x1`` (internal) of the shifts that run without play at a distance.
 
-    Inverse of `free_centre_distance` (ISO 21771, eq. 60).
+    Inverse of `zero_backlash_distance` (ISO 21771, eq. 60).
     """
     alpha, working = one.pressure_angle, working_pressure_angle(one, two, centre_distance)
     return _tooth_sum(one, two) * (inv(working) - inv(alpha)) / (2.0 * math.tan(alpha))
@@ -428,7 +428,7 @@ def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...
     return tuple(round(t) for t in turns)
 
 
-def check_roles(planetary: PlanetarySet) -> None:
+def _check_roles(planetary: PlanetarySet) -> None:
     """Refuse gears that cannot be sun, planet and ring of one set (E-ROLE, E-MODULE)."""
     sun, planet, ring = planetary.sun, planetary.planet, planetary.ring
     for gear, internal in ((sun, False), (planet, False), (ring, True)):
@@ -491,7 +491,7 @@ def _shifted(gear: Gear, shift: float) -> Gear:
 
 
 def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -> float:
-    first, second = free_centre_distance(sun, planet), free_centre_distance(planet, ring)
+    first, second = zero_backlash_distance(sun, planet), zero_backlash_distance(planet, ring)
     if find:
         return second if find == ("sun",) else first
     # what BACKLASH_TOLERANCE leaves open, as a change of the centre distance

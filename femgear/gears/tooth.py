@@ -76,7 +76,7 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     _check_sizes(flank_elements, refine)
     count = max(2, round(flank_elements * refine))
     sizes = _Sizes(unit=gear.module / refine, growth=GROWTH / refine)
-    rolls = np.linspace(gear.tip_roll, flank_end_roll(gear, count), 2 * count + 1)
+    rolls = np.linspace(gear.tip_roll, _flank_end_roll(gear, count), 2 * count + 1)
     flank = flank_points(gear, rolls)
     fillet, split = _fillet(gear, flank, rolls[-1], sizes)
     root = _root(gear, fillet, sizes)
@@ -150,7 +150,7 @@ def _last_edge(points: np.ndarray) -> float:
     return math.dist(points[-3], points[-1])
 
 
-def flank_end_roll(gear: Gear, flank_elements: int) -> float:
+def _flank_end_roll(gear: Gear, flank_elements: int) -> float:
     """Roll length [m] where the curve "flank" ends: the form radius, or one element from the base circle.
 
     Steps uniform in roll angle shrink to nothing at the base circle (edge length roll^2 / (2 rb)) and their

@@ -11,7 +11,7 @@ from validation.reference import gear_limits as limits
 from femgear.errors import GeometryError
 from femgear.gears import profile as iv
 from femgear.gears.gear import Gear
-from femgear.gears.planetary import free_centre_distance, required_shift, working_pressure_angle
+from femgear.gears.planetary import working_pressure_angle, zero_backlash_distance, zero_backlash_shift
 
 ALPHA = math.radians(20.0)
 
@@ -53,14 +53,14 @@ def test_centre_distance_and_shift_are_inverse_for_both_kinds_of_mesh():
     for internal, teeth, shifts in ((False, (17, 34), (0.3, 0.1)), (True, (20, 80), (-0.1, 0.25))):
         gears = pair(teeth, shifts, internal=internal)
         wanted = shifts[1] - shifts[0] if internal else sum(shifts)
-        found = required_shift(*gears, free_centre_distance(*gears))
+        found = zero_backlash_shift(*gears, zero_backlash_distance(*gears))
         assert found == pytest.approx(wanted, rel=1e-12)
 
 
 def test_positive_shift_of_an_internal_gear_moves_its_flank_outwards():
     # a wider ring lets the planet run at a larger centre distance, hence a larger working angle
     gears = pair((20, 80), (0.0, 0.2), internal=True)
-    assert working_pressure_angle(*gears, free_centre_distance(*gears)) > ALPHA
+    assert working_pressure_angle(*gears, zero_backlash_distance(*gears)) > ALPHA
 
 
 def test_centre_distance_below_the_base_circles_is_refused_with_the_limit():

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from femgear.gears import profile
 from femgear.gears.gear import Gear
-from femgear.gears.planetary import free_centre_distance, working_pressure_angle
+from femgear.gears.planetary import working_pressure_angle, zero_backlash_distance
 from femgear.gears.profile import BasicRack
 from validation.reference import gear_limits
 from validation.rows import REPEATED, Row, counted, printed
@@ -38,7 +38,7 @@ def _pair(teeth, shifts, degrees, *, internal=False, module=1.0, truncated=False
     one, two = (Gear(z, 1e-3 * module, alpha, x, 0.02, 1e-3, rack=rack) for z, x in zip(teeth, shifts))
     if internal:
         two = replace(two, internal=True, rim_radius=1.0)
-    distance = 1e3 * free_centre_distance(one, two)
+    distance = 1e3 * zero_backlash_distance(one, two)
     working = working_pressure_angle(one, two, 1e-3 * distance)
     reference = 0.5 * module * (teeth[1] - teeth[0] if internal else sum(teeth))
     cut = sum(shifts) - (distance - reference) / module if truncated else 0.0

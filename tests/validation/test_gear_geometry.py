@@ -18,8 +18,8 @@ from femgear.gears.planetary import (
     PlanetarySet,
     equal_planet_angles,
     feasible_angles,
-    free_centre_distance,
     working_pressure_angle,
+    zero_backlash_distance,
 )
 from femgear.gears.profile import BasicRack
 from validation.reference import gear_limits as limits
@@ -69,7 +69,7 @@ def test_limiting_contact_ratio_of_racks():
 def test_shifted_external_pair():
     """m = 3, 20/40, x = .3/.2."""
     pair = Gear(20, 3e-3, A20, 0.3, 0.02, 1e-3), Gear(40, 3e-3, A20, 0.2, 0.02, 1e-3)
-    distance = 1e3 * free_centre_distance(*pair)
+    distance = 1e3 * zero_backlash_distance(*pair)
     angle = working_pressure_angle(*pair, 1e-3 * distance)
     assert math.degrees(angle) == pytest.approx(22.3167069, abs=5e-8)
     assert distance == pytest.approx(91.4197646, abs=5e-8)
