@@ -55,9 +55,8 @@ def main(
     points
         Frequencies of the mesh-force spectra, 2 or more.
     """
-    from femgear.gears.checks import feasible_angles
     from femgear.gears.phasing import mesh_phasing, phasing_table, standard_lag
-    from femgear.gears.planetary import equal_planet_angles
+    from femgear.gears.planetary import equal_planet_angles, feasible_angles
     from femgear.gears.teeth_numbers import check_teeth, neighbouring_teeth
     from femgear.report.style import save_figure
     from femgear.trains.static.figures import mesh_force_spectra, phase_diagram, resultant_chart

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from validation.reference.plane_elasticity import edge_load
 
 from femgear.case.case import planetary_set, set_deviations
 from femgear.cli import main
@@ -13,11 +14,11 @@ from femgear.contact.flanks import flank_load_columns, flank_stations
 from femgear.contact.solve import solve_contact
 from femgear.errors import ContactError, FemgearError, GridError
 from femgear.fe.compliance import condense_sector, dof_pairs, interpolation
-from femgear.fe.elasticity import Material, edge_load, stiffness
+from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import mirror
 from femgear.fe.meshing import mesh_outline
 from femgear.gears.checks import check_set
-from femgear.gears.deviation_checks import check_deviations
+from femgear.gears.deviations import check_deviations
 from femgear.gears.tooth import half_sector
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static.stages import solve_static

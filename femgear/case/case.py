@@ -20,11 +20,15 @@ from femgear.case.problems import in_terms_of_the_case, rack_at
 from femgear.case.sections import Case, PlanetSection, RingSection, SunSection
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.gears.checks import check_set
-from femgear.gears.deviation_checks import check_deviations
-from femgear.gears.deviations import Ovality, Runout, SetDeviations, no_deviations, tooth_displacements
-from femgear.gears.fillet import BasicRack, PinionCutter
+from femgear.gears.deviations import (
+    Ovality,
+    Runout,
+    SetDeviations,
+    check_deviations,
+    no_deviations,
+    tooth_displacements,
+)
 from femgear.gears.gear import Gear
-from femgear.gears.helix import transverse_rack, transverse_tool
 from femgear.gears.modifications import (
     FlankForm,
     MeasuredProfile,
@@ -37,6 +41,7 @@ from femgear.gears.modifications import (
     roll_at,
 )
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
+from femgear.gears.profile import BasicRack, PinionCutter, transverse_rack, transverse_tool
 
 if TYPE_CHECKING:
     from femgear.case.deviations import ModificationSection

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from femgear.case.deviations import LARGEST_DEVIATION, ROUNDING, CarrierErrors, GearErrors
 from femgear.case.sections import Case, check_published
 from femgear.errors import CaseError, GeometryError
-from femgear.gears.checks import unheld_members
+from femgear.gears.kinematics import unheld_members
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet

@@ -120,7 +120,7 @@ def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
     """Force of every pin on its planet [N], shape (N, 2, P), in the frame of the carrier.
 
     What balances the mesh forces on the planet, whatever holds it: ``-(n_sp F_sp - n_pr F_pr)`` with the
-    normals of `femgear.gears.deviations.mesh_normals` on either side of the teeth.
+    normals of `femgear.gears.kinematics.mesh_normals` on either side of the teeth.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
     force, back_force : (2N, P) arrays
         On drive and back flanks [N].
     """
-    from femgear.gears.deviations import mesh_normals
+    from femgear.gears.kinematics import mesh_normals
 
     N = planetary_set.n_planets
     result = np.zeros((N, 2, np.shape(force)[1]))

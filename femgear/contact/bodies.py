@@ -208,8 +208,7 @@ def deformed_set(
 
 def _displacement(planetary_set, sector: Sector, cycle, position, acting):
     """Displacement of one body; `acting` lists (mesh, gear of the pair, drive flank) of its meshes."""
-    from femgear.fe.compliance import mirror_nodes, mirrored_columns
-    from femgear.fe.stress import cyclic_displacement
+    from femgear.fe.compliance import cyclic_displacement, mirror_nodes, mirrored_columns
 
     stations = flank_stations(sector.grid, sector.gear)
     left = flank_load_columns(sector.grid, stations)

@@ -21,9 +21,8 @@ from femgear.errors import CaseError
 
 if TYPE_CHECKING:
     from femgear.fe.compliance import SectorSchur
-    from femgear.fe.elasticity import Material
+    from femgear.fe.elasticity import BoundaryStress, Material
     from femgear.fe.grid import Grid
-    from femgear.fe.stress import BoundaryStress
     from femgear.gears.gear import Gear
 
 LEFT, RIGHT = 0, 1
@@ -139,7 +138,7 @@ def flank_load_columns(grid: Grid, stations: FlankStations) -> np.ndarray:
 
 def root_functionals(grid: Grid, gear: Gear, material: Material, *, state: str) -> BoundaryStress:
     """Tangential stress along fillet and root arc of the left flank, in the direction of the boundary."""
-    from femgear.fe.stress import tangential_stress
+    from femgear.fe.elasticity import tangential_stress
 
     names = tuple(name for name in ("fillet_left", "root_left") if name in grid.boundaries)
     return tangential_stress(grid, material, names[::-1] if gear.internal else names, state=state)

@@ -122,7 +122,7 @@ def force_directions(planetary_set: PlanetarySet, *, back: bool = False) -> tupl
 
     For the flanks that a positive torque on the sun loads, or the back flanks, in the frame of the carrier.
     """
-    from femgear.gears.deviations import mesh_normals
+    from femgear.gears.kinematics import mesh_normals
 
     normals = mesh_normals(planetary_set, back=back)
     return normals[: planetary_set.n_planets], normals[planetary_set.n_planets :]
@@ -138,7 +138,7 @@ def moving_members(
     ContactError
         E-MECHANISM: members float that the planets cannot hold.
     """
-    from femgear.gears.checks import unheld_members
+    from femgear.gears.kinematics import unheld_members
 
     floating = [name for name in ("sun", "carrier", "ring") if getattr(supports, name) == 0.0]
     loose = unheld_members(planetary_set, floating, both_flanks=both_flanks)

@@ -1,4 +1,4 @@
-"""Body compliance at flank points of a cyclic body: one tooth sector, one factorisation.
+"""Compliance and static displacement of a cyclic body from one tooth sector, factored once.
 
 The body is ``count`` copies of one mirror-symmetric sector. In the frame of each sector the cut
 displacements are tied by ``u_L(k) = Q u_R(k + 1)``, ``Q`` being the rotation by the sector angle
@@ -15,11 +15,17 @@ with ``S`` the Schur complement of the sector on its two cuts.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import GridError
-from femgear.fe.elasticity import symmetric_lu
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import SuperLU
+
+    from femgear.fe.grid import Grid
 
 
 @dataclass(frozen=True)
@@ -48,16 +54,19 @@ class SectorSchur:
     rotation: np.ndarray
 
 
-def symmetric_factor(matrix):
-    """Sparse LU of the stiffness of a sector, see `elasticity.symmetric_lu`.
+def symmetric_factor(matrix) -> SuperLU:
+    """Factor a sparse symmetric stiffness matrix (SuperLU in symmetric mode).
 
     Raises
     ------
     GridError
         When the matrix is singular: the body can move without straining.
     """
+    from scipy.sparse.linalg import splu
+
+    options = {"SymmetricMode": True}
     try:
-        return symmetric_lu(matrix)
+        return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise GridError(
             f"the stiffness matrix of a sector is singular ({error})",
@@ -66,18 +75,18 @@ def symmetric_factor(matrix):
         ) from error
 
 
-def dof_pairs(nodes):
+def dof_pairs(nodes) -> np.ndarray:
     """Degrees of freedom (x then y, node by node) of an array of nodes."""
     nodes = np.asarray(nodes)
     return (2 * nodes[:, None] + np.array([0, 1])).ravel()
 
 
-def boundary_nodes(grid, name):
+def boundary_nodes(grid: Grid, name: str) -> np.ndarray:
     """Sorted unique node numbers of a named boundary."""
     return np.unique(grid.boundaries[name])
 
 
-def mirror_nodes(grid):
+def mirror_nodes(grid: Grid) -> np.ndarray:
     """Permutation that maps every node to its mirror image in the x axis, shape (n,).
 
     Raises
@@ -85,20 +94,19 @@ def mirror_nodes(grid):
     GridError
         When the grid is not mirror-symmetric.
     """
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    points = np.asarray(grid.points)
-    distance, image = cKDTree(points).query(points * np.array([1.0, -1.0]))
-    if distance.max() > 1e-9 * np.abs(points).max():
+    distance, image = KDTree(grid.points).query(grid.points * np.array([1.0, -1.0]))
+    if distance.max() > 1e-9 * np.abs(grid.points).max():
         raise GridError(
             f"the sector grid is not mirror-symmetric (largest offset {distance.max():.2e} m)",
             code="E-GRID-MIRROR",
             remedy="make the sector by mirroring the grid of half a sector",
         )
-    return image
+    return np.asarray(image)
 
 
-def mirrored_columns(columns, image):
+def mirrored_columns(columns: np.ndarray, image: np.ndarray) -> np.ndarray:
     """Reflect displacement or load columns (2n, m) in the x axis."""
     result = np.empty_like(columns)
     result[2 * image] = columns[0::2]
@@ -106,7 +114,7 @@ def mirrored_columns(columns, image):
     return result
 
 
-def interpolation(grid, points):
+def interpolation(grid: Grid, points: np.ndarray):
     """Quadratic interpolation from the grid nodes to interior points.
 
     Parameters
@@ -126,7 +134,7 @@ def interpolation(grid, points):
     """
     from scipy.sparse import csr_array
 
-    nodes, triangles = np.asarray(grid.points), np.asarray(grid.triangles)
+    nodes, triangles = grid.points, grid.triangles
     corner = nodes[triangles[:, :3]]
     d1, d2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     area = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
@@ -179,16 +187,16 @@ def _curved_coordinates(element_nodes, points, b1, b2):
     return b1, b2
 
 
-def directional(weights, directions):
-    """Displacement columns (2n, m) from interpolation rows (m, n) and unit directions (m, 2)."""
-    dense = weights.toarray() if hasattr(weights, "toarray") else np.asarray(weights)
+def directional(weights, directions: np.ndarray) -> np.ndarray:
+    """Displacement columns (2n, m) from sparse interpolation rows (m, n) and unit directions (m, 2)."""
+    dense = weights.toarray()
     columns = np.empty((2 * dense.shape[1], dense.shape[0]))
     columns[0::2] = dense.T * directions[:, 0]
     columns[1::2] = dense.T * directions[:, 1]
     return columns
 
 
-def split_sector(grid, held):
+def split_sector(grid: Grid, held: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Free interior, right-cut and left-cut degrees of freedom of a sector, cuts ordered by radius."""
     fixed = boundary_nodes(grid, held) if held else np.zeros(0, int)
     cuts = []
@@ -201,14 +209,16 @@ def split_sector(grid, held):
     return dof_pairs(interior), dof_pairs(cuts[0]), dof_pairs(cuts[1])
 
 
-def cut_rotation(count, size):
+def cut_rotation(count: int, size: int) -> np.ndarray:
     """Block rotation (size, size) by the sector angle 2 pi / count."""
     angle = 2 * np.pi / count
     c, s = np.cos(angle), np.sin(angle)
     return np.kron(np.eye(size // 2), np.array([[c, -s], [s, c]]))
 
 
-def condense_sector(grid, stiffness, *, count, held, loads, observations):
+def condense_sector(
+    grid: Grid, stiffness, *, count: int, held: str | None, loads: np.ndarray, observations: np.ndarray
+) -> SectorSchur:
     """Condense a mirror-symmetric sector on its cuts.
 
     Loads and observations are given for the left half (y > 0) only; their mirror images are appended, so
@@ -228,29 +238,21 @@ def condense_sector(grid, stiffness, *, count, held, loads, observations):
         Nodal forces of the left loads.
     observations : (2n, mo) array
         Displacement functionals of the left observations.
-
-    Returns
-    -------
-    SectorSchur
     """
-    interior, right, left = split_sector(grid, held)
+    interior, _, left = parts = split_sector(grid, held)
     image = mirror_nodes(grid)
     adjoint = np.hstack([observations, mirrored_columns(observations, image)])[interior]
-    cut = np.concatenate([right, left])
-    solution = solve_interior(grid, stiffness, (interior, right, left), loads)
-    K_ib, X_b = solution.coupling, solution.cut
+    solution = solve_interior(grid, stiffness, parts, loads)
     full = np.zeros((stiffness.shape[0], loads.shape[1]))
     full[interior] = solution.loads
     X_f = np.hstack([solution.loads, mirrored_columns(full, image)[interior]])
-    S = stiffness.tocsc()[cut][:, cut].toarray() - K_ib.T @ X_b
-    S = 0.5 * (S + S.T)
     nl = len(left)
     return SectorSchur(
         count=count,
-        S=S.reshape(2, nl, 2, nl).transpose(0, 2, 1, 3),
+        S=solution.schur.reshape(2, nl, 2, nl).transpose(0, 2, 1, 3),
         C=adjoint.T @ X_f,
-        load_cut=-(K_ib.T @ X_f).reshape(2, nl, -1),
-        observation_cut=-(X_b.T @ adjoint).reshape(2, nl, -1),
+        load_cut=-(solution.coupling.T @ X_f).reshape(2, nl, -1),
+        observation_cut=-(solution.cut.T @ adjoint).reshape(2, nl, -1),
         rotation=cut_rotation(count, nl),
     )
 
@@ -261,20 +263,23 @@ class InteriorSolution:
 
     Parameters
     ----------
-    factor : object
-        Sparse factor of ``K_ii`` with a method ``solve``.
+    factor : SuperLU
+        Of ``K_ii``.
     coupling : sparse matrix (ni, 2 nb)
         ``K_ib``, right cut first.
     cut, loads : (ni, 2 nb), (ni, m) arrays
+    schur : (2 nb, 2 nb) array
+        Stiffness of the sector on its cuts, ``K_bb - K_ib^T K_ii^-1 K_ib`` [N/m].
     """
 
-    factor: object
-    coupling: object
+    factor: SuperLU
+    coupling: csc_array
     cut: np.ndarray
     loads: np.ndarray
+    schur: np.ndarray
 
 
-def solve_interior(grid, stiffness, parts, loads) -> InteriorSolution:
+def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> InteriorSolution:
     """Factor the interior of a mirror-symmetric sector; the right cut is the mirror image of the left.
 
     Parameters
@@ -285,33 +290,24 @@ def solve_interior(grid, stiffness, parts, loads) -> InteriorSolution:
         Interior, right and left degrees of freedom, see `split_sector`.
     loads : (2n, m) array
         They must not act on the cuts.
+
+    Raises
+    ------
+    GridError
+        A load on a cut (E-GRID-LOAD), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
     interior, right, left = parts
     cut = np.concatenate([right, left])
-    _check_interior(loads, cut)
-    rows = stiffness.tocsc()[interior]
+    if np.any(loads[cut]):
+        raise GridError("a load acts on a cut of the sector", code="E-GRID-LOAD")
+    stiffness = stiffness.tocsc()
+    rows = stiffness[interior]
     K_ii, K_ib = rows[:, interior], rows[:, cut]
     nl = len(left)
     rhs = np.hstack([K_ib[:, nl:].toarray(), loads[interior]])
     factor = symmetric_factor(K_ii)
     solution = factor.solve(rhs)
-    _check_residual(K_ii, solution, rhs)
-    full = np.zeros((stiffness.shape[0], nl))
-    full[interior] = solution[:, :nl]
-    # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
-    reflected = mirrored_columns(full, mirror_nodes(grid))[interior] * np.tile([1.0, -1.0], nl // 2)
-    return InteriorSolution(factor, K_ib, np.hstack([reflected, solution[:, :nl]]), solution[:, nl:])
-
-
-def _check_interior(loads, cut):
-    if np.abs(loads[cut]).max(initial=0.0) > 0.0:
-        raise GridError("a load acts on a cut of the sector", code="E-GRID-LOAD")
-
-
-def _check_residual(matrix, solution, rhs):
-    """Refuse a solution that is not finite or does not satisfy the equations."""
-    scale = np.abs(rhs).max()
-    residual = np.abs(matrix @ solution - rhs).max() / scale if scale else 0.0
+    residual = np.abs(K_ii @ solution - rhs).max() / np.abs(rhs).max()
     if not np.isfinite(residual) or residual > 1e-8:
         raise GridError(
             f"the sector solution has a relative residual of {residual:.1e}",
@@ -319,9 +315,16 @@ def _check_residual(matrix, solution, rhs):
             limit="1e-8",
             remedy="the body is not held, or its grid is distorted",
         )
+    full = np.zeros((stiffness.shape[0], nl))
+    full[interior] = solution[:, :nl]
+    # the mirror image of a unit y displacement of the left cut is a negative one of the right cut
+    reflected = mirrored_columns(full, mirror_nodes(grid))[interior] * np.tile([1.0, -1.0], nl // 2)
+    X_b = np.hstack([reflected, solution[:, :nl]])
+    S = stiffness[cut][:, cut].toarray() - K_ib.T @ X_b
+    return InteriorSolution(factor, K_ib, X_b, solution[:, nl:], 0.5 * (S + S.T))
 
 
-def cyclic_harmonics(schur, harmonics):
+def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     """Compliance ``H_n`` of each cyclic harmonic, shape (len(harmonics), n_observations, n_loads)."""
     Q, S = schur.rotation, schur.S
     RL, own = S[0, 1] @ Q, S[0, 0] + Q.T @ S[1, 1] @ Q
@@ -331,28 +334,65 @@ def cyclic_harmonics(schur, harmonics):
         phase = np.exp(2j * np.pi * n / schur.count)
         A = own + phase * RL + np.conj(phase) * RL.T
         if n % schur.count in (0, 1, schur.count - 1):  # rotation is the harmonic 0, translation the first
-            _check_held(A)
+            values = np.linalg.eigvalsh(A)
+            if values[0] < 1e-13 * values[-1]:
+                raise GridError(
+                    "the body can move without straining: nothing holds it",
+                    code="E-GRID-FREE",
+                    remedy="hold its bore or its rim, or put it on a foundation",
+                )
         P_f = schur.load_cut[0] + np.conj(phase) * tied_load
         P_d = schur.observation_cut[0] + np.conj(phase) * tied_observation
         result[row] = schur.C + P_d.conj().T @ np.linalg.solve(A, P_f)
     return result
 
 
-def _check_held(tied):
-    """Refuse a body that can move as a whole: a tied sector without stiffness in some direction."""
-    values = np.linalg.eigvalsh(tied)
-    if values[0] < 1e-13 * values[-1]:
-        raise GridError(
-            "the body can move without straining: nothing holds it",
-            code="E-GRID-FREE",
-            remedy="hold its bore or its rim, or put it on a foundation",
-        )
-
-
-def tooth_compliance(schur):
+def tooth_compliance(schur: SectorSchur) -> np.ndarray:
     """Compliance between any two teeth, shape (count, n_observations, n_loads) [m/N].
 
     Entry ``[k]`` is the displacement on tooth ``i`` per unit load on tooth ``i - k``.
     """
     harmonics = cyclic_harmonics(schur, np.arange(schur.count // 2 + 1))
     return np.fft.irfft(harmonics, n=schur.count, axis=0)
+
+
+def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str | None) -> np.ndarray:
+    """Static displacement of every sector in its own frame.
+
+    The loads are transformed over the sectors, each harmonic is solved on the sector with its cuts tied, and
+    the solutions are transformed back.
+
+    Parameters
+    ----------
+    grid : Grid
+        Sector with boundaries ``cut_left``, ``cut_right`` and `held`.
+    stiffness : (2n, 2n) sparse matrix
+        [N/m].
+    loads : (count, 2n) array
+        Nodal forces of each sector in its own frame [N], none on the cuts.
+    held : str or None
+        Boundary that cannot move.
+
+    Returns
+    -------
+    (count, n, 2) array
+        [m].
+    """
+    count, size = loads.shape
+    inner, right, left = parts = split_sector(grid, held)
+    forces = np.fft.rfft(loads, axis=0).T
+    n_h, nb = forces.shape[1], len(right)
+    solution = solve_interior(grid, stiffness, parts, np.hstack([forces.real, forces.imag]))
+    X_f = solution.loads[:, :n_h] + 1j * solution.loads[:, n_h:]
+    on_cut = -(solution.coupling.T @ X_f).T
+    tie = np.empty((n_h, 2 * nb, nb), complex)
+    tie[:, :nb] = np.eye(nb)
+    phase = np.exp(2j * np.pi * np.arange(n_h) / count)
+    tie[:, nb:] = phase[:, None, None] * cut_rotation(count, nb)
+    adjoint = tie.conj().transpose(0, 2, 1)
+    u_right = np.linalg.solve(adjoint @ solution.schur @ tie, adjoint @ on_cut[:, :, None])
+    u_cut = (tie @ u_right)[:, :, 0]
+    field = np.zeros((n_h, size), complex)
+    field[:, inner] = (X_f - solution.cut @ u_cut.T).T
+    field[:, np.concatenate([right, left])] = u_cut
+    return np.fft.irfft(field, n=count, axis=0).reshape(count, -1, 2)

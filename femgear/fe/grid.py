@@ -1,7 +1,4 @@
-"""Second-order triangle grids: the data, mirror images, rotated copies, checks, and files.
-
-Files are written whole and with a checksum, and read with suspicion.
-"""
+"""Second-order triangle grids: the data, mirror images, rotated copies, checks, and files with a checksum."""
 
 from __future__ import annotations
 
@@ -11,10 +8,17 @@ import os
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import GridError, StorageError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+# boundaries of a half sector that `mirror` also gives as one
+JOINED = ("tip", "rim", "root")
 
 
 @dataclass(frozen=True)
@@ -54,11 +58,6 @@ class Grid:
 def ordered_nodes(grid: Grid, name: str) -> np.ndarray:
     """Nodes along a connected boundary: start, mid, end, mid, ... in the order of its edges.
 
-    Parameters
-    ----------
-    grid : Grid
-    name : str
-
     Returns
     -------
     (2 k + 1,) int array
@@ -87,40 +86,33 @@ def boundary_edges(grid: Grid, name: str) -> np.ndarray:
     return grid.boundaries[name]
 
 
-def mirror(
-    grid: Grid,
-    *,
-    mirrored: tuple[str, ...] | None = None,
-    joined: tuple[str, ...] = ("tip", "rim", "root"),
-    symmetry: str = "symmetry",
-) -> Grid:
+def mirror(grid: Grid) -> Grid:
     """Reflect the upper half of a sector in the x axis; the nodes given keep their numbers.
 
     Parameters
     ----------
     grid : Grid
-        The half with y >= 0.
-    mirrored : tuple of str, optional
-        Boundaries to carry over, with the suffixes ``_left`` (y > 0) and ``_right`` (y < 0); all but
-        the symmetry line when omitted.
-    joined : tuple of str
-        Boundaries that also appear as one, without suffix.
-    symmetry : str
-        Boundary on the x axis along which the halves are joined; its name is dropped.
+        The half with y >= 0. Along its boundary ``symmetry``, on the x axis, the halves are joined.
+
+    Returns
+    -------
+    Grid
+        All other boundaries with the suffixes ``_left`` (y > 0) and ``_right`` (y < 0); tip, rim and root
+        also as one, without suffix.
 
     Raises
     ------
     GridError
         When the symmetry line is missing or not on the x axis.
     """
-    line = np.unique(boundary_edges(grid, symmetry))
+    line = np.unique(boundary_edges(grid, "symmetry"))
     size = np.ptp(grid.points, axis=0).max()
     offset = np.abs(grid.points[line, 1]).max()
     if offset > 1e-9 * size:
         raise GridError(
-            f"the boundary {symmetry!r} leaves the x axis by {offset:.3e} m",
+            f"the boundary 'symmetry' leaves the x axis by {offset:.3e} m",
             code="E-GRID-MIRROR",
-            key=symmetry,
+            key="symmetry",
         )
     n = grid.n_nodes
     image = np.full(n, -1)
@@ -131,8 +123,14 @@ def mirror(
     upper[line, 1] = 0.0
     points = np.vstack([upper, upper[new] * [1.0, -1.0]])
     triangles = np.vstack([grid.triangles, image[grid.triangles][:, [0, 2, 1, 5, 4, 3]]])
-    names = [name for name in grid.boundaries if name != symmetry] if mirrored is None else mirrored
-    boundaries = _both_halves({name: boundary_edges(grid, name) for name in names}, image, joined)
+    boundaries = {}
+    for name, left in grid.boundaries.items():
+        if name == "symmetry":
+            continue
+        right = image[left][::-1, [1, 0, 2]]
+        boundaries[f"{name}_left"], boundaries[f"{name}_right"] = left, right
+        if name in JOINED:
+            boundaries[name] = np.vstack([right, left] if right[-1, 1] == left[0, 0] else [left, right])
     m = len(grid.triangles)
     regions = {name: np.concatenate([e, e + m]) for name, e in grid.regions.items()}
     return Grid(points, triangles, boundaries, regions)
@@ -234,20 +232,6 @@ def jacobian_bounds(grid: Grid) -> np.ndarray:
     return np.stack([control.min(axis=1), control.max(axis=1)], axis=1)
 
 
-def quality(grid: Grid) -> np.ndarray:
-    """Shape quality of every element, 1 for an equilateral straight-sided triangle, shape (m,).
-
-    ``4 sqrt(3) A / sum l^2`` (Bank) times the ratio of the bounds of the Jacobian determinant; not
-    positive where the element may be folded.
-    """
-    corner = grid.points[grid.triangles[:, :3]]
-    side = np.roll(corner, -1, axis=1) - corner
-    area = 0.5 * (side[:, 0, 0] * side[:, 1, 1] - side[:, 0, 1] * side[:, 1, 0])
-    bound = jacobian_bounds(grid)
-    top = np.where(bound[:, 1] > 0, bound[:, 1], np.inf)
-    return 4 * np.sqrt(3) * area / (side**2).sum(axis=(1, 2)) * bound[:, 0] / top
-
-
 def check_grid(grid: Grid) -> None:
     """Refuse numbers that are not finite, unused nodes, and inverted or folded elements.
 
@@ -278,52 +262,36 @@ def check_grid(grid: Grid) -> None:
         )
 
 
-def write_grid(path, grid: Grid, *, point_data: dict[str, np.ndarray] | None = None) -> None:
-    """Write a grid through meshio, under a temporary name first.
+def write_grid(path: Path, grid: Grid) -> None:
+    """Write a grid as Gmsh 2.2 binary with a checksum, under a temporary name first.
 
-    Parameters
-    ----------
-    path : path
-        ``.msh`` (Gmsh 2.2 binary; boundaries and regions as named physical groups, with a checksum: what
-        `read_grid` takes) or ``.vtu`` (ParaView; triangles with the number of their region).
-    grid : Grid
-    point_data : dict of str to (n,) or (n, 2) array, optional
-        Fields at the nodes; two components are padded to three for VTU.
+    Boundaries and regions are named physical groups.
 
     Raises
     ------
     StorageError
-        When the file cannot be written or its ending is neither.
+        When the file cannot be written.
     """
     import meshio
 
-    path = Path(path)
     names = list(grid.regions)
     tag = np.zeros(len(grid.triangles), dtype=np.int32)
     for number, name in enumerate(names, start=1):
         tag[grid.regions[name]] = number
     points = np.column_stack([grid.points, np.zeros(grid.n_nodes)])
-    cells, tags = [("triangle6", grid.triangles)], [tag]
-    fields = {name: _three_components(value) for name, value in (point_data or {}).items()}
-    if path.suffix == ".msh":
-        groups = {name: np.array([number, 2]) for number, name in enumerate(names, start=1)}
-        for number, (name, edges) in enumerate(grid.boundaries.items(), start=len(names) + 1):
-            groups[name] = np.array([number, 1])
-            cells.append(("line3", edges))
-            tags.append(np.full(len(edges), number, dtype=np.int32))
-        data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-        mesh, kind = meshio.Mesh(points, cells, fields, data, groups), "gmsh22"
-    elif path.suffix == ".vtu":
-        mesh, kind = meshio.Mesh(points, cells, fields, {"region": tags}), "vtu"
-    else:
-        raise StorageError(
-            f"a grid cannot be written as {path.name!r}", code="E-GRID-FORMAT", limit=".msh or .vtu"
-        )
+    cells: list[tuple[str, ArrayLike] | meshio.CellBlock] = [("triangle6", grid.triangles)]
+    tags: list[ArrayLike] = [tag]
+    groups = {name: np.array([number, 2]) for number, name in enumerate(names, start=1)}
+    for number, (name, edges) in enumerate(grid.boundaries.items(), start=len(names) + 1):
+        groups[name] = np.array([number, 1])
+        cells.append(("line3", edges))
+        tags.append(np.full(len(edges), number, dtype=np.int32))
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     temporary = path.with_name(f".{path.stem}.{os.getpid()}-{threading.get_ident()}{path.suffix}")
     try:
-        mesh.write(temporary, file_format=kind)
-        if kind == "gmsh22":
-            _seal(temporary)
+        meshio.Mesh(points, cells, {}, data, groups).write(temporary, file_format="gmsh22")
+        written = temporary.read_bytes()
+        temporary.write_bytes(written + _seal_of(written))
         os.replace(temporary, path)
     except OSError as error:
         with contextlib.suppress(OSError):
@@ -331,7 +299,7 @@ def write_grid(path, grid: Grid, *, point_data: dict[str, np.ndarray] | None = N
         raise StorageError(f"cannot write the grid {path}: {error}", code="E-GRID-WRITE") from error
 
 
-def read_grid(path) -> Grid:
+def read_grid(path: Path) -> Grid:
     """Read a grid that `write_grid` has written as ``.msh``.
 
     Raises
@@ -342,16 +310,14 @@ def read_grid(path) -> Grid:
     import meshio
 
     try:
-        _check_seal(path)
+        data = path.read_bytes()
+        start = data.rfind(b"$Comments\n")
+        if start < 0 or data[start:] != _seal_of(data[:start]):
+            raise ValueError("its checksum is missing or is not that of its contents")
         mesh = meshio.read(path, file_format="gmsh")
-        tags = mesh.cell_data["gmsh:physical"]
-        blocks = [
-            (block.type, np.asarray(block.data), np.asarray(tag)) for block, tag in zip(mesh.cells, tags)
-        ]
-        triangles = np.vstack([data for kind, data, _ in blocks if kind == "triangle6"])
-        region = np.concatenate([tag for kind, _, tag in blocks if kind == "triangle6"])
-        edges = np.vstack([np.empty((0, 3), dtype=int)] + [d for kind, d, _ in blocks if kind == "line3"])
-        edge_tag = np.concatenate([np.empty(0, dtype=int)] + [t for kind, _, t in blocks if kind == "line3"])
+        triangles, edges = mesh.get_cells_type("triangle6"), mesh.get_cells_type("line3")
+        region = mesh.get_cell_data("gmsh:physical", "triangle6")
+        edge_tag = mesh.get_cell_data("gmsh:physical", "line3") if len(edges) else np.empty(0, int)
         groups = {str(name): (int(value[0]), int(value[1])) for name, value in mesh.field_data.items()}
         boundaries = {name: edges[edge_tag == number] for name, (number, dim) in groups.items() if dim == 1}
         regions = {
@@ -375,38 +341,11 @@ def _read_only(value, dtype):
     return array
 
 
-def _both_halves(boundaries, image, joined):
-    result = {}
-    for name, left in boundaries.items():
-        right = image[left][::-1, [1, 0, 2]]
-        result[f"{name}_left"], result[f"{name}_right"] = left, right
-        if name in joined:
-            result[name] = np.vstack([right, left] if right[-1, 1] == left[0, 0] else [left, right])
-    return result
-
-
 def _turn(points, angle):
     c, s = np.cos(angle), np.sin(angle)
     return points @ np.array([[c, s], [-s, c]])
 
 
-def _three_components(value):
-    value = np.asarray(value, dtype=float)
-    return np.column_stack([value, np.zeros(len(value))]) if value.shape[1:] == (2,) else value
-
-
-def _seal(path):
-    """Append the SHA-256 of everything before it, in a section of comments that other readers skip."""
-    data = path.read_bytes()
-    path.write_bytes(data + _seal_of(data))
-
-
-def _check_seal(path):
-    data = Path(path).read_bytes()
-    start = data.rfind(b"$Comments\n")
-    if start < 0 or data[start:] != _seal_of(data[:start]):
-        raise ValueError("its checksum is missing or is not that of its contents")
-
-
-def _seal_of(data):
+def _seal_of(data: bytes) -> bytes:
+    """SHA-256 of everything before it, in a section of comments that other readers skip."""
     return f"$Comments\nsha256 {hashlib.sha256(data).hexdigest()}\n$EndComments\n".encode()

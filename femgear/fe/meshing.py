@@ -17,10 +17,12 @@ import numpy as np
 
 from femgear.errors import GridError, StorageError
 from femgear.fe.grid import Grid, check_grid, read_grid, write_grid
-from femgear.fe.outline import check_outline, estimate_elements
+from femgear.fe.outline import Plan, check_outline, estimate_elements
 
 FORMAT = "1"  # raise when the way grids are made changes, so that cached ones are not reused
 WORKER = Path(__file__).with_name("_gmsh_worker.py")
+TIME_LIMIT = 60.0  # seconds after which the mesh generator is killed
+MAX_ELEMENTS = 200_000  # outlines whose estimated number of elements is larger are refused
 PACKAGES = {
     "libGLU": "libglu1-mesa",
     "libGL": "libgl1",
@@ -32,13 +34,7 @@ PACKAGES = {
 }
 
 
-def mesh_outline(
-    outline,
-    *,
-    cache: Path | None = None,
-    time_limit: float = 60.0,
-    max_elements: int = 200_000,
-) -> Grid:
+def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
     """Mesh an outline with six-node triangles whose edge nodes are exactly the points of the outline.
 
     Gmsh triangulates the polygon of corners (one element edge for each pair of neighbouring corners,
@@ -52,10 +48,6 @@ def mesh_outline(
     cache : path, optional
         Folder in which grids are kept under the hash of their content; None to keep nothing. Where it cannot
         be written there is a warning.
-    time_limit : float
-        Seconds after which the mesh generator is killed.
-    max_elements : int
-        Refuse outlines whose estimated number of elements is larger.
 
     Returns
     -------
@@ -70,27 +62,25 @@ def mesh_outline(
     """
     plan = check_outline(outline)
     expected = estimate_elements(plan)
-    if expected > max_elements:
+    if expected > MAX_ELEMENTS:
         raise GridError(
             f"the grid would have about {expected:.3g} elements",
             code="E-GRID-COUNT",
             value=f"{expected:.3g}",
-            limit=f"at most {max_elements}",
+            limit=f"at most {MAX_ELEMENTS}",
             remedy="use fewer points along the outline",
         )
-    if cache is None:
-        return _mesh_plan(plan, time_limit)
-    return _mesh_cached(plan, Path(cache), time_limit)
+    return _mesh_plan(plan) if cache is None else _mesh_cached(plan, Path(cache))
 
 
-def _mesh_cached(plan, folder, time_limit):
+def _mesh_cached(plan: Plan, folder: Path) -> Grid:
     path = folder / f"{_content_hash(plan)}.msh"
     if os.path.exists(path):
         try:
             return _check_cached(read_grid(path), plan)
         except (StorageError, GridError):
             pass  # a damaged file in the cache is made again and replaced
-    grid = _mesh_plan(plan, time_limit)
+    grid = _mesh_plan(plan)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_grid(path, grid)
@@ -106,7 +96,7 @@ def _warn_uncached(folder, error):
     warnings.warn(f"grids are made but not kept: cannot write into {folder} ({reason})", stacklevel=2)
 
 
-def _check_cached(grid, plan):
+def _check_cached(grid: Grid, plan: Plan) -> Grid:
     check_grid(grid)
     same = set(grid.regions) == set(plan.faces) and np.array_equal(
         grid.points[: len(plan.points)], plan.points
@@ -121,30 +111,19 @@ def _check_cached(grid, plan):
     return grid
 
 
-def mesh_outlines(
-    outlines,
-    *,
-    cache: Path | None = None,
-    time_limit: float = 60.0,
-    max_elements: int = 200_000,
-    processes: int | None = None,
-) -> tuple[Grid, ...]:
-    """Mesh several outlines at once, see `mesh_outline`; by default as many processes as cores.
+def mesh_outlines(outlines, *, cache: Path | None = None) -> tuple[Grid, ...]:
+    """Mesh several outlines at once, see `mesh_outline`, in as many processes as there are cores.
 
     Raises
     ------
     GridError
         The first error of any outline, after all processes have ended.
     """
-
-    def one(outline):
-        return mesh_outline(outline, cache=cache, time_limit=time_limit, max_elements=max_elements)
-
-    with ThreadPoolExecutor(max_workers=processes or os.cpu_count() or 1) as pool:
-        return tuple(pool.map(one, outlines))
+    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        return tuple(pool.map(lambda outline: mesh_outline(outline, cache=cache), outlines))
 
 
-def _content_hash(plan):
+def _content_hash(plan: Plan) -> str:
     try:
         gmsh = metadata.version("gmsh")
     except metadata.PackageNotFoundError as error:
@@ -156,15 +135,15 @@ def _content_hash(plan):
     return digest.hexdigest()[:32]
 
 
-def _mesh_plan(plan, time_limit):
-    result = _run_gmsh(plan, time_limit)
+def _mesh_plan(plan: Plan) -> Grid:
+    result = _run_gmsh(plan)
     points = np.vstack([plan.points, result["points"][len(plan.points) :]])
     grid = _second_order(plan, points, result["triangles"], result["face"])
     check_grid(grid)
     return grid
 
 
-def _run_gmsh(plan, time_limit):
+def _run_gmsh(plan: Plan) -> dict[str, np.ndarray]:
     # Gmsh works with absolute tolerances: hand it an outline of unit size at the origin, with rounding
     # errors removed so that they do not decide between equally good triangulations
     centre, size = plan.points.mean(axis=0), plan.size
@@ -174,7 +153,7 @@ def _run_gmsh(plan, time_limit):
         "segments": plan.segments,
         "loops": np.concatenate(plan.loops),
         "loop_ends": np.cumsum([len(loop) for loop in plan.loops]),
-        "time_limit": time_limit,
+        "time_limit": TIME_LIMIT,
     }
     with tempfile.TemporaryDirectory(prefix="femgear-") as folder:
         source, target = Path(folder) / "outline.npz", Path(folder) / "grid.npz"
@@ -182,11 +161,11 @@ def _run_gmsh(plan, time_limit):
         command = [sys.executable, "-P", str(WORKER), str(source), str(target)]
         try:
             done = subprocess.run(
-                command, timeout=time_limit, capture_output=True, text=True, stdin=subprocess.DEVNULL
+                command, timeout=TIME_LIMIT, capture_output=True, text=True, stdin=subprocess.DEVNULL
             )
         except subprocess.TimeoutExpired as error:
             raise GridError(
-                f"Gmsh was stopped: no grid after {time_limit:g} s",
+                f"Gmsh was stopped: no grid after {TIME_LIMIT:g} s",
                 code="E-GRID-TIMEOUT",
                 remedy="use fewer points along the outline or a longer time limit",
             ) from error
@@ -214,7 +193,7 @@ def _library_error(text):
     return GridError(f"Gmsh cannot be loaded: {text}", code="E-GRID-LIBRARY", remedy=remedy)
 
 
-def _second_order(plan, points, corners, face):
+def _second_order(plan: Plan, points, corners, face) -> Grid:
     """Add mid-side nodes: the given ones on boundary and interfaces, half-way ones inside."""
     n = len(points)
     pairs = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)

@@ -63,11 +63,7 @@ def check_outline(outline) -> Plan:
     Parameters
     ----------
     outline : Outline
-        Or any object with the same fields; ``regions`` may be absent.
-
-    Returns
-    -------
-    Plan
+        Or any object with the same fields.
 
     Raises
     ------
@@ -94,7 +90,7 @@ def check_outline(outline) -> Plan:
     _check_crossing(points, segments, names, size)
     area = _check_area(points[segments[:n_boundary, 0]], size)
     loops = _faces(points, segments, n_boundary, area, names)
-    faces = _name_faces(points, segments, loops, tuple(getattr(outline, "regions", ())))
+    faces = _name_faces(points, segments, loops, tuple(outline.regions))
     return Plan(points, segments, mids, names, n_boundary, loops, faces)
 
 
@@ -157,9 +153,9 @@ def _join(curves, inner, size):
 
 
 def _check_distinct(points, size):
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    pairs = cKDTree(points).query_pairs(CLOSE * size, output_type="ndarray")
+    pairs = KDTree(points).query_pairs(CLOSE * size, output_type="ndarray")
     if len(pairs):
         a, b = points[pairs[0]]
         raise GridError(

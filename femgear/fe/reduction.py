@@ -8,10 +8,14 @@ for each number ``n`` of nodal diameters (Thomas 1979), whose nodal diameter is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.fe.compliance import cut_rotation, solve_interior, split_sector
+
+if TYPE_CHECKING:
+    from femgear.fe.grid import Grid
 
 
 @dataclass(frozen=True)
@@ -54,8 +58,7 @@ class CyclicModes:
     @property
     def norm(self) -> np.ndarray:
         """Factor of every mode that makes its coordinates have unit modal mass."""
-        single = (self.nodal_diameter == 0) | (2 * self.nodal_diameter == self.count)
-        return np.sqrt(np.where(single, 1.0, 2.0) / self.count)
+        return np.sqrt(np.where(self.paired, 2.0, 1.0) / self.count)
 
     @property
     def paired(self) -> np.ndarray:
@@ -75,7 +78,9 @@ class SectorBasis:
     rotation: np.ndarray
 
 
-def sector_basis(grid, stiffness, mass, *, count, loads, interior_modes=16) -> SectorBasis:
+def sector_basis(
+    grid: Grid, stiffness, mass, *, count: int, loads: np.ndarray, interior_modes: int = 16
+) -> SectorBasis:
     """Reduce one sector to its cuts, `interior_modes` fixed-interface modes and the static load shapes.
 
     Parameters
@@ -90,13 +95,14 @@ def sector_basis(grid, stiffness, mass, *, count, loads, interior_modes=16) -> S
     """
     from scipy.sparse.linalg import LinearOperator, eigsh
 
-    inner, right, left = split_sector(grid, None)
+    inner, right, left = parts = split_sector(grid, None)
     cut = np.concatenate([right, left])
     stiffness, mass = stiffness.tocsc(), mass.tocsc()
     K_ii, M_ii = stiffness[inner][:, inner], mass[inner][:, inner]
-    solution = solve_interior(grid, stiffness, (inner, right, left), loads)
+    solution = solve_interior(grid, stiffness, parts, loads)
     constraint, static = -solution.cut, solution.loads
-    inverse = LinearOperator(K_ii.shape, matvec=solution.factor.solve, dtype=float)
+    # the types that scipy's constructor shows are those of a subclass
+    inverse = LinearOperator(K_ii.shape, matvec=solution.factor.solve, dtype=float)  # type: ignore[call-arg]
     start = np.cos(np.arange(len(inner)) + 1.0)
     _, modes = eigsh(K_ii, k=interior_modes, M=M_ii, sigma=0.0, OPinv=inverse, v0=start)
     static = static - modes @ (modes.T @ (M_ii @ static))
@@ -106,11 +112,10 @@ def sector_basis(grid, stiffness, mass, *, count, loads, interior_modes=16) -> S
     full_c[inner], full_c[cut] = constraint, np.eye(len(cut))
     full_i = np.zeros((stiffness.shape[0], interior.shape[1]))
     full_i[inner] = interior
-    S = stiffness[cut][:, cut].toarray() + solution.coupling.T @ constraint
     basis = np.hstack([full_c, full_i])
     reduced_mass = basis.T @ (mass @ basis)
     return SectorBasis(
-        stiffness_cut=0.5 * (S + S.T),
+        stiffness_cut=solution.schur,
         stiffness_interior=interior.T @ (K_ii @ interior),
         mass=0.5 * (reduced_mass + reduced_mass.T),
         constraint=full_c,
@@ -135,10 +140,6 @@ def cyclic_modes(
         [Hz]; at least one mode is kept for each nodal diameter.
     static_correction : bool
         Append the part of the static response to the loads that the kept modes miss.
-
-    Returns
-    -------
-    CyclicModes
     """
     recovery = np.hstack([basis.constraint, basis.interior])
     on_basis = recovery.T @ loads
@@ -171,7 +172,7 @@ def _one_diameter(basis: SectorBasis, count, n, loads, max_frequency, static_cor
     T[: 2 * nb, :nb], T[2 * nb :, nb:] = tie, np.eye(nv)
     M = T.conj().T @ basis.mass @ T
     if n == 0 or 2 * n == count:
-        K, M, T = K.real, M.real, T.real
+        K, M, T = np.real(K), np.real(M), np.real(T)
     values, vectors = eigh(K, M)
     kept = max(int(np.searchsorted(values, (2 * np.pi * max_frequency) ** 2)), 1)
     chosen = vectors[:, :kept]

@@ -164,8 +164,12 @@ def _half_section(steps, refine):
     for k, step in enumerate(steps):
         outer += [(0.5 * step.outer_diameter, z[k]), (0.5 * step.outer_diameter, z[k + 1])]
         inner += [(0.5 * step.inner_diameter, z[k]), (0.5 * step.inner_diameter, z[k + 1])]
-    chains = [("held", [inner[0], outer[0]]), ("outside", outer), ("coupled", [outer[-1], inner[-1]])]
-    chains.append(("inside", inner[::-1]))
+    chains = (
+        ("held", [inner[0], outer[0]]),
+        ("outside", outer),
+        ("coupled", [outer[-1], inner[-1]]),
+        ("inside", inner[::-1]),
+    )
     return Outline(tuple((name, _divided(corners, size)) for name, corners in chains))
 
 

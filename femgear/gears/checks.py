@@ -1,12 +1,7 @@
 """Can the set be assembled, and does it run: refusals with numbers, and warnings.
 
 `check_set` looks at assembly, neighbours, play, contact ratios and clearances, and at contact that a mesh
-must not have (`check_interference`): below the involute, on root fillets, between passing tips.
-
-`unheld_members` tells whether the flanks of the planets alone keep members without a support in place.
-Contacts only push: forces of the loaded flanks, none below zero, must balance the torque and leave no force
-on a member that floats. By Farkas' lemma (1902) there are such forces, or there is a motion that the load
-drives and no flank stops. A member that floats alone must not slide past all flanks either.
+must not have: below the involute, on root fillets, between passing tips.
 """
 
 from __future__ import annotations
@@ -18,15 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears import involute
-from femgear.gears.deviations import mesh_normals
-from femgear.gears.fillet import fillet_point
 from femgear.gears.gear import GeometryWarning, half_thickness_angle, tooth_thickness, working_half_angles
-from femgear.gears.planetary import BACKLASH_TOLERANCE
+from femgear.gears.planetary import BACKLASH_TOLERANCE, assembly_positions
+from femgear.gears.profile import inv, pressure_angle_at, undercut_shift
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
 
@@ -34,18 +25,10 @@ FILLET_TOLERANCE = 1e-4
 """Overlap of a tip corner with a root fillet, in modules, that is warned about instead of refused."""
 # overlap [m] below which there is nothing to warn of
 _SEEN = 1e-9
-ASSEMBLY_TOLERANCE = 1e-6
-"""Part of a tooth pitch by which planet angles may miss an assembly position."""
-TOLERANCE = 1e-9
-"""Of the forces of flanks for a unit load, and of singular values of matrices whose columns are near one."""
 
 
 def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
     """Refuse a set that cannot be assembled or run, and list what deserves a warning.
-
-    Parameters
-    ----------
-    planetary : PlanetarySet
 
     Returns
     -------
@@ -59,35 +42,16 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
         E-ASSEMBLY, E-NEIGHBOURS, E-BACKLASH, E-INTERFERENCE, E-FILLET, E-TROCHOID, E-CLEARANCE,
         E-CONTACT-RATIO.
     """
+    found = [*_planets(planetary), *_neighbours(planetary)]
+    assembly_positions(planetary.sun.teeth, planetary.ring.teeth, planetary.planet_angles)
     return (
-        *_planets(planetary),
-        *_neighbours(planetary),
-        *_assembly(planetary),
+        *found,
         *_backlash(planetary),
-        *check_interference(planetary),
+        *_interference(planetary),
         *_clearances(planetary),
         *_contact_ratios(planetary),
         *_single_gears(planetary),
     )
-
-
-def feasible_angles(teeth_sum: int, angles: tuple[float, ...]) -> tuple[float, ...]:
-    """Assembly positions [rad] nearest to wanted planet angles, counted from the first planet.
-
-    Planets fit at multiples of ``2 pi / (z_s + z_r)`` from each other (Mueller, Epicyclic Drive Trains);
-    ``teeth_sum`` is z_s + z_r.
-    """
-    step = 2.0 * math.pi / teeth_sum
-    return tuple(angles[0] + math.floor((a - angles[0]) / step + 0.5 + 1e-9) * step for a in angles)
-
-
-def neighbour_limit(sun_teeth: int, planet_teeth: int) -> float:
-    """Number of equal planets, unshifted, whose tip circles would just touch.
-
-    ``pi / asin((z_p + 2)/(z_s + z_p))``; infinite where the ratio exceeds one it is 1: not even two fit.
-    """
-    ratio = (planet_teeth + 2) / (sun_teeth + planet_teeth)
-    return math.pi / math.asin(ratio) if ratio < 1.0 else 1.0
 
 
 def tip_clearances(planetary: PlanetarySet) -> dict[str, float]:
@@ -140,26 +104,6 @@ def _neighbours(s: PlanetarySet):
             room,
             ">= one module",
         )
-
-
-def _assembly(s: PlanetarySet):
-    total = s.sun.teeth + s.ring.teeth
-    turns = [(a - s.planet_angles[0]) * total / (2.0 * math.pi) for a in s.planet_angles]
-    worst = max(abs(t - round(t)) for t in turns)
-    if worst > ASSEMBLY_TOLERANCE:
-        wanted = feasible_angles(total, s.planet_angles)
-        listing = ", ".join(f"{math.degrees(a):.6f}" for a in wanted[:24])
-        raise GeometryError(
-            f"{s.n_planets} planets do not assemble at these angles: {s.sun.teeth} + {s.ring.teeth} teeth "
-            f"times the angle over one turn must be whole, one planet misses by {worst:.4f} teeth "
-            f"((z_s + z_r)/N = {total / s.n_planets:.6g})",
-            code="E-ASSEMBLY",
-            key="set.planet_angles",
-            value=f"{total / s.n_planets:.6g} teeth a planet",
-            limit=f"multiples of {360.0 / total:.6f} deg from the first planet",
-            remedy=f"nearest planet_angles that assemble: {listing} deg",
-        )
-    return ()
 
 
 def _backlash(s: PlanetarySet):
@@ -242,7 +186,7 @@ def _single_gears(s: PlanetarySet):
                 f"{gear.name}.profile_shift",
                 f"{gear.teeth} teeth are undercut: the involute ends at {gear.form_radius * 1e3:.4f} mm; "
                 f"this tool needs x >= {gear.undercut_shift:.4f} (a tool flank one module deep: "
-                f"{involute.undercut_shift(gear.teeth, gear.pressure_angle):.4f})",
+                f"{undercut_shift(gear.teeth, gear.pressure_angle):.4f})",
                 gear.profile_shift,
                 f">= {gear.undercut_shift:.4f}",
             )
@@ -281,27 +225,30 @@ def _rim_held(gear: Gear) -> str:
     )
 
 
-def check_interference(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
-    """Refuse involute, fillet and trochoid interference of a set; see `check_set`."""
-    warnings = []
-    for gear, partner, reach in active_limits(planetary):
+def _interference(s: PlanetarySet):
+    """Involute and fillet interference of both meshes, and passing tips of planet and ring."""
+    for gear, partner, reach in _active_limits(s):
         if reach < 0.0 and partner.internal:
-            _involute_interference(gear, partner, reach)
+            allowed = math.hypot(partner.base_radius, partner.tip_roll - reach)
+            raise GeometryError(
+                f"involute interference: the {partner.name}'s tip meets the {gear.name} "
+                f"{-reach * 1e3:.4f} mm beyond the end of the line of action, inside the {gear.name}'s base "
+                "circle",
+                code="E-INTERFERENCE",
+                key=f"{partner.name}.tip_diameter",
+                value=2.0 * partner.tip_radius,
+                limit=f"tip diameter {_tip_limit(partner, allowed)} mm",
+                remedy=f"give that tip_diameter, more teeth to the {gear.name}, or profile shifts",
+            )
         excess = reach - gear.form_roll if gear.internal else gear.form_roll - reach
         # undercut has removed the flank that a partner's tip would reach: the path of contact is shorter
         if excess > 0.0 and not gear.undercut:
-            overlap = fillet_overlap(gear, partner, planetary.centre_distance)
-            if overlap > FILLET_TOLERANCE * gear.module:
-                _fillet_interference(gear, partner, reach, overlap)
-            if overlap > _SEEN:
-                warnings.append(_fillet_warning(gear, partner, reach, overlap))
-    check_passing_tips(planetary.planet, planetary.ring, planetary.centre_distance)
-    return tuple(warnings)
+            yield from _fillet_contact(gear, partner, reach, s.centre_distance)
+    check_passing_tips(s.planet, s.ring, s.centre_distance)
 
 
-def active_limits(planetary: PlanetarySet):
+def _active_limits(s: PlanetarySet):
     """Gear, partner and roll length [m] on the gear's flank that the partner's tip reaches, four times."""
-    s = planetary
     sun_planet = s.centre_distance * math.sin(s.working_pressure_angle_sun_planet)
     planet_ring = s.centre_distance * math.sin(s.working_pressure_angle_planet_ring)
     return (
@@ -312,7 +259,43 @@ def active_limits(planetary: PlanetarySet):
     )
 
 
-def fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
+def _fillet_contact(gear: Gear, partner: Gear, reach: float, centre_distance: float):
+    """Contact of the partner's tip with the gear's root fillet."""
+    overlap = _fillet_overlap(gear, partner, centre_distance)
+    if overlap <= _SEEN:
+        return
+    where = math.hypot(gear.base_radius, max(reach, 0.0))
+    below = "" if reach >= 0.0 else f" and {-reach * 1e3:.4f} mm beyond the end of the line of action"
+    message = (
+        f"the {partner.name}'s tip runs into the {gear.name}'s root fillet: it reaches radius "
+        f"{where * 1e3:.4f} mm{below}; the involute {'ends' if gear.internal else 'begins'} at "
+        f"{gear.form_radius * 1e3:.4f} mm (overlap {overlap * 1e6:.3f} um)"
+    )
+    # the partner's tip then reaches just the end of the gear's involute
+    missing = (reach - gear.form_roll) * (-1.0 if gear.internal or partner.internal else 1.0)
+    limit = _tip_limit(partner, math.hypot(partner.base_radius, partner.tip_roll + missing))
+    if overlap > FILLET_TOLERANCE * gear.module:
+        raise GeometryError(
+            message,
+            code="E-FILLET",
+            key="rack.root_radius",
+            value=round(gear.tool.rounding / gear.module, 9),
+            limit=f"active profile {'up' if gear.internal else 'down'} to {gear.form_radius * 1e3:.4f} mm",
+            remedy=f"reduce root_radius, or give the {partner.name} a tip_diameter {limit} mm",
+        )
+    yield GeometryWarning(
+        "W-FILLET", f"{partner.name}.tip_diameter", message, 2.0 * partner.tip_radius, f"{limit} mm"
+    )
+
+
+def _tip_limit(partner: Gear, radius: float) -> str:
+    """Allowed tip diameters in mm, to be typed as they stand: above that of a ring, below that of others."""
+    if partner.internal:
+        return f">= {math.ceil(2e7 * radius) / 1e4:.4f}"
+    return f"<= {math.floor(2e7 * radius) / 1e4:.4f}"
+
+
+def _fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
     """Depth [m] to which the partner's tip corner enters the gear's fillet, as an arc.
 
     The corner is followed through the mesh from pitch-point contact of the loaded flanks, seen from the gear,
@@ -327,7 +310,7 @@ def fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
     centre = -centre_distance if partner.internal else centre_distance
     corner = eta_partner - tip if internal else math.pi - eta_partner + tip
     ratio = (1.0 if internal else -1.0) * gear.teeth / partner.teeth
-    radius, angle = fillet_point(gear.tool, np.linspace(0.0, gear.fillet_end, 4001))
+    radius, angle = gear.tool.fillet_point(np.linspace(0.0, gear.fillet_end, 4001))
     order = np.argsort(radius)
 
     def depth(turn):
@@ -345,26 +328,28 @@ def fillet_overlap(gear: Gear, partner: Gear, centre_distance: float) -> float:
     return float(np.max(arc))
 
 
-def allowed_tip_radius(gear: Gear, partner: Gear, reach: float) -> float:
-    """Tip radius [m] of the partner that reaches just the end of the gear's involute."""
-    missing = reach - gear.form_roll
-    roll = (
-        partner.tip_roll + missing if not (gear.internal or partner.internal) else partner.tip_roll - missing
-    )
-    return math.hypot(partner.base_radius, roll)
+def tip_margin(planet: Gear, ring: Gear, centre_distance: float) -> float:
+    """Angle [rad] at the ring by which the tip corners of a planet in a ring miss each other.
+
+    ``z1/z2 (phi1 + inv(aa1) - inv(aw)) + inv(aw) - inv(aa2) - phi2`` with the angles phi1, phi2 of the
+    crossing of both tip circles at the two centres (Colbourne, The Geometry of Involute Gears, ch. 8):
+    negative means that the teeth strike each other outside the path of contact. ``inf`` when the tip
+    circles do not cross.
+    """
+    a, tip_1, tip_2 = centre_distance, planet.tip_radius, ring.tip_radius
+    cos_1 = (tip_2**2 - tip_1**2 - a**2) / (2.0 * a * tip_1)
+    cos_2 = (tip_2**2 - tip_1**2 + a**2) / (2.0 * a * tip_2)
+    if abs(cos_1) >= 1.0 or abs(cos_2) >= 1.0:
+        return math.inf
+    working = inv(pressure_angle_at(a, ring.base_radius - planet.base_radius))
+    angle_1 = math.acos(cos_1) + inv(pressure_angle_at(tip_1, planet.base_radius)) - working
+    angle_2 = math.acos(cos_2) + inv(pressure_angle_at(tip_2, ring.base_radius)) - working
+    return angle_1 * planet.teeth / ring.teeth - angle_2
 
 
 def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None:
     """Refuse an internal pair whose tips strike each other outside the path of contact (E-TROCHOID)."""
-    margin = involute.trochoid_interference(
-        planet.teeth,
-        ring.teeth,
-        planet.tip_radius,
-        ring.tip_radius,
-        planet.base_radius,
-        ring.base_radius,
-        centre_distance,
-    )
+    margin = tip_margin(planet, ring, centre_distance)
     if margin < 0.0:
         raise GeometryError(
             f"the tips of planet ({planet.teeth} teeth) and ring ({ring.teeth}) strike each other outside "
@@ -375,122 +360,3 @@ def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None
             limit="corners of the tips pass each other",
             remedy="increase the difference of the tooth numbers, or shorten the tips (tip_diameter)",
         )
-
-
-def _involute_interference(gear: Gear, partner: Gear, reach: float):
-    allowed = math.hypot(partner.base_radius, partner.tip_roll - reach)
-    raise GeometryError(
-        f"involute interference: the {partner.name}'s tip meets the {gear.name} {-reach * 1e3:.4f} mm beyond "
-        f"the end of the line of action, inside the {gear.name}'s base circle",
-        code="E-INTERFERENCE",
-        key=f"{partner.name}.tip_diameter",
-        value=2.0 * partner.tip_radius,
-        limit=f"tip diameter >= {_rounded_up(allowed)} mm",
-        remedy=f"give that tip_diameter, more teeth to the {gear.name}, or profile shifts",
-    )
-
-
-def _fillet_interference(gear: Gear, partner: Gear, reach: float, overlap: float):
-    allowed = allowed_tip_radius(gear, partner, reach)
-    raise GeometryError(
-        _fillet_message(gear, reach, partner, overlap),
-        code="E-FILLET",
-        key="rack.root_radius",
-        value=round(gear.tool.rounding / gear.module, 9),
-        limit=f"active profile {'up' if gear.internal else 'down'} to {gear.form_radius * 1e3:.4f} mm",
-        remedy=f"reduce root_radius, or give the {partner.name} a tip_diameter "
-        f"{_tip_limit(partner, allowed)} mm",
-    )
-
-
-def _fillet_warning(gear: Gear, partner: Gear, reach: float, overlap: float) -> GeometryWarning:
-    allowed = allowed_tip_radius(gear, partner, reach)
-    return GeometryWarning(
-        "W-FILLET",
-        f"{partner.name}.tip_diameter",
-        _fillet_message(gear, reach, partner, overlap),
-        2.0 * partner.tip_radius,
-        f"{_tip_limit(partner, allowed)} mm",
-    )
-
-
-def _fillet_message(gear: Gear, reach: float, partner: Gear, overlap: float) -> str:
-    where = math.hypot(gear.base_radius, max(reach, 0.0))
-    below = "" if reach >= 0.0 else f" and {-reach * 1e3:.4f} mm beyond the end of the line of action"
-    return (
-        f"the {partner.name}'s tip runs into the {gear.name}'s root fillet: it reaches radius "
-        f"{where * 1e3:.4f} mm{below}; the involute {'ends' if gear.internal else 'begins'} at "
-        f"{gear.form_radius * 1e3:.4f} mm (overlap {overlap * 1e6:.3f} um)"
-    )
-
-
-def _tip_limit(partner: Gear, allowed: float) -> str:
-    """Allowed tip diameters in mm: above that of a ring, below that of the others."""
-    return f">= {_rounded_up(allowed)}" if partner.internal else f"<= {_rounded_down(allowed)}"
-
-
-def _rounded_up(radius: float) -> str:
-    """Diameter in mm of the smallest tip circle [m] that is allowed, to be typed as it stands."""
-    return f"{math.ceil(2e7 * radius) / 1e4:.4f}"
-
-
-def _rounded_down(radius: float) -> str:
-    """The same of the largest one."""
-    return f"{math.floor(2e7 * radius) / 1e4:.4f}"
-
-
-def unheld_members(
-    planetary_set: PlanetarySet, floating: Sequence[str], *, both_flanks: bool = False
-) -> tuple[str, ...]:
-    """Members that float without being held by the planets.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    floating : sequence of str
-        Members without a radial support: any of "sun", "carrier" and "ring".
-    both_flanks : bool
-        The back flanks carry too.
-
-    Returns
-    -------
-    tuple of str
-        The first member that the planets cannot hold though the others stand still; all of `floating` when
-        they can hold each but not all at once; empty when everything is held.
-    """
-    if not floating:
-        return ()
-    for name in floating:
-        if not _held(planetary_set, (name,), both_flanks):
-            return (name,)
-    # sun and carrier may slide together at constant loads: these are known, their common place is free
-    if len(floating) < 2 or _held(planetary_set, tuple(floating), both_flanks):
-        return ()
-    return tuple(floating)
-
-
-def _held(s: PlanetarySet, floating: tuple[str, ...], both_flanks: bool) -> bool:
-    """Whether forces of the flanks keep the members in equilibrium, and a single one from sliding."""
-    from scipy.optimize import nnls
-
-    approach = np.vstack([_approach(s, floating, back) for back in (False, True)[: 1 + both_flanks]])
-    slides = np.linalg.matrix_rank(approach, tol=TOLERANCE) < approach.shape[1]
-    if len(floating) == 1 and slides:
-        return False
-    load = np.zeros(approach.shape[1])
-    load[s.n_planets] = 1.0  # the torque of the sun, which everything else must pass on
-    return bool(nnls(approach.T, load)[1] < TOLERANCE)
-
-
-def _approach(s: PlanetarySet, floating: tuple[str, ...], back: bool) -> np.ndarray:
-    """Approach (2N, N + 1 + 2m) of the flanks per rotation of planets and sun and motion of the members."""
-    N, side = s.n_planets, -1.0 if back else 1.0
-    normals, zero = mesh_normals(s, back=back), np.zeros((N, 2))
-    on_planet, on_ring = normals[:N], normals[N:]
-    turns = np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
-    motions = {
-        "sun": np.vstack([on_planet, zero]),
-        "carrier": np.vstack([-on_planet, on_ring]),
-        "ring": np.vstack([zero, -on_ring]),
-    }
-    return np.hstack([side * turns, *(motions[name] for name in floating)])

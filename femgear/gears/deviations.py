@@ -20,8 +20,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.gears.kinematics import orientations
-from femgear.gears.modifications import FlankForm, form_deviation
+from femgear.errors import GeometryError
+from femgear.gears.gear import GeometryWarning
+from femgear.gears.kinematics import mesh_normals, orientations
+from femgear.gears.modifications import LARGEST_DEVIATION, FlankForm, check_flank, form_deviation
 
 if TYPE_CHECKING:
     from femgear.gears.gear import Gear
@@ -29,14 +31,8 @@ if TYPE_CHECKING:
 
 LONGEST_RECORD = 256
 """Mesh periods that a record spans at most unless told otherwise."""
-_ARRAYS = (
-    "sun_pitch",
-    "planet_pitch",
-    "planet_ring_side_pitch",
-    "ring_pitch",
-    "pin_errors",
-    "planet_thickness",
-)
+LONGEST_SEARCH = 4096
+"""Mesh periods that are searched for the least play."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +118,8 @@ class SetDeviations:
     ring_thickness: float = 0.0
 
     def __post_init__(self):
-        for name in _ARRAYS:
+        pitches = ("sun_pitch", "planet_pitch", "planet_ring_side_pitch", "ring_pitch")
+        for name in (*pitches, "pin_errors", "planet_thickness"):
             array = np.array(getattr(self, name), dtype=float)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -234,23 +231,6 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
     return one[np.asarray(tooth_1) % len(one)] + two[np.asarray(tooth_2) % len(two)]
 
 
-def mesh_normals(planetary_set: PlanetarySet, *, back: bool = False) -> np.ndarray:
-    """Unit vectors, (2N, 2), of the force of gear 1 on gear 2 in every mesh: its line of action.
-
-    Sun on planet at ``psi + pi/2 - alpha_w``, planet on ring at ``psi - pi/2 + alpha_w`` (carrier frame); the
-    back flanks, with `back`, at ``psi - pi/2 + alpha_w`` and ``psi + pi/2 - alpha_w``.
-    """
-    s = planetary_set
-    psi, side = np.asarray(s.planet_angles), -1.0 if back else 1.0
-    angle = np.concatenate(
-        [
-            psi + side * (0.5 * np.pi - s.working_pressure_angle_sun_planet),
-            psi - side * (0.5 * np.pi - s.working_pressure_angle_planet_ring),
-        ]
-    )
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
-
-
 def body_separation(
     deviations: SetDeviations, planetary_set: PlanetarySet, position, *, back: bool = False
 ) -> np.ndarray:
@@ -278,7 +258,7 @@ def body_separation(
     if back:
         others = np.repeat([d.sun_thickness, d.ring_thickness], s.n_planets)
         thinner = others + np.tile(d.planet_thickness, 2) - thinner
-    return (normals.conj()[:, None] * moved).real + thinner[:, None] * math.cos(s.sun.pressure_angle)
+    return np.real(normals.conj()[:, None] * moved) + thinner[:, None] * math.cos(s.sun.pressure_angle)
 
 
 def _relative_displacements(d: SetDeviations, s: PlanetarySet, position: np.ndarray) -> np.ndarray:
@@ -395,10 +375,6 @@ def mirrored_deviations(
         Planet angles ``2 psi_1 - psi``, ascending from the first planet.
     order : (N,) integer array
         Mirrored planet ``i`` is original planet ``order[i]``.
-
-    Returns
-    -------
-    SetDeviations
     """
     d, s, order = deviations, planetary_set, [int(n) for n in order]
     axis = 2.0 * s.planet_angles[0]
@@ -436,3 +412,142 @@ def _turned(values: np.ndarray, first: int) -> np.ndarray:
 
 def _reflected(runout: Runout, axis: float) -> Runout:
     return replace(runout, phase=axis - runout.phase)
+
+
+def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[GeometryWarning, ...]:
+    """Refuse deviations that do not belong to the set, and list what deserves a warning.
+
+    Returns
+    -------
+    tuple of GeometryWarning
+        W-WEDGING: the deviations may use up the play, so that both flanks carry. W-PROFILE: a measured
+        profile covers less than half of its flank.
+
+    Raises
+    ------
+    GeometryError
+        E-DEVIATION (arrays of another length than the teeth or planets, numbers that are not finite or
+        exceed 0.2 modules, modifications of a flank that do so together), E-MODIFICATION (see
+        `modifications.check_form`).
+    """
+    d, s = deviations, planetary_set
+    _check_lengths(d, s)
+    _check_amounts(d, s.sun.module)
+    found: list[GeometryWarning] = []
+    for flank, form, gear in (
+        ("sun", d.sun, s.sun),
+        ("planet, sun side", d.planet_sun_side, s.planet),
+        ("planet, ring side", d.planet_ring_side, s.planet),
+        ("ring", d.ring, s.ring),
+    ):
+        found += check_flank(flank, form, gear)
+    return (*found, *_wedging(d, s))
+
+
+def least_play(deviations: SetDeviations, planetary_set: PlanetarySet) -> tuple[float, float]:
+    """Lower bounds of the play that the deviations leave, along the line of action [m].
+
+    Positions are sampled over the common period; pitch deviations and profiles enter with their extremes, as
+    if the worst teeth met.
+
+    Returns
+    -------
+    single : float
+        Of any one mesh, between the flanks of the two gears alone.
+    whole : float
+        Of the sun against the held ring: the loaded flanks of one planet and the back flanks of another
+        stop it.
+    """
+    d, s = deviations, planetary_set
+    N = s.n_planets
+    periods, _ = common_period(d, s, limit=LONGEST_SEARCH)
+    position = np.arange(4 * periods) / 4.0
+    bodies = [body_separation(d, s, position, back=back) for back in (False, True)]
+    drive = bodies[0] + _worst(d, s, back=False)[:, None]
+    back = bodies[1] + _worst(d, s, back=True)[:, None]
+    back = back + np.repeat([s.backlash_sun_planet, s.backlash_planet_ring], N)[:, None]
+    single = float((drive + back).min())
+    whole = float(((drive[:N] + drive[N:]).min(axis=0) + (back[:N] + back[N:]).min(axis=0)).min())
+    return single, whole
+
+
+def _worst(d: SetDeviations, s: PlanetarySet, *, back: bool) -> np.ndarray:
+    """Smallest separation (2N,) of any teeth and any points of the flanks of every mesh."""
+    N, side = s.n_planets, -1.0 if back else 1.0
+    first, second = d.planet_pitch.min(axis=1), d.planet_ring_side_pitch.min(axis=1)
+    sun_side, ring_side = (second, first) if back else (first, second)
+    pitch = np.concatenate([(side * d.sun_pitch).min() + sun_side, ring_side + (side * d.ring_pitch).min()])
+    profile = [_thickest(d, s, kind, back=back) for kind in (0, 1)]
+    return pitch + np.repeat(profile, N)
+
+
+def _thickest(d: SetDeviations, s: PlanetarySet, kind: int, *, back: bool) -> float:
+    gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
+    rolls = [np.linspace(gear.form_roll, gear.tip_roll, 101) for gear in gears]
+    return float(profile_separation(d, s, kind, rolls[0][:, None], rolls[1][None, :], back=back).min())
+
+
+def _wedging(d: SetDeviations, s: PlanetarySet):
+    if d.ideal and not (d.planet_thickness.any() or d.sun_thickness or d.ring_thickness):
+        return
+    single, whole = least_play(d, s)
+    least = min(single, whole)
+    if least < -1e-12:
+        nominal = min(s.backlash_sun_planet, s.backlash_planet_ring)
+        where = "in one mesh" if single <= whole else "between different planets"
+        yield GeometryWarning(
+            "W-WEDGING",
+            "set.backlash",
+            f"pin errors and other deviations may exceed the backlash by {-least * 1e6:.3f} um {where} "
+            f"(ideal gears have {nominal * 1e6:.3f} um): loaded and back flanks may touch at once",
+            least,
+            "play of 0 um or more",
+        )
+
+
+def _check_lengths(d: SetDeviations, s: PlanetarySet) -> None:
+    N = s.n_planets
+    wanted = {
+        "sun_pitch": (s.sun.teeth,),
+        "planet_pitch": (N, s.planet.teeth),
+        "planet_ring_side_pitch": (N, s.planet.teeth),
+        "ring_pitch": (s.ring.teeth,),
+        "pin_errors": (N, 2),
+        "planet_thickness": (N,),
+    }
+    for name, shape in wanted.items():
+        if getattr(d, name).shape != shape:
+            _refuse(f"{name} has the shape {getattr(d, name).shape}", name, str(shape))
+    if len(d.planet_runout) != N:
+        _refuse(f"{len(d.planet_runout)} runouts for {N} planets", "planet_runout", f"{N} runouts")
+    n = d.ovality.nodal_diameter
+    if n < 1 or n != int(n):
+        _refuse(f"an ovality with {n} nodal diameters", "ovality", "1, 2, 3, ...")
+
+
+def _check_amounts(d: SetDeviations, module: float) -> None:
+    most = LARGEST_DEVIATION * module
+    runouts = (d.sun_runout, d.ring_runout, d.carrier_runout, *d.planet_runout, d.ovality)
+    phases = [runout.phase for runout in runouts]
+    if not all(map(math.isfinite, phases)):
+        _refuse("a phase of a runout or an ovality is not finite", "phase", "finite")
+    amounts = {
+        "sun_pitch": d.sun_pitch,
+        "planet_pitch": d.planet_pitch,
+        "planet_ring_side_pitch": d.planet_ring_side_pitch,
+        "ring_pitch": d.ring_pitch,
+        "pin_errors": d.pin_errors,
+        "thickness": np.array([d.sun_thickness, d.ring_thickness, *d.planet_thickness]),
+        "runout": np.array([runout.amplitude for runout in runouts]),
+    }
+    for name, values in amounts.items():
+        largest = np.abs(values).max(initial=0.0)
+        if not largest <= most:
+            limit = f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.1f} um"
+            _refuse(f"{name} of {largest * 1e6:.6g} um is not plausible", name, limit)
+
+
+def _refuse(message: str, key: str, limit: str):
+    raise GeometryError(
+        message, code="E-DEVIATION", key=key, limit=limit, remedy="lengths are in metres, angles in radians"
+    )

@@ -1,7 +1,6 @@
 """What a spur gear is: its data, its circles, the tools that cut it, and the numbers that no gear can have.
 
-A gear is checked before anything is computed with it (`check_gear`); the tool is matched to its flank and
-root circle (`generating_tool`).
+A gear is checked before anything is computed with it; the tool is matched to its flank and root circle.
 """
 
 from __future__ import annotations
@@ -10,22 +9,22 @@ import math
 import operator
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.fillet import (
+from femgear.gears.profile import (
     ISO_53_C,
     BasicRack,
     CutterTip,
     PinionCutter,
     RackTip,
-    default_cutter,
-    fillet_point,
-    junction_roll,
-    undercut_end,
+    arcinv,
+    inv,
+    pressure_angle_at,
+    roll,
 )
-from femgear.gears.involute import arcinv, inv, pressure_angle_at, roll
 
 TEETH_RANGE = (5, 5000)
 MODULE_RANGE = (0.05e-3, 0.1)
@@ -76,7 +75,7 @@ class Gear:
     internal : bool
     rack : BasicRack
     cutter : PinionCutter, optional
-        For internal gears; None takes the cutter of `fillet.default_cutter`.
+        For internal gears; None takes the cutter of `cutter_of`.
     tip_diameter, root_diameter : float, optional
         [m]; None takes ``m (z +- 2 (h + x))`` of the basic rack.
     thickness_allowance : float
@@ -106,7 +105,7 @@ class Gear:
     name: str = field(default="gear", compare=False)
 
     def __post_init__(self):
-        check_gear(self)
+        _check_gear(self)
 
     @property
     def reference_radius(self) -> float:
@@ -155,22 +154,21 @@ class Gear:
     @cached_property
     def tool(self) -> RackTip | CutterTip:
         """Rounded tip of the generating tool, matched to this flank and root circle."""
-        return generating_tool(self)
+        return _generating_tool(self)
 
     @cached_property
     def fillet_end(self) -> float:
-        """Parameter ``theta`` [rad] of `fillet.fillet_point` where fillet and involute meet."""
-        if self.undercut:
-            return undercut_end(self.tool, self.base_radius, self.base_half_angle)
+        """Parameter ``theta`` [rad] of the tool's `fillet_point` where fillet and involute meet."""
+        if self.undercut and isinstance(self.tool, RackTip):
+            return self.tool.undercut_end(self.base_radius, self.base_half_angle)
         return self.tool.end_angle
 
     @cached_property
     def form_roll(self) -> float:
         """Roll length [m] of the flank's end at the fillet."""
         if self.undercut:
-            radius, _ = fillet_point(self.tool, self.fillet_end)
-            return roll(radius, self.base_radius)
-        return junction_roll(self.tool, self.base_radius)
+            return roll(self.tool.fillet_point(self.fillet_end)[0], self.base_radius)
+        return self.tool.junction_roll
 
     @property
     def form_radius(self) -> float:
@@ -185,7 +183,7 @@ class Gear:
     @property
     def undercut(self) -> bool:
         """Whether the rack cuts away part of the involute (external gears only)."""
-        return not self.internal and junction_roll(self.tool, self.base_radius) < 0.0
+        return not self.internal and self.tool.junction_roll < 0.0
 
     @property
     def undercut_shift(self) -> float:
@@ -235,35 +233,18 @@ def flank_points(gear: Gear, roll_lengths) -> np.ndarray:
 
 
 def cutter_of(gear: Gear) -> PinionCutter:
-    """Pinion cutter of an internal gear, its own or the default one."""
-    return gear.cutter if gear.cutter is not None else default_cutter(gear.teeth)
+    """Pinion cutter of an internal gear, by default of 30 unshifted teeth, or 12 fewer than the gear's."""
+    return gear.cutter or PinionCutter(teeth=max(5, min(30, gear.teeth - 12)))
 
 
-def generating_tool(gear: Gear, *, rounding: float | None = None) -> RackTip | CutterTip:
-    """Tool tip that cuts the flank and the root circle of a gear.
-
-    Parameters
-    ----------
-    gear : Gear
-    rounding : float, optional
-        Tip rounding [modules]; None takes that of the gear's rack or cutter.
-
-    Raises
-    ------
-    GeometryError
-        No working pressure angle exists between the gear and its cutter (E-INVOLUTE).
-    """
-    if rounding is None:
-        rounding = gear.rack.root_radius
-        if gear.internal and cutter_of(gear).tip_radius is not None:
-            rounding = cutter_of(gear).tip_radius
-    if gear.internal:
-        return _cutter_tip(gear, cutter_of(gear), rounding * gear.module)
-    return _rack_tip(gear, rounding * gear.module)
+def _generating_tool(gear: Gear, rounding: float | None = None) -> RackTip | CutterTip:
+    """Tool tip that cuts flank and root circle of a gear; its rounding [modules] is by default the gear's."""
+    return _cutter_tip(gear, rounding) if gear.internal else _rack_tip(gear, rounding)
 
 
-def _rack_tip(gear: Gear, rounding: float) -> RackTip:
+def _rack_tip(gear: Gear, rounding: float | None) -> RackTip:
     """Rack of ISO 53, thickened by the allowance and as deep as the root circle asks; lengths in m."""
+    rounding = gear.module * (gear.rack.root_radius if rounding is None else rounding)
     reference = gear.reference_radius
     # depth of the rounding's centre under the tool's datum line
     depth = reference + gear.profile_shift * gear.module - gear.root_radius - rounding
@@ -279,12 +260,15 @@ def _rack_tip(gear: Gear, rounding: float) -> RackTip:
     )
 
 
-def _cutter_tip(gear: Gear, cutter: PinionCutter, rounding: float) -> CutterTip:
+def _cutter_tip(gear: Gear, rounding: float | None = None) -> CutterTip:
     """Cutter at the centre distance that leaves it no play in the finished gap; lengths in m.
 
     Its shift and that distance give the flank its thickness; its tip radius follows from the root circle.
     """
-    alpha, module = gear.pressure_angle, gear.module
+    alpha, module, cutter = gear.pressure_angle, gear.module, cutter_of(gear)
+    if rounding is None:
+        rounding = gear.rack.root_radius if cutter.tip_radius is None else cutter.tip_radius
+    rounding *= module
     tangent = math.tan(alpha)
     # a thinner tooth is a wider gap: the cutter is fed in as if the flank were shifted further out
     flank_shift = gear.profile_shift + 0.5 * gear.thickness_allowance / (module * tangent)
@@ -292,17 +276,14 @@ def _cutter_tip(gear: Gear, cutter: PinionCutter, rounding: float) -> CutterTip:
     working = arcinv(inv(alpha) + 2.0 * tangent * shift / (gear.teeth - cutter.teeth))
     base = 0.5 * module * cutter.teeth * math.cos(alpha)
     pitch, cutter_pitch = gear.base_radius / math.cos(working), base / math.cos(working)
-    tip = gear.root_radius - (pitch - cutter_pitch)
-    centre_radius = tip - rounding
+    centre_radius = gear.root_radius - (pitch - cutter_pitch) - rounding
     base_half = (0.5 * math.pi + 2.0 * cutter.profile_shift * tangent) / cutter.teeth + inv(alpha)
     # the parallel of an involute is an involute of the same base circle, begun rounding/rb further in
     centre_angle = base_half - rounding / base - inv(pressure_angle_at(centre_radius, base))
     return CutterTip(
-        cutter_teeth=cutter.teeth,
         pitch_radius=pitch,
         cutter_pitch_radius=cutter_pitch,
         cutter_base_radius=base,
-        cutter_tip_radius=tip,
         centre_distance=pitch - cutter_pitch,
         centre_radius=centre_radius,
         centre_angle=centre_angle,
@@ -312,7 +293,7 @@ def _cutter_tip(gear: Gear, cutter: PinionCutter, rounding: float) -> CutterTip:
     )
 
 
-def check_gear(gear: Gear) -> None:
+def _check_gear(gear: Gear) -> None:
     """Refuse a gear that cannot be made; see the errors of `Gear`."""
     _check_numbers(gear)
     _check_rack(gear)
@@ -361,11 +342,11 @@ def _check_numbers(gear: Gear) -> None:
 
 def is_whole(value) -> bool:
     """Whether a value is a whole number, and no truth value."""
-    return isinstance(value, int | np.integer) and not isinstance(value, bool | np.bool_)
+    return isinstance(value, Integral) and not isinstance(value, bool)
 
 
 def _within(value, low: float, high: float) -> bool:
-    return isinstance(value, float | int | np.floating) and low <= value <= high
+    return isinstance(value, float | int | np.floating) and bool(low <= value <= high)
 
 
 def _check_rack(gear: Gear) -> None:
@@ -437,8 +418,8 @@ def _check_tool(gear: Gear) -> None:
     """Room for the tool's rounding."""
     if gear.internal:
         _check_cutter(gear)
-    room = _room(gear, None)
-    if room < -1e-12:
+    # a length of the rack is taken in modules; an angle of the cutter is one already
+    if gear.tool.room / (1.0 if gear.internal else gear.module) < -1e-12:
         largest, rounding = _largest_rounding(gear), round(gear.tool.rounding / gear.module, 9)
         _refuse(
             gear,
@@ -465,7 +446,7 @@ def _check_cutter(gear: Gear) -> None:
             remedy="choose a smaller cutter; 30 teeth, or 12 fewer than the gear, is the default",
         )
     try:
-        tool = gear.tool
+        tool = _cutter_tip(gear)
     except GeometryError:
         _refuse(
             gear,
@@ -503,20 +484,13 @@ def _check_cutter(gear: Gear) -> None:
         )
 
 
-def _room(gear: Gear, rounding: float | None) -> float:
-    """Space left between the two rounded corners of the tool's tip, relative (negative: none)."""
-    tool = generating_tool(gear, rounding=rounding)
-    if not gear.internal:
-        return tool.centre_offset / gear.module
-    return tool.centre_angle if tool.centre_radius > tool.cutter_base_radius else -1.0
-
-
 def _largest_rounding(gear: Gear) -> float:
     """Largest tool tip rounding [modules] that fits with the same root circle, rounded down to 1e-4."""
     low, high = 0.0, 3.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _room(gear, middle) >= 0.0 else (low, middle)
+        fits = _generating_tool(gear, middle).room >= 0.0
+        low, high = (middle, high) if fits else (low, middle)
     return math.floor(1e4 * low) / 1e4
 
 
@@ -549,7 +523,7 @@ def _check_flank(gear: Gear) -> None:
         )
 
 
-def _refuse(gear: Gear, entry: str, message: str, *, code: str, value, limit: str, remedy: str):
+def _refuse(gear: Gear, entry: str, message: str, *, code: str, value, limit: str | None, remedy: str):
     key = entry if entry.startswith("rack.") else f"{gear.name}.{entry}"
     raise GeometryError(
         f"{gear.name}: {message}", code=code, key=key, value=value, limit=limit, remedy=remedy

@@ -1,4 +1,10 @@
-"""Where the bodies of a planetary set stand, how fast they turn and what torques they carry."""
+"""Where the bodies of a planetary set stand, how they turn, what torques they carry and what holds them.
+
+`unheld_members` tells whether the flanks of the planets alone keep members without a support in place.
+Contacts only push: forces of the loaded flanks, none below zero, must balance the torque and leave no force
+on a member that floats. By Farkas' lemma (1902) there are such forces, or there is a motion that the load
+drives and no flank stops. A member that floats alone must not slide past all flanks either.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +12,19 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from femgear.errors import GeometryError
 from femgear.gears.gear import working_half_angles
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from femgear.gears.planetary import PlanetarySet
 
 MEMBERS = ("sun", "carrier", "ring")
+TOLERANCE = 1e-9
+"""Of the forces of flanks for a unit load, and of singular values of matrices whose columns are near one."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +65,6 @@ def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations
     position : float
         tau, fraction of one mesh period (may exceed 1): the sun turns by ``+2 pi tau / z_s``, a planet by
         ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``.
-
-    Returns
-    -------
-    Orientations
     """
     s = planetary
     psi, phase = s.planet_angles, s.mesh_phases.tolist()
@@ -93,7 +101,11 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
     GeometryError
         Not one input and one fixed member (E-MECHANISM), or a speed that is not finite.
     """
-    _check_mechanism(input, fixed)
+    for member in (input, fixed):
+        if member not in MEMBERS:
+            _refuse_mechanism(f"{member!r} is no member that can be driven or held", member)
+    if input == fixed:
+        _refuse_mechanism(f"the {input} is both driven and held, which leaves two members free", input)
     if not math.isfinite(speed):
         raise GeometryError(
             f"a speed of {speed} rad/s", code="E-VALUE", key="operation.speeds", value=speed, limit="finite"
@@ -125,7 +137,7 @@ def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
         Unknown member (E-MECHANISM) or a torque that is not finite (E-VALUE).
     """
     if member not in MEMBERS:
-        _mechanism_error(f"the torque acts on {member!r}", member)
+        _refuse_mechanism(f"the torque acts on {member!r}", member)
     if not math.isfinite(torque):
         raise GeometryError(
             f"a torque of {torque} N m", code="E-VALUE", key="operation.torque", value=torque, limit="finite"
@@ -136,15 +148,7 @@ def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
     return Torques(sun=sun, ring=sun * share["ring"], carrier=sun * share["carrier"])
 
 
-def _check_mechanism(input: str, fixed: str) -> None:
-    for member in (input, fixed):
-        if member not in MEMBERS:
-            _mechanism_error(f"{member!r} is no member that can be driven or held", member)
-    if input == fixed:
-        _mechanism_error(f"the {input} is both driven and held, which leaves two members free", input)
-
-
-def _mechanism_error(message: str, value):
+def _refuse_mechanism(message: str, value: str):
     raise GeometryError(
         message,
         code="E-MECHANISM",
@@ -153,3 +157,77 @@ def _mechanism_error(message: str, value):
         limit="one driven, one held and one output member out of sun, carrier and ring",
         remedy='for example input = "sun", fixed = "ring"',
     )
+
+
+def mesh_normals(planetary_set: PlanetarySet, *, back: bool = False) -> np.ndarray:
+    """Unit vectors, (2N, 2), of the force of gear 1 on gear 2 in every mesh: its line of action.
+
+    Sun on planet at ``psi + pi/2 - alpha_w``, planet on ring at ``psi - pi/2 + alpha_w`` (carrier frame); the
+    back flanks, with `back`, at ``psi - pi/2 + alpha_w`` and ``psi + pi/2 - alpha_w``.
+    """
+    s = planetary_set
+    psi, side = np.asarray(s.planet_angles), -1.0 if back else 1.0
+    angle = np.concatenate(
+        [
+            psi + side * (0.5 * np.pi - s.working_pressure_angle_sun_planet),
+            psi - side * (0.5 * np.pi - s.working_pressure_angle_planet_ring),
+        ]
+    )
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def unheld_members(
+    planetary_set: PlanetarySet, floating: Sequence[str], *, both_flanks: bool = False
+) -> tuple[str, ...]:
+    """Members that float without being held by the planets.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    floating : sequence of str
+        Members without a radial support: any of "sun", "carrier" and "ring".
+    both_flanks : bool
+        The back flanks carry too.
+
+    Returns
+    -------
+    tuple of str
+        The first member that the planets cannot hold though the others stand still; all of `floating` when
+        they can hold each but not all at once; empty when everything is held.
+    """
+    if not floating:
+        return ()
+    for name in floating:
+        if not _held(planetary_set, (name,), both_flanks):
+            return (name,)
+    # sun and carrier may slide together at constant loads: these are known, their common place is free
+    if len(floating) < 2 or _held(planetary_set, tuple(floating), both_flanks):
+        return ()
+    return tuple(floating)
+
+
+def _held(s: PlanetarySet, floating: tuple[str, ...], both_flanks: bool) -> bool:
+    """Whether forces of the flanks keep the members in equilibrium, and a single one from sliding."""
+    from scipy.optimize import nnls
+
+    approach = np.vstack([_approach(s, floating, back) for back in (False, True)[: 1 + both_flanks]])
+    slides = np.linalg.matrix_rank(approach, tol=TOLERANCE) < approach.shape[1]
+    if len(floating) == 1 and slides:
+        return False
+    load = np.zeros(approach.shape[1])
+    load[s.n_planets] = 1.0  # the torque of the sun, which everything else must pass on
+    return bool(nnls(approach.T, load)[1] < TOLERANCE)
+
+
+def _approach(s: PlanetarySet, floating: tuple[str, ...], back: bool) -> np.ndarray:
+    """Approach (2N, N + 1 + 2m) of the flanks per rotation of planets and sun and motion of the members."""
+    N, side = s.n_planets, -1.0 if back else 1.0
+    normals, zero = mesh_normals(s, back=back), np.zeros((N, 2))
+    on_planet, on_ring = normals[:N], normals[N:]
+    turns = np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
+    motions = {
+        "sun": np.vstack([on_planet, zero]),
+        "carrier": np.vstack([-on_planet, on_ring]),
+        "ring": np.vstack([zero, -on_ring]),
+    }
+    return np.hstack([side * turns, *(motions[name] for name in floating)])

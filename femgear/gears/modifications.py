@@ -14,12 +14,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import GeometryError
+from femgear.gears.gear import GeometryWarning
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from femgear.gears.gear import Gear
 
 LARGEST_DEVIATION = 0.2
 """Largest plausible amount of any modification or error, in modules."""
+LEAST_COVERAGE = 0.5
+"""Part of a flank that a measured profile should cover; beyond its ends it is constant."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +149,7 @@ def form_deviation(form: FlankForm, gear: Gear, roll):
 def _removed(modification: Modification, gear: Gear, roll: np.ndarray) -> np.ndarray:
     if isinstance(modification, MeasuredProfile):
         return np.interp(roll, modification.roll, modification.removed)
-    start, end = modification_range(modification, gear)
+    start, end = _modification_range(modification, gear)
     t = (roll - start) / (end - start)
     if isinstance(modification, ProfileSlope):
         return modification.amount * (0.5 - t)
@@ -153,7 +158,7 @@ def _removed(modification: Modification, gear: Gear, roll: np.ndarray) -> np.nda
     return modification.amount * np.maximum(t, 0.0) ** modification.power
 
 
-def modification_range(modification: Modification, gear: Gear) -> tuple[float, float]:
+def _modification_range(modification: Modification, gear: Gear) -> tuple[float, float]:
     """Roll lengths [m] of start and end of a law, of the first and the last point of a measured profile."""
     if isinstance(modification, MeasuredProfile):
         return modification.roll[0], modification.roll[-1]
@@ -224,7 +229,7 @@ def _problem(modification: Modification, gear: Gear):
     relief = isinstance(modification, TipRelief | RootRelief)
     if relief and not 0.1 <= modification.power <= 20.0:
         return "the power of the relief is not plausible", modification.power, "0.1 to 20"
-    start, end = modification_range(modification, gear)
+    start, end = _modification_range(modification, gear)
     low, high = sorted((gear.form_roll, gear.tip_roll))
     tolerance = 1e-6 * gear.module
     for name, value in (("start", start), ("end", end)):
@@ -257,3 +262,71 @@ def _place(gear: Gear, roll: float) -> str:
 
 def _flank(gear: Gear) -> str:
     return f"{_place(gear, gear.form_roll)} (form circle) to {_place(gear, gear.tip_roll)} (tip circle)"
+
+
+def check_flank(flank: str, form: FlankForm, gear: Gear) -> Iterator[GeometryWarning]:
+    """Refuse modifications that a named flank cannot have, alone or together, and warn of short profiles.
+
+    Raises
+    ------
+    GeometryError
+        E-MODIFICATION (see `check_form`), E-DEVIATION: modifications, each of them plausible, that together
+        are not.
+
+    Yields
+    ------
+    GeometryWarning
+        W-PROFILE: a measured profile covers less than `LEAST_COVERAGE` of its flank.
+    """
+    check_form(form, gear)
+    _check_sum(flank, form, gear)
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    for profile in form.modifications:
+        if not isinstance(profile, MeasuredProfile):
+            continue
+        start, end = profile.roll[0], profile.roll[-1]
+        covered = max(min(end, high) - max(start, low), 0.0) / (high - low)
+        if covered < LEAST_COVERAGE:
+            angles = [math.degrees(roll / gear.base_radius) for roll in (start, end, low, high)]
+            yield GeometryWarning(
+                "W-PROFILE",
+                f"{gear.name}.modifications",
+                "{}: a measured profile over roll angles {:.4g} to {:.4g} deg covers {:.0f} % of the flank, "
+                "{:.4g} to {:.4g} deg; beyond its ends it is constant".format(
+                    flank, *angles[:2], 100 * covered, *angles[2:]
+                ),
+                covered,
+                f"{100 * LEAST_COVERAGE:.0f} % or more",
+            )
+
+
+def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
+    """Refuse modifications, each of them plausible, that together are not."""
+    most = LARGEST_DEVIATION * gear.module
+    rolls = [np.linspace(gear.form_roll, gear.tip_roll, 1001)]
+    # laws are monotonic or parabolas between their ends, profiles straight between their points
+    rolls += [
+        m.roll if isinstance(m, MeasuredProfile) else _modification_range(m, gear) for m in form.modifications
+    ]
+    roll = np.concatenate(rolls)
+    removed = form_deviation(form, gear, roll)
+    i = int(np.abs(removed).argmax())
+    if abs(removed[i]) <= most * (1.0 + 1e-9):
+        return
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    angle = math.degrees(min(max(roll[i], low), high) / gear.base_radius)
+    found = f"{abs(removed[i]) * 1e6:.6g} um at a roll angle of {angle:.4g} deg"
+    count, verb = len(form.modifications), "take off" if removed[i] > 0 else "add"
+    message = f"{count} modifications together {verb} {found}"
+    remedy = "check the units, and whether a section stands there twice"
+    if count == 1:
+        message = f"the modification goes on beyond its end and reaches {found}"
+        remedy = "let it end nearer to the end of the flank"
+    raise GeometryError(
+        f"{flank}: {message}",
+        code="E-DEVIATION",
+        key=f"{gear.name}.modifications",
+        value=f"{removed[i] * 1e6:.6g} um",
+        limit=f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um, at every place of the flank",
+        remedy=remedy,
+    )

@@ -24,9 +24,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.checks import ASSEMBLY_TOLERANCE, feasible_angles
 from femgear.gears.gear import TEETH_RANGE, is_whole
-from femgear.gears.planetary import check_angles
+from femgear.gears.planetary import assembly_positions, check_angles
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -150,21 +149,7 @@ def mesh_phasing(
     """
     angles = _angles(planet_angles)
     MeshPhasing(sun_teeth, ring_teeth, (0,), rotation, flank, convention, lag)
-    total = sun_teeth + ring_teeth
-    places = (np.array(angles) - angles[0]) * total / (2.0 * math.pi)
-    missed = float(np.abs(places - np.round(places)).max())
-    if missed > ASSEMBLY_TOLERANCE:
-        listing = ", ".join(f"{math.degrees(a):.6f}" for a in feasible_angles(total, angles)[:24])
-        raise GeometryError(
-            f"{len(angles)} planets between {sun_teeth} and {ring_teeth} teeth miss an assembly position by "
-            f"{missed:.3g} teeth; their phases do not belong to teeth that mesh",
-            code="E-ASSEMBLY",
-            key="set.planet_angles",
-            value=f"{total / len(angles):.6g} teeth a planet",
-            limit=f"multiples of {360.0 / total:.6f} deg from the first planet",
-            remedy=f"nearest planet_angles that assemble: {listing} deg",
-        )
-    positions = tuple(int(p) for p in np.round(places))
+    positions = assembly_positions(sun_teeth, ring_teeth, angles)
     return MeshPhasing(sun_teeth, ring_teeth, positions, rotation, flank, convention, lag)
 
 
@@ -278,9 +263,6 @@ class PhasingTable:
         One of `KINDS` for every harmonic, the same for sun and ring meshes.
     cyclic : (H,) int array
         k = mod(h z_s, N); -1 for unequally spaced planets.
-    sums : (H, 2, 3) complex array
-        Mean over the planets of ``exp(2 pi i h gamma_n) exp(i q psi_n)`` for sun and ring meshes, q = 0, 1
-        and -1.
     members : (H, 3, 4) array
         Resultants on `MEMBERS` by `RESULTANTS` as shares of what they were if all planets acted alike and in
         the worst direction: 0 cancelled, 1 everything adds up.
@@ -296,7 +278,6 @@ class PhasingTable:
     harmonics: np.ndarray
     kind: tuple[str, ...]
     cyclic: np.ndarray
-    sums: np.ndarray
     members: np.ndarray
     planets: np.ndarray
     modes: np.ndarray
@@ -337,21 +318,16 @@ def phasing_table(phasing: MeshPhasing, harmonics=range(1, 7)) -> PhasingTable:
     phasing : MeshPhasing
     harmonics : (H,) sequence of int
 
-    Returns
-    -------
-    PhasingTable
-
     Raises
     ------
     GeometryError
         Harmonics that are no whole numbers from 1 (E-HARMONICS).
     """
-    harmonics = _checked_harmonics(harmonics)
+    harmonics = check_harmonics(harmonics)
     turns, N = np.array(phasing.turns), phasing.n_planets
     positions = np.array([phasing.positions] * 2)
     total = np.full(2, phasing.teeth_sum)
-    sums = planet_sums(turns, positions, total, harmonics, (0, 1, -1)).swapaxes(0, 1)
-    size = np.abs(sums)
+    size = np.abs(planet_sums(turns, positions, total, harmonics, (0, 1, -1)).swapaxes(0, 1))
     plain, turning = size[..., 0], size[..., 1:].max(axis=-1)  # (H, 2)
     both = [np.column_stack([part, part.max(axis=1)]) for part in (plain, turning)]
     kinds = phase_kinds(turns[0], positions[0], total[0], harmonics)
@@ -359,7 +335,6 @@ def phasing_table(phasing: MeshPhasing, harmonics=range(1, 7)) -> PhasingTable:
         harmonics=harmonics,
         kind=tuple(KINDS[k] for k in kinds),
         cyclic=cyclic_harmonic(phasing, harmonics),
-        sums=sums,
         members=np.stack([both[0], both[1], both[0], both[1]], axis=-1),
         planets=_planet_resultants(phasing, harmonics),
         modes=_mode_shares(phase_factors(phasing, harmonics).reshape(-1, 2, N), phasing.planet_angles, size),
@@ -367,54 +342,9 @@ def phasing_table(phasing: MeshPhasing, harmonics=range(1, 7)) -> PhasingTable:
     )
 
 
-def cyclic_shares(phasing: MeshPhasing, harmonics=range(1, 7)) -> np.ndarray:
-    """Shares of the motions ``exp(i j psi_n)``, j = 0 to N // 2 and both senses, in the phase pattern.
-
-    Parameters
-    ----------
-    phasing : MeshPhasing
-    harmonics : (H,) sequence of int
-
-    Returns
-    -------
-    (H, N // 2 + 1) array
-        The larger of sun and ring meshes. With equal spacing one entry of a row is 1, at ``min(k, N - k)``
-        with k = mod(h z_s, N): which of the planet modes of `phase_shares` it can excite.
-        At unequal spacing the motions overlap, and several entries differ from 0.
-    """
-    harmonics, N = _checked_harmonics(harmonics), phasing.n_planets
-    orders = np.arange(N // 2 + 1)
-    size = [
-        np.abs(planet_sums(turns, phasing.positions, phasing.teeth_sum, harmonics, sense * orders))
-        for turns in phasing.turns
-        for sense in (1, -1)
-    ]
-    shares = np.max(size, axis=0)
-    return np.where(shares < ZERO, 0.0, shares)
-
-
-def mesh_loads(directions, phasing: MeshPhasing, harmonics) -> np.ndarray:
-    """Loads of unit mesh forces with their phases on all coordinates of a model, by family of meshes.
-
-    Parameters
-    ----------
-    directions : (n, 2N) array
-        Mesh columns of a model, such as `femgear.system.assembler.mesh_directions`.
-    phasing : MeshPhasing
-    harmonics : (H,) sequence of int
-
-    Returns
-    -------
-    (H, 2, n) complex array
-        Loads by the sun meshes and by the ring meshes.
-    """
-    directions, N = np.asarray(directions), phasing.n_planets
-    factors = phase_factors(phasing, harmonics).reshape(-1, 2, N)
-    return np.einsum("nfj,hfj->hfn", directions.reshape(len(directions), 2, N), factors)
-
-
 def check_harmonics(harmonics) -> np.ndarray:
     """Harmonics as whole numbers from 1, (H,); refuses others (E-HARMONICS)."""
+    harmonics = list(harmonics) if isinstance(harmonics, range) else harmonics
     found = np.atleast_1d(np.asarray(harmonics))
     if found.ndim != 1 or not len(found) or found.dtype.kind not in "iu" or found.min() < 1:
         raise GeometryError(
@@ -422,11 +352,6 @@ def check_harmonics(harmonics) -> np.ndarray:
             limit="whole numbers from 1", remedy="for instance range(1, 7)",
         )  # fmt: skip
     return found.astype(np.int64)
-
-
-def _checked_harmonics(harmonics) -> np.ndarray:
-    """`check_harmonics`, whose refusal tells a range by its numbers."""
-    return check_harmonics(list(harmonics) if isinstance(harmonics, range) else harmonics)
 
 
 def _planet_resultants(phasing: MeshPhasing, harmonics: np.ndarray) -> np.ndarray:

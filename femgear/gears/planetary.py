@@ -16,11 +16,13 @@ from itertools import pairwise
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears import involute
 from femgear.gears.gear import Gear, is_whole, working_half_angles
+from femgear.gears.profile import BasicRack, arcinv, inv, pressure_angle_at
 
 BACKLASH_TOLERANCE = 1e-4
 """Normal backlash, in modules, that counts as none: what four decimals of profile shifts leave open."""
+ASSEMBLY_TOLERANCE = 1e-6
+"""Part of a tooth pitch by which planet angles may miss an assembly position."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class PlanetarySet:
             gear = getattr(self, name)
             if gear.name != name:
                 object.__setattr__(self, name, replace(gear, name=name))
-        check_roles(self)
+        _check_roles(self)
         check_angles(self.planet_angles)
         # both raise when the base circles would overlap
         _ = self.working_pressure_angle_sun_planet, self.working_pressure_angle_planet_ring
@@ -72,12 +74,12 @@ class PlanetarySet:
     @property
     def working_pressure_angle_sun_planet(self) -> float:
         """[rad]"""
-        return _working_angle(self.sun, self.planet, self.centre_distance)
+        return working_pressure_angle(self.sun, self.planet, self.centre_distance)
 
     @property
     def working_pressure_angle_planet_ring(self) -> float:
         """[rad]"""
-        return _working_angle(self.planet, self.ring, self.centre_distance)
+        return working_pressure_angle(self.planet, self.ring, self.centre_distance)
 
     @property
     def contact_ratio_sun_planet(self) -> float:
@@ -119,26 +121,14 @@ class PlanetarySet:
         return start, self.planet.tip_roll - planet
 
     @property
-    def circumferential_backlash_sun_planet(self) -> float:
-        """Play [m] on the working pitch circles, pitch minus both tooth thicknesses."""
-        return _backlash(self.sun, self.planet, self.working_pressure_angle_sun_planet)
-
-    @property
-    def circumferential_backlash_planet_ring(self) -> float:
-        """Play [m] on the working pitch circles, pitch minus both tooth thicknesses."""
-        return _backlash(self.planet, self.ring, self.working_pressure_angle_planet_ring)
-
-    @property
     def backlash_sun_planet(self) -> float:
         """Normal play [m] along the line of action."""
-        angle = self.working_pressure_angle_sun_planet
-        return self.circumferential_backlash_sun_planet * math.cos(angle)
+        return _backlash(self.sun, self.planet, self.working_pressure_angle_sun_planet)
 
     @property
     def backlash_planet_ring(self) -> float:
         """Normal play [m] along the line of action."""
-        angle = self.working_pressure_angle_planet_ring
-        return self.circumferential_backlash_planet_ring * math.cos(angle)
+        return _backlash(self.planet, self.ring, self.working_pressure_angle_planet_ring)
 
     @property
     def mesh_phases(self) -> np.ndarray:
@@ -215,42 +205,147 @@ def close_set(
     _check_find(find, centre_distance)
     if centre_distance is None:
         centre_distance = _free_distance(sun, planet, ring, find)
-    total = _required_shift(sun, planet, centre_distance)  # x_sun + x_planet
-    difference = _required_shift(planet, ring, centre_distance)  # x_ring - x_planet
+    total = zero_backlash_shift(sun, planet, centre_distance)  # x_sun + x_planet
+    difference = zero_backlash_shift(planet, ring, centre_distance)  # x_ring - x_planet
     x_sun, x_planet, x_ring = sun.profile_shift, planet.profile_shift, ring.profile_shift
     if "planet" in find:
         x_planet = x_ring - difference if "sun" in find else total - x_sun
     x_sun = total - x_planet if "sun" in find else x_sun
     x_ring = difference + x_planet if "ring" in find else x_ring
-    shifts = ((sun, x_sun), (planet, x_planet), (ring, x_ring))
-    return PlanetarySet(*(_shifted(g, x) for g, x in shifts), centre_distance, planet_angles)
+    gears = _shifted(sun, x_sun), _shifted(planet, x_planet), _shifted(ring, x_ring)
+    return PlanetarySet(*gears, centre_distance, planet_angles)
 
 
-def free_centre_distances(sun: Gear, planet: Gear, ring: Gear) -> tuple[float, float]:
-    """Centre distances [m] without play of sun-planet and planet-ring, allowances left aside."""
-    alpha = sun.pressure_angle
-    out = []
-    for one, two in ((sun, planet), (planet, ring)):
-        shifts = one.profile_shift, two.profile_shift
-        try:
-            angle = involute.working_pressure_angle(
-                one.teeth, two.teeth, *shifts, alpha, internal=two.internal
-            )
-        except GeometryError as error:
-            raise GeometryError(
-                f"no centre distance suits profile shifts {shifts[0]:.4f} ({one.name}) and {shifts[1]:.4f} "
-                f"({two.name}): {error.message}",
-                code=error.code,
-                key=f"{two.name}.profile_shift",
-                value=shifts[1],
-                limit=error.limit,
-                remedy=error.remedy,
-            ) from None
-        reference = involute.reference_centre_distance(
-            one.teeth, two.teeth, one.module, internal=two.internal
+def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, int]:
+    """Whole tooth numbers next to ``z / cos^3(beta)`` of sun, planet and ring."""
+    cube = math.cos(helix_angle) ** 3
+    return round(gears.sun.teeth / cube), round(gears.planet.teeth / cube), round(gears.ring.teeth / cube)
+
+
+def virtual_set(gears: PlanetarySet, helix_angle: float) -> PlanetarySet:
+    """Spur gears of the normal section: one planet, whole tooth numbers next to ``z / cos^3(beta)``.
+
+    The normal section cuts the reference cylinder in an ellipse with the radius of curvature
+    ``r / cos^2(beta)`` at the tooth (G. Niemann and H. Winter, Maschinenelemente, vol. 2, section 21.3).
+    Rims keep their thickness beside the roots. The ring's profile shift is found, which takes up that the
+    tooth numbers were rounded.
+
+    Parameters
+    ----------
+    gears : PlanetarySet
+        Of the transverse section.
+    helix_angle : float
+        [rad]
+
+    Raises
+    ------
+    GeometryError
+        Where virtual gears cannot be made.
+    """
+    sun, planet, ring = virtual_teeth(gears, helix_angle)
+    return close_set(
+        _virtual(gears.sun, sun, helix_angle),
+        _virtual(gears.planet, planet, helix_angle),
+        _virtual(gears.ring, ring, helix_angle),
+        planet_angles=(0.0,),
+        find=("ring",),
+    )
+
+
+def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
+    factor = math.cos(helix_angle)
+    rack, module = gear.rack, gear.module * factor
+    radius = 0.5 * module * teeth
+
+    def moved(diameter: float | None) -> float | None:
+        """A given diameter as far from the virtual reference circle as it was from the true one."""
+        return None if diameter is None else diameter + 2.0 * (radius - gear.reference_radius)
+
+    made = Gear(
+        teeth=teeth,
+        module=module,
+        pressure_angle=math.atan(math.tan(gear.pressure_angle) * factor),
+        profile_shift=gear.profile_shift / factor,
+        face_width=gear.face_width,
+        # replaced below, once the root circle is known
+        rim_radius=2.0 * radius if gear.internal else 0.2 * radius,
+        internal=gear.internal,
+        rack=BasicRack(
+            addendum=rack.addendum / factor,
+            dedendum=rack.dedendum / factor,
+            root_radius=rack.root_radius / factor,
+        ),
+        tip_diameter=moved(gear.tip_diameter),
+        root_diameter=moved(gear.root_diameter),
+        thickness_allowance=gear.thickness_allowance * factor,
+        name=gear.name,
+    )
+    return replace(made, rim_radius=made.root_radius + gear.rim_radius - gear.root_radius)
+
+
+def _tooth_sum(one: Gear, two: Gear) -> int:
+    """Sum of the teeth of an external pair, difference of an internal one (gear 2)."""
+    return two.teeth - one.teeth if two.internal else one.teeth + two.teeth
+
+
+def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> float:
+    """Working pressure angle [rad] of two gears at a centre distance [m], ``cos(aw) = a0 cos(alpha) / a``.
+
+    Raises
+    ------
+    GeometryError
+        E-CENTRE-DISTANCE: the base circles would overlap (``cos(aw) > 1``).
+    """
+    base = 0.5 * one.module * _tooth_sum(one, two) * math.cos(one.pressure_angle)
+    if not centre_distance >= base:
+        raise GeometryError(
+            f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {one.teeth} and "
+            f"{two.teeth} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
+            code="E-CENTRE-DISTANCE",
+            key="set.centre_distance",
+            value=centre_distance,
+            limit=f">= {math.ceil(base * 1e7) / 1e4:.4f} mm",
+            remedy="increase the centre distance or reduce the tooth numbers or the module",
         )
-        out.append(reference * math.cos(alpha) / math.cos(angle))
-    return out[0], out[1]
+    return pressure_angle_at(centre_distance, base)
+
+
+def zero_backlash_distance(one: Gear, two: Gear) -> float:
+    """Centre distance [m] at which two gears run without play, allowances left aside.
+
+    External: ``inv(aw) = inv(a) + 2 tan(a) (x1 + x2)/(z1 + z2)`` (ISO 21771, eq. 60); internal (gear 2):
+    ``inv(aw) = inv(a) + 2 tan(a) (x2 - x1)/(z2 - z1)``, shifts positive outwards.
+
+    Raises
+    ------
+    GeometryError
+        E-INVOLUTE: ``inv(aw)`` would be negative.
+    """
+    alpha, total = one.pressure_angle, _tooth_sum(one, two)
+    x_1, x_2 = one.profile_shift, two.profile_shift
+    shift = x_2 - x_1 if two.internal else x_1 + x_2
+    try:
+        angle = arcinv(inv(alpha) + 2.0 * math.tan(alpha) * shift / total)
+    except GeometryError as error:
+        raise GeometryError(
+            f"no centre distance suits profile shifts {x_1:.4f} ({one.name}) and {x_2:.4f} "
+            f"({two.name}): {error.message}",
+            code=error.code,
+            key=f"{two.name}.profile_shift",
+            value=x_2,
+            limit=error.limit,
+            remedy=error.remedy,
+        ) from None
+    return 0.5 * one.module * total * math.cos(alpha) / math.cos(angle)
+
+
+def zero_backlash_shift(one: Gear, two: Gear, centre_distance: float) -> float:
+    """Sum (external) or difference ``x2 - x1`` (internal) of the shifts that run without play at a distance.
+
+    Inverse of `zero_backlash_distance` (ISO 21771, eq. 60).
+    """
+    alpha, working = one.pressure_angle, working_pressure_angle(one, two, centre_distance)
+    return _tooth_sum(one, two) * (inv(working) - inv(alpha)) / (2.0 * math.tan(alpha))
 
 
 def equal_planet_angles(planets: int) -> tuple[float, ...]:
@@ -296,7 +391,44 @@ def check_angles(angles: tuple[float, ...]) -> None:
         )
 
 
-def check_roles(planetary: PlanetarySet) -> None:
+def feasible_angles(teeth_sum: int, angles: tuple[float, ...]) -> tuple[float, ...]:
+    """Assembly positions [rad] nearest to wanted planet angles, counted from the first planet.
+
+    Planets fit at multiples of ``2 pi / (z_s + z_r)`` from each other (Mueller, Epicyclic Drive Trains);
+    ``teeth_sum`` is z_s + z_r.
+    """
+    step = 2.0 * math.pi / teeth_sum
+    return tuple(angles[0] + math.floor((a - angles[0]) / step + 0.5 + 1e-9) * step for a in angles)
+
+
+def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...]) -> tuple[int, ...]:
+    """Assembly positions of planets at given angles [rad], whole multiples of ``2 pi / (z_s + z_r)``.
+
+    Raises
+    ------
+    GeometryError
+        A planet that misses its position by more than `ASSEMBLY_TOLERANCE` (E-ASSEMBLY).
+    """
+    total = sun_teeth + ring_teeth
+    turns = [(a - angles[0]) * total / (2.0 * math.pi) for a in angles]
+    worst = max(abs(t - round(t)) for t in turns)
+    if worst > ASSEMBLY_TOLERANCE:
+        listing = ", ".join(f"{math.degrees(a):.6f}" for a in feasible_angles(total, angles)[:24])
+        each = f"{total / len(angles):.6g}"
+        raise GeometryError(
+            f"{len(angles)} planets do not assemble at these angles: {sun_teeth} + {ring_teeth} teeth times "
+            f"the angle over one turn must be whole, one planet misses by {worst:.3g} teeth "
+            f"((z_s + z_r)/N = {each})",
+            code="E-ASSEMBLY",
+            key="set.planet_angles",
+            value=f"{each} teeth a planet",
+            limit=f"multiples of {360.0 / total:.6f} deg from the first planet",
+            remedy=f"nearest planet_angles that assemble: {listing} deg",
+        )
+    return tuple(round(t) for t in turns)
+
+
+def _check_roles(planetary: PlanetarySet) -> None:
     """Refuse gears that cannot be sun, planet and ring of one set (E-ROLE, E-MODULE)."""
     sun, planet, ring = planetary.sun, planetary.planet, planetary.ring
     for gear, internal in ((sun, False), (planet, False), (ring, True)):
@@ -321,21 +453,16 @@ def check_roles(planetary: PlanetarySet) -> None:
                 )
 
 
-def _working_angle(one: Gear, two: Gear, distance: float) -> float:
-    return involute.angle_at_centre_distance(
-        one.teeth, two.teeth, one.module, one.pressure_angle, distance, internal=two.internal
-    )
-
-
 def _undercut_roll(gear: Gear) -> float:
     """Roll length [m] where an undercut flank ends, minus infinity without undercut."""
     return gear.form_roll if gear.undercut else -math.inf
 
 
 def _backlash(one: Gear, two: Gear, angle: float) -> float:
+    """Pitch minus both tooth thicknesses on the working pitch circles, taken along the normal [m]."""
     eta_1, eta_2 = working_half_angles(one, two, angle)
     r_1, r_2 = one.base_radius / math.cos(angle), two.base_radius / math.cos(angle)
-    return one.pitch_angle * r_1 - 2.0 * (r_1 * eta_1 + r_2 * eta_2)
+    return (one.pitch_angle * r_1 - 2.0 * (r_1 * eta_1 + r_2 * eta_2)) * math.cos(angle)
 
 
 def _fraction(value: np.ndarray) -> np.ndarray:
@@ -359,18 +486,12 @@ def _planet_lag(planetary: PlanetarySet) -> float:
     return (math.pi - eta_ps - eta_pr) / planetary.planet.pitch_angle
 
 
-def _required_shift(one: Gear, two: Gear, distance: float) -> float:
-    return involute.shift_for_angle(
-        one.teeth, two.teeth, one.pressure_angle, _working_angle(one, two, distance), internal=two.internal
-    )
-
-
 def _shifted(gear: Gear, shift: float) -> Gear:
     return gear if shift == gear.profile_shift else replace(gear, profile_shift=shift)
 
 
 def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -> float:
-    first, second = free_centre_distances(sun, planet, ring)
+    first, second = zero_backlash_distance(sun, planet), zero_backlash_distance(planet, ring)
     if find:
         return second if find == ("sun",) else first
     # what BACKLASH_TOLERANCE leaves open, as a change of the centre distance

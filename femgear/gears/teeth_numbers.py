@@ -43,10 +43,8 @@ class ToothChoices:
     sums : (C, H, 2) array
         Shares of the mesh forces that add up to torque (and thrust), and to lateral force (and tilting
         moment), 0 to 1.
-    common_sun_planet, common_planet_ring : (C,) int array
-        Common divisors; with 1 every tooth meets every tooth of the other gear.
-    common_sun_planets, common_ring_planets : (C,) int array
-        Of the teeth of sun (ring) and N: several planets then hit one tooth at the same moment of its cycle.
+    hunting : (C,) bool array
+        Whether every tooth meets every tooth of the other gear in both meshes: no common divisors.
     room : (C,) array
         Between the tip circles of the two nearest planets [modules], negative where they overlap.
     """
@@ -60,19 +58,11 @@ class ToothChoices:
     kind: np.ndarray
     cyclic: np.ndarray
     sums: np.ndarray
-    common_sun_planet: np.ndarray
-    common_planet_ring: np.ndarray
-    common_sun_planets: np.ndarray
-    common_ring_planets: np.ndarray
+    hunting: np.ndarray
     room: np.ndarray
 
     def __len__(self) -> int:
         return len(self.teeth)
-
-    @property
-    def hunting(self) -> np.ndarray:
-        """Whether neither mesh repeats its tooth pairs early, (C,) bool."""
-        return (self.common_sun_planet == 1) & (self.common_planet_ring == 1)
 
     @property
     def spacing_error(self) -> np.ndarray:
@@ -89,12 +79,6 @@ class ToothChoices:
     def only(self, chosen) -> ToothChoices:
         """The choices of a mask (C,) or of indices, in their order."""
         return ToothChoices(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
-
-    def phasing(self, choice: int, **options) -> MeshPhasing:
-        """Mesh phases of one choice; options as in `MeshPhasing`, with the lag of unshifted planets."""
-        sun, planet, ring = (int(z) for z in self.teeth[choice])
-        options = {"lag": standard_lag(planet)} | options
-        return MeshPhasing(sun, ring, tuple(int(m) for m in self.positions[choice]), **options)
 
 
 def neighbouring_teeth(
@@ -129,10 +113,6 @@ def neighbouring_teeth(
     fitting : bool
         Leaves out sets whose neighbouring planets overlap.
 
-    Returns
-    -------
-    ToothChoices
-
     Raises
     ------
     GeometryError
@@ -141,7 +121,10 @@ def neighbouring_teeth(
     equal_planet_angles(planets)
     wanted = (sun_teeth, planet_teeth, ring_teeth)
     _check(wanted, distance, ratio_tolerance, closure, harmonics)
-    teeth = _candidates(wanted, distance, closure)
+    steps = np.arange(-distance, distance + 1)
+    teeth = np.stack(np.meshgrid(*(z + steps for z in wanted), indexing="ij"), axis=-1).reshape(-1, 3)
+    misfit = teeth[:, 2] - teeth[:, 0] - 2 * teeth[:, 1]
+    teeth = teeth[(np.abs(misfit) <= closure) & np.all(teeth >= TEETH_RANGE[0], axis=1)]
     ratio = 1.0 + teeth[:, 2] / teeth[:, 0]
     change = ratio / (1.0 + ring_teeth / sun_teeth) - 1.0
     near = np.abs(change) <= ratio_tolerance + 1e-12
@@ -197,13 +180,6 @@ def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _candidates(wanted, distance: int, closure: int) -> np.ndarray:
-    steps = np.arange(-distance, distance + 1)
-    grid = np.stack(np.meshgrid(*(z + steps for z in wanted), indexing="ij"), axis=-1).reshape(-1, 3)
-    misfit = grid[:, 2] - grid[:, 0] - 2 * grid[:, 1]
-    return grid[(np.abs(misfit) <= closure) & np.all(grid >= TEETH_RANGE[0], axis=1)]
-
-
 def _described(teeth, ratio, change, planets: int, harmonics) -> ToothChoices:
     sun, planet, ring = teeth.T
     total = sun + ring
@@ -223,10 +199,7 @@ def _described(teeth, ratio, change, planets: int, harmonics) -> ToothChoices:
         kind=phase_kinds(-sun, positions, total, harmonics),
         cyclic=np.where(even[:, None], cyclic, -1),
         sums=np.stack([sums[..., 0], sums[..., 1:].max(axis=-1)], axis=-1),
-        common_sun_planet=np.gcd(sun, planet),
-        common_planet_ring=np.gcd(planet, ring),
-        common_sun_planets=np.gcd(sun, planets),
-        common_ring_planets=np.gcd(ring, planets),
+        hunting=(np.gcd(sun, planet) == 1) & (np.gcd(planet, ring) == 1),
         room=_room(teeth, positions, total),
     )
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.fillet import fillet_point
 from femgear.gears.gear import Gear, flank_points, half_thickness_angle
 
 # point spacing in modules, before `refine`: about 1200 triangles in the half sector of the reference sun
@@ -67,10 +67,6 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     refine : float
         Divides every spacing, that of the flank included.
 
-    Returns
-    -------
-    HalfSector
-
     Raises
     ------
     GeometryError
@@ -80,12 +76,12 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     _check_sizes(flank_elements, refine)
     count = max(2, round(flank_elements * refine))
     sizes = _Sizes(unit=gear.module / refine, growth=GROWTH / refine)
-    rolls = np.linspace(gear.tip_roll, flank_end_roll(gear, count), 2 * count + 1)
+    rolls = np.linspace(gear.tip_roll, _flank_end_roll(gear, count), 2 * count + 1)
     flank = flank_points(gear, rolls)
     fillet, split = _fillet(gear, flank, rolls[-1], sizes)
     root = _root(gear, fillet, sizes)
-    tip = _tip(gear, flank, sizes)
-    base = _tooth_base(fillet[split], sizes)
+    tip = _arc_to(flank[0], gear.tip_radius, _last_edge(flank[::-1]), sizes)
+    base = _arc_to(fillet[split], math.hypot(*fillet[split]), FILLET_SIZE * sizes.unit, sizes)
     last = _last_edge(root if root is not None else fillet)
     cut = _cut(gear, sizes, start=last)
     rim = _rim(gear, sizes)
@@ -95,9 +91,13 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     if gear.internal:  # built as if the tooth pointed outwards; that of an internal gear runs the other way
         parts = [(name, points[::-1]) for name, points in reversed(parts)]
         rolls = rolls[::-1]
+    joined = []
+    for i, (name, points) in enumerate(parts):
+        # consecutive curves have the very same end points
+        points = np.vstack([parts[i - 1][1][-1:], points[1:]])
+        joined.append((name, _read_only(points)))
     inside = _inside(gear, fillet[split])
-    arrays = tuple((name, _read_only(points)) for name, points in _joined(parts))
-    return HalfSector(arrays, (("tooth_base", _read_only(base)),), inside, _read_only(rolls))
+    return HalfSector(tuple(joined), (("tooth_base", _read_only(base)),), inside, _read_only(rolls))
 
 
 @dataclass(frozen=True)
@@ -107,17 +107,17 @@ class _Sizes:
     unit: float
     growth: float
 
-    def spacing(self, length: float, start: float, end: float, *, largest) -> np.ndarray:
+    def spacing(
+        self, length: float, start: float, end: float, *, largest: float | Callable[[np.ndarray], np.ndarray]
+    ) -> np.ndarray:
         """Positions (2 k + 1,) in 0 .. 1 of vertices and mid points; edges grow from both ends (sizes in m).
 
         `largest` is a size or a function that gives it at distances from the start. The number of edges is
         the integral of 1/size; the vertices divide that integral equally.
         """
         s = np.linspace(0.0, length, 2001)
-        if callable(largest):
-            largest = largest(s)
         grown = np.minimum(start + self.growth * s, end + self.growth * (length - s))
-        density = 1.0 / np.minimum(grown, largest)
+        density = 1.0 / np.minimum(grown, largest(s) if callable(largest) else largest)
         integral = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
         count = max(1, math.ceil(integral[-1] - 0.2))
         vertices = np.interp(np.linspace(0.0, integral[-1], count + 1), integral, s) / length
@@ -150,7 +150,7 @@ def _last_edge(points: np.ndarray) -> float:
     return math.dist(points[-3], points[-1])
 
 
-def flank_end_roll(gear: Gear, flank_elements: int) -> float:
+def _flank_end_roll(gear: Gear, flank_elements: int) -> float:
     """Roll length [m] where the curve "flank" ends: the form radius, or one element from the base circle.
 
     Steps uniform in roll angle shrink to nothing at the base circle (edge length roll^2 / (2 rb)) and their
@@ -164,12 +164,12 @@ def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tu
 
     Bits of involute or root arc that are too short for an edge of their own belong to it.
     """
-    corner = float(fillet_point(gear.tool, 0.0)[1])
+    corner = float(gear.tool.fillet_point(0.0)[1])
     land = math.pi / gear.teeth - corner
 
     def point(p):
         # p in -1 .. 0: rest of the involute, 0 .. 1: generated fillet, 1 .. 2: short root arc
-        radius, angle = fillet_point(gear.tool, gear.fillet_end * (1.0 - np.clip(p, 0.0, 1.0)))
+        radius, angle = gear.tool.fillet_point(gear.fillet_end * (1.0 - np.clip(p, 0.0, 1.0)))
         angle = np.where(p > 1.0, corner + land * (p - 1.0), angle)
         generated = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
         involute = flank_points(gear, gear.form_roll + (end_roll - gear.form_roll) * np.maximum(-p, 0.0))
@@ -213,20 +213,10 @@ def _root(gear: Gear, fillet: np.ndarray, sizes: _Sizes) -> np.ndarray | None:
     return points
 
 
-def _tip(gear: Gear, flank: np.ndarray, sizes: _Sizes) -> np.ndarray:
-    """Tip arc from the symmetry line to the flank."""
-    end, largest = math.atan2(flank[0, 1], flank[0, 0]), INNER_SIZE * sizes.unit
-    spacing = sizes.spacing(gear.tip_radius * end, largest, _last_edge(flank[::-1]), largest=largest)
-    points = _arc(gear.tip_radius, 0.0, end, spacing)
-    points[0, 1] = 0.0
-    points[-1] = flank[0]
-    return points
-
-
-def _tooth_base(end: np.ndarray, sizes: _Sizes) -> np.ndarray:
-    """Arc about the gear centre from the symmetry line to a fillet point."""
-    radius, angle, largest = math.hypot(*end), math.atan2(end[1], end[0]), INNER_SIZE * sizes.unit
-    spacing = sizes.spacing(radius * angle, largest, FILLET_SIZE * sizes.unit, largest=largest)
+def _arc_to(end: np.ndarray, radius: float, size: float, sizes: _Sizes) -> np.ndarray:
+    """Arc about the gear centre from the symmetry line to a point, with the size [m] of its last edge."""
+    angle, largest = math.atan2(end[1], end[0]), INNER_SIZE * sizes.unit
+    spacing = sizes.spacing(radius * angle, largest, size, largest=largest)
     points = _arc(radius, 0.0, angle, spacing)
     points[0, 1] = 0.0
     points[-1] = end
@@ -317,16 +307,6 @@ def _inside(gear: Gear, split: np.ndarray) -> tuple[tuple[str, tuple[float, floa
         ("tooth", (middle, lateral)),
         ("body", (below * math.cos(angle), below * math.sin(angle))),
     )
-
-
-def _joined(parts):
-    """Give consecutive curves the very same end points."""
-    joined = []
-    for i, (name, points) in enumerate(parts):
-        points = np.array(points)
-        points[0] = parts[i - 1][1][-1]
-        joined.append((name, points))
-    return joined
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:

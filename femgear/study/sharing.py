@@ -25,7 +25,8 @@ from femgear.contact.sides import mirrored_set
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import RIGID, Supports, moving_members
 from femgear.errors import CaseError, ContactError
-from femgear.gears.deviations import SetDeviations, mesh_normals, mirrored_deviations, no_deviations
+from femgear.gears.deviations import SetDeviations, mirrored_deviations, no_deviations
+from femgear.gears.kinematics import mesh_normals
 from femgear.study.linearised import in_windows
 from femgear.threads import one_blas_thread
 
@@ -198,7 +199,7 @@ def _placed(s, order, load, force, deflection, between, supports, change, *, mir
 def pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
     """Separation of every path per unit radial and tangential displacement of its pin, (N, 2).
 
-    ``(n_sp - n_pr) . u`` with the normals of `gears.deviations.mesh_normals`.
+    ``(n_sp - n_pr) . u`` with the normals of `gears.kinematics.mesh_normals`.
     """
     s, N = planetary_set, planetary_set.n_planets
     normals = mesh_normals(s)

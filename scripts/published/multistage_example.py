@@ -15,11 +15,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from published.iso6336_stiffness import mesh_stiffness_method_b
 
-from femgear.gears.fillet import BasicRack
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
+from femgear.gears.profile import BasicRack
 from femgear.system.assembler import planar_meshes
 from femgear.system.elements import GearMeshes
 from femgear.system.lumped import PlanarBody, PlanarSet, torsional_of_reduced, torsional_set

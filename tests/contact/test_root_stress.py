@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from validation.planetary import reference_set
+from validation.reference.plane_elasticity import stress
 
 from femgear.contact.bodies import deformed_set, make_bodies, make_sectors
 from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
@@ -22,10 +23,9 @@ from femgear.contact.root_stress import (
     worst_history,
 )
 from femgear.fe.compliance import symmetric_factor
-from femgear.fe.elasticity import Material, foundation, stiffness, stress
+from femgear.fe.elasticity import Material, foundation, stiffness, tangential_stress
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
 from femgear.fe.meshing import mesh_outline
-from femgear.fe.stress import tangential_stress
 from femgear.gears.deviations import no_deviations
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import nominal_root_stress

@@ -198,7 +198,7 @@ def test_reduced_ring_is_statically_complete(gear, sector):
 
 def test_displacement_field_of_the_whole_gear(gear, sector, whole):
     """Loads on three teeth: the field from one sector is that of the whole gear."""
-    from femgear.fe.stress import cyclic_displacement
+    from femgear.fe.compliance import cyclic_displacement
 
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
     columns = flank_load_columns(sector, flank_stations(sector, gear))

@@ -8,11 +8,11 @@ import threading
 
 import numpy as np
 import pytest
+from validation.reference.plane_elasticity import quality
 
 from femgear.errors import GridError
 from femgear.fe import grid as fe_grid
 from femgear.fe import meshing
-from femgear.fe.grid import quality
 from femgear.fe.meshing import mesh_outline, mesh_outlines
 from femgear.fe.outline import Outline, check_outline, estimate_elements
 
@@ -28,9 +28,9 @@ def polygon(corners, *, name="edge", divide=1):
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
 
-def refusal(outline, **options):
+def refusal(outline):
     with pytest.raises(GridError) as error:
-        mesh_outline(outline, **options)
+        mesh_outline(outline)
     return error.value
 
 
@@ -56,7 +56,7 @@ def test_same_outline_same_grid_at_any_scale_and_place():
 
 def test_several_outlines_in_order():
     outlines = [polygon(np.array(SQUARE) * k, divide=3) for k in (1.0, 2.0, 3.0)]
-    grids = mesh_outlines(outlines, processes=2)
+    grids = mesh_outlines(outlines)
     assert [grid.points.max() for grid in grids] == [1.0, 2.0, 3.0]
 
 
@@ -127,7 +127,8 @@ def fake_gmsh(folder, monkeypatch, text):
 
 def test_generator_that_does_not_return_is_killed(tmp_path, monkeypatch):
     fake_gmsh(tmp_path, monkeypatch, "import time\ntime.sleep(60)\n")
-    error = refusal(polygon(SQUARE), time_limit=0.8)
+    monkeypatch.setattr(meshing, "TIME_LIMIT", 0.8)
+    error = refusal(polygon(SQUARE))
     assert error.code == "E-GRID-TIMEOUT" and "0.8 s" in str(error)
 
 

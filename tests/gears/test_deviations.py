@@ -11,19 +11,19 @@ from hypothesis import strategies as st
 
 from femgear.contact.candidates import tooth_numbers
 from femgear.errors import GeometryError
-from femgear.gears.deviation_checks import check_deviations, least_play
 from femgear.gears.deviations import (
     Ovality,
     Runout,
     body_separation,
+    check_deviations,
     common_period,
-    mesh_normals,
+    least_play,
     no_deviations,
     profile_separation,
     tooth_displacements,
     tooth_separation,
 )
-from femgear.gears.kinematics import orientations
+from femgear.gears.kinematics import mesh_normals, orientations
 from femgear.gears.modifications import FlankForm, ProfileSlope, TipRelief
 
 

@@ -11,9 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femgear.gears.fillet import BasicRack, PinionCutter, fillet_point
 from femgear.gears.gear import Gear, cutter_of, flank_points
-from femgear.gears.involute import arcinv, inv
+from femgear.gears.profile import BasicRack, PinionCutter, arcinv, inv
 
 ALPHA = math.radians(20.0)
 EXTERNAL = {
@@ -40,7 +39,7 @@ INTERNAL = {
 
 def cut_points(gear, count=6):
     """Points of the fillet and of the flank (root to tip)."""
-    radius, angle = fillet_point(gear.tool, np.linspace(0.0, gear.fillet_end, count))
+    radius, angle = gear.tool.fillet_point(np.linspace(0.0, gear.fillet_end, count))
     fillet = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
     return fillet, flank_points(gear, np.linspace(gear.form_roll, gear.tip_roll, count))
 
@@ -149,7 +148,7 @@ def test_cutter_touches_flank_and_fillet_and_cuts_no_deeper(name):
 
 @pytest.mark.parametrize("gear", [*EXTERNAL.values(), *INTERNAL.values()], ids=[*EXTERNAL, *INTERNAL])
 def test_fillet_meets_root_circle_and_flank(gear):
-    radius, angle = fillet_point(gear.tool, np.array([0.0, gear.fillet_end]))
+    radius, angle = gear.tool.fillet_point(np.array([0.0, gear.fillet_end]))
     assert radius[0] == pytest.approx(gear.root_radius, rel=1e-14)
     end = flank_points(gear, np.array([gear.form_roll]))[0]
     meeting = radius[1] * np.array([math.cos(angle[1]), math.sin(angle[1])])
@@ -159,7 +158,7 @@ def test_fillet_meets_root_circle_and_flank(gear):
 @pytest.mark.parametrize("gear", [*EXTERNAL.values(), *INTERNAL.values()], ids=[*EXTERNAL, *INTERNAL])
 def test_tangent_is_continuous_where_the_tooth_is_not_undercut(gear):
     step = 1e-6
-    radius, angle = fillet_point(gear.tool, gear.fillet_end - step * np.array([1.0, 0.0]))
+    radius, angle = gear.tool.fillet_point(gear.fillet_end - step * np.array([1.0, 0.0]))
     fillet = np.diff(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]), axis=0)[0]
     flank = np.diff(flank_points(gear, gear.form_roll + gear.module * np.array([0.0, 1e-6])), axis=0)[0]
     if gear.internal:

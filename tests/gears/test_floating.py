@@ -8,8 +8,7 @@ import pytest
 from scipy.optimize import linprog
 from validation.planetary import reference_set
 
-from femgear.gears.checks import unheld_members
-from femgear.gears.deviations import mesh_normals
+from femgear.gears.kinematics import mesh_normals, unheld_members
 
 MEMBERS = ("sun", "carrier", "ring")
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears.fillet import BasicRack, PinionCutter
 from femgear.gears.gear import Gear, flank_points, half_thickness_angle, roll_length, tooth_thickness
-from femgear.gears.involute import inv
+from femgear.gears.profile import BasicRack, PinionCutter, inv
 
 ALPHA = math.radians(20.0)
 SUN = Gear(27, 1.5e-3, ALPHA, 0.52681, 25e-3, 9e-3, name="sun")

@@ -5,19 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from validation.reference.gear_limits import neighbour_limit
 
 from femgear.errors import GeometryError
-from femgear.gears.checks import (
-    check_passing_tips,
-    check_set,
-    feasible_angles,
-    neighbour_limit,
-    tip_clearances,
-)
-from femgear.gears.fillet import BasicRack
+from femgear.gears.checks import check_passing_tips, check_set, tip_clearances, tip_margin
 from femgear.gears.gear import Gear
-from femgear.gears.involute import trochoid_interference
-from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles, feasible_angles
+from femgear.gears.profile import BasicRack
 
 ALPHA = math.radians(20.0)
 
@@ -153,8 +147,8 @@ def test_passing_tips_against_rolled_outlines(ring):
     base = 0.5e-3 * math.cos(ALPHA) * np.array([40, ring])
     distance = 0.5e-3 * (ring - 40)
     tip = max(math.hypot(base[1], distance * math.sin(ALPHA)) + 2e-5, 0.5e-3 * (ring - 2))
-    margin = trochoid_interference(40, ring, 21e-3, tip, *base, distance)
-    assert (margin < 0.0) is _tips_strike(ring, tip, distance)
+    pair = _planet_and_ring(ring, tip)
+    assert (tip_margin(*pair, distance) < 0.0) is _tips_strike(*pair, distance)
 
 
 def test_passing_tips_are_refused():
@@ -166,10 +160,15 @@ def test_passing_tips_are_refused():
     assert caught.value.code == "E-TROCHOID"
 
 
-def _tips_strike(ring_teeth, tip, distance):
-    """Roll a planet of 40 teeth in the ring and look for tip corners of the planet inside ring teeth."""
+def _planet_and_ring(ring_teeth, tip):
+    """A planet of 40 teeth, and a ring with a given tip radius."""
     planet = Gear(40, 1e-3, ALPHA, 0.0, 1e-2, 15e-3)
-    ring = Gear(ring_teeth, 1e-3, ALPHA, 0.0, 1e-2, 40e-3, internal=True, tip_diameter=2 * tip)
+    return planet, Gear(ring_teeth, 1e-3, ALPHA, 0.0, 1e-2, 40e-3, internal=True, tip_diameter=2 * tip)
+
+
+def _tips_strike(planet, ring, distance):
+    """Roll the planet of 40 teeth in the ring and look for tip corners of the planet inside ring teeth."""
+    ring_teeth = ring.teeth
     half = math.pi / 80 + math.tan(ALPHA) - ALPHA
     corner = half - (math.tan(b := math.acos(planet.base_radius / planet.tip_radius)) - b)
     turns = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 40001)
@@ -181,7 +180,7 @@ def _tips_strike(ring_teeth, tip, distance):
         local = np.angle(point) - turns * 40 / ring_teeth - math.pi / ring_teeth
         pitch = ring.pitch_angle
         local = np.abs((local + 0.5 * pitch) % pitch - 0.5 * pitch)
-        ok = (r >= tip) & (r > ring.base_radius)
+        ok = (r >= ring.tip_radius) & (r > ring.base_radius)
         pressure = np.arccos(ring.base_radius / r[ok])
         width = math.pi / (2 * ring_teeth) - (math.tan(ALPHA) - ALPHA) + np.tan(pressure) - pressure
         worst = max(worst, float(np.max(width - local[ok], initial=0.0)))

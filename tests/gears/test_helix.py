@@ -4,10 +4,9 @@ import math
 
 import pytest
 
-from femgear.gears.fillet import BasicRack
 from femgear.gears.gear import Gear
-from femgear.gears.helix import transverse_rack, transverse_tool, virtual_set, virtual_teeth
-from femgear.gears.planetary import close_set
+from femgear.gears.planetary import close_set, virtual_set, virtual_teeth
+from femgear.gears.profile import BasicRack, transverse_rack, transverse_tool
 
 NORMAL = BasicRack(addendum=1.0, dedendum=1.25, root_radius=0.2)
 

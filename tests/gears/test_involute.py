@@ -1,13 +1,17 @@
 """Involute relations against closed forms and high-precision numbers."""
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
+from validation.reference import gear_limits as limits
 
 from femgear.errors import GeometryError
-from femgear.gears import involute as iv
+from femgear.gears import profile as iv
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import working_pressure_angle, zero_backlash_distance, zero_backlash_shift
 
 ALPHA = math.radians(20.0)
 
@@ -39,40 +43,50 @@ def test_arcinv_refuses_what_has_no_angle(value):
     assert caught.value.code == "E-INVOLUTE"
 
 
-def test_working_angle_and_shift_are_inverse_for_both_kinds_of_mesh():
+def pair(teeth, shifts=(0.0, 0.0), *, internal=False):
+    """Gears of module 1.5 mm; the second may be internal."""
+    one, two = (Gear(z, 1.5e-3, ALPHA, x, 0.02, 5e-3) for z, x in zip(teeth, shifts))
+    return one, replace(two, internal=True, rim_radius=0.1) if internal else two
+
+
+def test_centre_distance_and_shift_are_inverse_for_both_kinds_of_mesh():
     for internal, teeth, shifts in ((False, (17, 34), (0.3, 0.1)), (True, (20, 80), (-0.1, 0.25))):
-        angle = iv.working_pressure_angle(*teeth, *shifts, ALPHA, internal=internal)
+        gears = pair(teeth, shifts, internal=internal)
         wanted = shifts[1] - shifts[0] if internal else sum(shifts)
-        assert iv.shift_for_angle(*teeth, ALPHA, angle, internal=internal) == pytest.approx(wanted, rel=1e-12)
+        found = zero_backlash_shift(*gears, zero_backlash_distance(*gears))
+        assert found == pytest.approx(wanted, rel=1e-12)
 
 
 def test_positive_shift_of_an_internal_gear_moves_its_flank_outwards():
     # a wider ring lets the planet run at a larger centre distance, hence a larger working angle
-    assert iv.working_pressure_angle(20, 80, 0.0, 0.2, ALPHA, internal=True) > ALPHA
+    gears = pair((20, 80), (0.0, 0.2), internal=True)
+    assert working_pressure_angle(*gears, zero_backlash_distance(*gears)) > ALPHA
 
 
 def test_centre_distance_below_the_base_circles_is_refused_with_the_limit():
     with pytest.raises(GeometryError) as caught:
-        iv.angle_at_centre_distance(27, 40, 1.5e-3, ALPHA, 47e-3)
+        working_pressure_angle(*pair((27, 40)), 47e-3)
     assert caught.value.code == "E-CENTRE-DISTANCE"
     assert "47.2196" in caught.value.limit  # 50.25 cos 20 deg
     with pytest.raises(GeometryError):
-        iv.angle_at_centre_distance(27, 40, 1.5e-3, ALPHA, 0.0)
+        working_pressure_angle(*pair((27, 40)), 0.0)
 
 
 def test_largest_root_radius_of_the_iso_rack():
-    assert iv.largest_root_radius(ALPHA, 1.25) == pytest.approx(0.472, abs=5e-4)  # ISO 53, profiles C and D
+    assert limits.largest_root_radius(ALPHA, 1.25) == pytest.approx(
+        0.472, abs=5e-4
+    )  # ISO 53, profiles C and D
 
 
 def test_undercut_limits_agree_with_each_other():
-    assert iv.undercut_shift(iv.undercut_teeth(ALPHA), ALPHA) == pytest.approx(0.0, abs=1e-15)
-    assert iv.undercut_teeth(ALPHA, shift=iv.undercut_shift(10, ALPHA)) == pytest.approx(10.0, rel=1e-14)
+    assert iv.undercut_shift(limits.undercut_teeth(ALPHA), ALPHA) == pytest.approx(0.0, abs=1e-15)
+    assert limits.undercut_teeth(ALPHA, shift=iv.undercut_shift(10, ALPHA)) == pytest.approx(10.0, rel=1e-14)
 
 
 def test_pointed_tip_shift_makes_the_thickness_vanish():
-    shift = iv.pointed_tip_shift(12, ALPHA)
+    shift = limits.pointed_tip_shift(12, ALPHA)
     tip, base = 6.0 + 1.0 + shift, 6.0 * math.cos(ALPHA)
     half = math.pi / 24 + 2 * shift * math.tan(ALPHA) / 12 + iv.inv(ALPHA) - iv.inv(math.acos(base / tip))
     assert half == pytest.approx(0.0, abs=1e-14)
     with pytest.raises(GeometryError):
-        iv.pointed_tip_shift(200, ALPHA)
+        limits.pointed_tip_shift(200, ALPHA)

@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from phase_patterns import cyclic_shares
 
 from femgear.contact.sides import flank_side
 from femgear.errors import GeometryError
@@ -13,7 +14,6 @@ from femgear.gears.kinematics import orientations
 from femgear.gears.phasing import (
     MeshPhasing,
     cyclic_harmonic,
-    cyclic_shares,
     mesh_phasing,
     phase_factors,
     phasing_of_set,

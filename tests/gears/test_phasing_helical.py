@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from phase_patterns import mesh_loads
 
-from femgear.gears.checks import feasible_angles
-from femgear.gears.phasing import MEMBERS, mesh_loads, mesh_phasing, phasing_table
-from femgear.gears.planetary import equal_planet_angles
+from femgear.gears.phasing import MEMBERS, mesh_phasing, phasing_table
+from femgear.gears.planetary import equal_planet_angles, feasible_angles
 from femgear.system.lumped import HelicalBody, HelicalSupport
 from femgear.trains.helical.model import (
     HelicalSet,

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears.fillet import BasicRack
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
-from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles, free_centre_distances
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles, zero_backlash_distance
+from femgear.gears.profile import BasicRack
 
 ALPHA = math.radians(20.0)
 RACK = BasicRack(root_radius=0.15)  # with 0.25 the ring's tips touch some of these planets' fillets
@@ -142,7 +142,7 @@ def test_closing_finds_shifts_that_leave_no_backlash():
             assert getattr(s, name).profile_shift == 0.1
     s = close_set(sun, planet, ring, planet_angles=angles, find=("ring",))
     assert abs(s.backlash_sun_planet) < 1e-14 and abs(s.backlash_planet_ring) < 1e-14
-    assert s.centre_distance == pytest.approx(free_centre_distances(sun, planet, ring)[0], rel=1e-14)
+    assert s.centre_distance == pytest.approx(zero_backlash_distance(sun, planet), rel=1e-14)
 
 
 def test_sets_whose_meshes_want_different_centre_distances_are_refused():

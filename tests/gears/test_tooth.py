@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import GeometryError
-from femgear.gears.fillet import BasicRack, fillet_point
 from femgear.gears.gear import Gear, flank_points, half_thickness_angle
+from femgear.gears.profile import BasicRack
 from femgear.gears.tooth import half_sector
 
 ALPHA = math.radians(20.0)
@@ -69,7 +69,7 @@ def test_area_is_that_of_the_exact_tooth(name):
     gear = GEARS[name]
     rolls = np.linspace(gear.form_roll, gear.tip_roll, 20001)
     r_flank = np.hypot(gear.base_radius, rolls)
-    r_fillet, a_fillet = fillet_point(gear.tool, np.linspace(0.0, gear.fillet_end, 20001))
+    r_fillet, a_fillet = gear.tool.fillet_point(np.linspace(0.0, gear.fillet_end, 20001))
     area = np.trapezoid(half_thickness_angle(gear, r_flank) * r_flank, r_flank)
     area += np.trapezoid(a_fillet * r_fillet, r_fillet)
     area += 0.5 * math.pi / gear.teeth * (gear.root_radius**2 - gear.rim_radius**2)
@@ -112,7 +112,7 @@ def test_flank_stations_are_uniform_in_roll_and_end_at_tip_and_fillet(name):
 @every_gear
 def test_fillet_points_lie_on_the_generated_curve(name):
     gear, points = GEARS[name], half_sector(GEARS[name]).curve("fillet")
-    radius, angle = fillet_point(gear.tool, np.linspace(0.0, gear.fillet_end, 200_001))
+    radius, angle = gear.tool.fillet_point(np.linspace(0.0, gear.fillet_end, 200_001))
     dense = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
     tangent = np.gradient(dense, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1)[:, None]

@@ -13,9 +13,8 @@ from femgear.errors import CaseError, ContactError
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.fe.reduction import CyclicModes
-from femgear.gears.checks import feasible_angles
 from femgear.gears.gear import Gear
-from femgear.gears.planetary import PlanetarySet, equal_planet_angles
+from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_angles
 from femgear.solvers.linear.modal import complex_modes, solve_modes
 from femgear.system.assembler import planar_system
 from femgear.system.lumped import PlanarBody, planar_from_set

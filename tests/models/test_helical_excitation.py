@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from published.iso6336_stiffness import theoretical_single_stiffness
 from published.planetary_sets import kahraman_set
 from scipy.integrate import quad
 
 from femgear.contact.cycle import cycle_without_load
 from femgear.errors import CaseError
-from femgear.gears import involute
-from femgear.gears.iso6336 import theoretical_single_stiffness
+from femgear.gears import profile
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import contact_line_width, helical_excitation, slice_phases
 
@@ -99,12 +99,12 @@ def test_records_of_several_periods_keep_their_orders():
 def test_height_runs_ahead_by_the_twist_of_the_flanks(helix):
     """A flank at height z stands z tan(beta_b) / r_b ahead of the one at mid-face, over the pitch angle."""
     beta, normal_angle, module, teeth, width = math.radians(helix), math.radians(20.0), 2e-3, 30, 0.04
-    transverse = involute.transverse_angle(normal_angle, beta)
+    transverse = profile.transverse_angle(normal_angle, beta)
     base = 0.5 * teeth * module / math.cos(beta) * math.cos(transverse)
-    twist = math.tan(involute.base_helix_angle(normal_angle, beta)) / base
+    twist = math.tan(profile.base_helix_angle(normal_angle, beta)) / base
     height = kahraman_set(slices=4, face_width=width).slice_heights
     ahead = slice_phases(
-        [0.2], involute.overlap_ratio(width, module, beta), slices=4, hand=int(np.sign(helix))
+        [0.2], profile.overlap_ratio(width, module, beta), slices=4, hand=int(np.sign(helix))
     )  # fmt: skip
     assert ahead == pytest.approx(0.2 + height * twist * teeth / (2 * math.pi), rel=1e-12)
 

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from femgear.fe.elasticity import Material, basis, checked_solve, edge_load, node_of_dof, stiffness, stress
+from femgear.fe.elasticity import Material, basis, node_of_dof, stiffness
 from femgear.fe.grid import Grid
 from validation.mapped import boundary_nodes, mapped_grid, ring_mapping
+from validation.reference.plane_elasticity import checked_solve, edge_load, stress
 from validation.rows import REPEATED, Row, at_most, printed, within
 
 LAME = "Lame (Timoshenko and Goodier, art. 28)"

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from femgear.gears import involute
+from femgear.gears import profile
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import working_pressure_angle, zero_backlash_distance
+from femgear.gears.profile import BasicRack
+from validation.reference import gear_limits
 from validation.rows import REPEATED, Row, counted, printed
 
 TWENTY = math.radians(20.0)
@@ -14,14 +19,14 @@ def involute_function() -> tuple[Row, ...]:
     """D1: the involute function and its inverse."""
     source = "tan(alpha) - alpha in extended precision"
     rows = [
-        printed("D1", source, f"inv {degrees} deg [rad]", value, involute.inv(math.radians(float(degrees))))
+        printed("D1", source, f"inv {degrees} deg [rad]", value, profile.inv(math.radians(float(degrees))))
         for degrees, value in (
             ("20", ".014904383867336446"),
             ("25", ".0299753451564162"),
             ("22.5", ".021514480674370895"),
         )
     ]
-    inverse = math.degrees(involute.arcinv(0.02))
+    inverse = math.degrees(profile.arcinv(0.02))
     return (*rows, printed("D1", source, "arcinv 0.02 [deg]", "21.981101788115", inverse))
 
 
@@ -29,14 +34,18 @@ def _pair(teeth, shifts, degrees, *, internal=False, module=1.0, truncated=False
     """Working angle [rad], centre distance and contact ratio of a pair with addendum one module."""
     alpha = math.radians(degrees)
     cosine = math.cos(alpha)
-    working = involute.working_pressure_angle(*teeth, *shifts, alpha, internal=internal)
-    reference = involute.reference_centre_distance(*teeth, module, internal=internal)
-    distance = reference * cosine / math.cos(working)
+    rack = BasicRack(root_radius=0.1)
+    one, two = (Gear(z, 1e-3 * module, alpha, x, 0.02, 1e-3, rack=rack) for z, x in zip(teeth, shifts))
+    if internal:
+        two = replace(two, internal=True, rim_radius=1.0)
+    distance = 1e3 * zero_backlash_distance(one, two)
+    working = working_pressure_angle(one, two, 1e-3 * distance)
+    reference = 0.5 * module * (teeth[1] - teeth[0] if internal else sum(teeth))
     cut = sum(shifts) - (distance - reference) / module if truncated else 0.0
     base_1, base_2 = (0.5 * module * z * cosine for z in teeth)
     tip_1 = module * (teeth[0] / 2 + 1 + shifts[0] - cut)
     tip_2 = module * (teeth[1] / 2 + (-1 if internal else 1) * (1 - cut) + shifts[1])
-    ratio = involute.contact_ratio_internal if internal else involute.contact_ratio_external
+    ratio = gear_limits.contact_ratio_internal if internal else gear_limits.contact_ratio_external
     return working, distance, ratio(tip_1, base_1, tip_2, base_2, distance, math.pi * module * cosine)
 
 
@@ -63,7 +72,7 @@ def external_pairs() -> tuple[Row, ...]:
             source,
             "limit, two racks, 20 deg",
             "1.98080909704540",
-            involute.limiting_contact_ratio(TWENTY),
+            gear_limits.limiting_contact_ratio(TWENTY),
         )
     )
     working, distance, ratio = _pair((20, 40), (0.3, 0.2), 20, module=3.0)
@@ -101,27 +110,27 @@ def limits() -> tuple[Row, ...]:
     """D4: undercut, pointed tips, tip thickness."""
     source = f"closed forms, 20 deg, addendum 1, evaluated independently ({REPEATED})"
     base = 10.0 * math.cos(TWENTY)
-    pointed = base / math.cos(involute.pointed_tip_angle(20, 0.0, TWENTY))
-    tip = involute.inv(involute.pointed_tip_angle(20, 0.0, TWENTY)) - involute.inv(
-        involute.pressure_angle_at(11.0, base)
+    pointed = base / math.cos(gear_limits.pointed_tip_angle(20, 0.0, TWENTY))
+    tip = profile.inv(gear_limits.pointed_tip_angle(20, 0.0, TWENTY)) - profile.inv(
+        profile.pressure_angle_at(11.0, base)
     )
     return (
-        printed("D4", source, "teeth without undercut", "17.0972643", involute.undercut_teeth(TWENTY)),
-        printed("D4", source, "least shift, 10 teeth", ".4151111", involute.undercut_shift(10, TWENTY)),
-        printed("D4", source, "least shift, 12 teeth", ".2981333", involute.undercut_shift(12, TWENTY)),
+        printed("D4", source, "teeth without undercut", "17.0972643", gear_limits.undercut_teeth(TWENTY)),
+        printed("D4", source, "least shift, 10 teeth", ".4151111", profile.undercut_shift(10, TWENTY)),
+        printed("D4", source, "least shift, 12 teeth", ".2981333", profile.undercut_shift(12, TWENTY)),
         printed(
             "D4",
             source,
             "shift of a pointed tip, 12 teeth",
             ".8202039",
-            involute.pointed_tip_shift(12, TWENTY),
+            gear_limits.pointed_tip_shift(12, TWENTY),
         ),
         printed(
             "D4",
             source,
             "shift of a pointed tip, 20 teeth",
             "1.2223485",
-            involute.pointed_tip_shift(20, TWENTY),
+            gear_limits.pointed_tip_shift(20, TWENTY),
         ),
         printed("D4", source, "tip thickness, 20 teeth [modules]", ".6948800", 2 * 11.0 * tip),
         printed("D4", source, "pointed radius, 20 teeth [modules]", "11.5383374", pointed),
@@ -142,7 +151,7 @@ def _least_ring(planet):
     for ring in range(planet + 8, 400):
         tip, base = ring / 2 - 1, (planet * cosine / 2, ring * cosine / 2)
         # an internal gear whose tip circle lies inside its base circle has no involute there
-        if tip >= base[1] and involute.internal_interference(tip, *base, (ring - planet) / 2) >= 0:
+        if tip >= base[1] and gear_limits.internal_interference(tip, *base, (ring - planet) / 2) >= 0:
             return ring
     return 0
 
@@ -151,15 +160,15 @@ def helical() -> tuple[Row, ...]:
     """D5: a helical pair."""
     source = f"closed forms, m_n 3, beta 15 deg, 20/40, b 40; evaluated independently ({REPEATED})"
     beta = math.radians(15.0)
-    alpha = involute.transverse_angle(TWENTY, beta)
+    alpha = profile.transverse_angle(TWENTY, beta)
     scale = 3.0 / (2 * math.cos(beta))
     radii = [(z * scale + 3.0, z * scale * math.cos(alpha)) for z in (20, 40)]
     pitch = 2 * math.pi * scale * math.cos(alpha)
-    ratio = involute.contact_ratio_external(*radii[0], *radii[1], 60 * scale, pitch)
-    base_helix = math.degrees(involute.base_helix_angle(TWENTY, beta))
+    ratio = gear_limits.contact_ratio_external(*radii[0], *radii[1], 60 * scale, pitch)
+    base_helix = math.degrees(profile.base_helix_angle(TWENTY, beta))
     return (
         printed("D5", source, "transverse pressure angle [deg]", "20.6468965", math.degrees(alpha)),
         printed("D5", source, "base helix angle [deg]", "14.0760954", base_helix),
         printed("D5", source, "transverse contact ratio", "1.5609328", ratio),
-        printed("D5", source, "overlap ratio", "1.0984621", involute.overlap_ratio(40.0, 3.0, beta)),
+        printed("D5", source, "overlap ratio", "1.0984621", profile.overlap_ratio(40.0, 3.0, beta)),
     )

@@ -7,15 +7,23 @@ planetary stage 2 (github.com/gfsReboucas/Drivetrain, @NREL_5MW/stage_02.rtf).
 import math
 
 import pytest
+from published.iso6336_stiffness import mesh_stiffness_method_b, theoretical_single_stiffness
 
 from femgear.errors import GeometryError
-from femgear.gears import involute as iv
-from femgear.gears.checks import check_set, feasible_angles, neighbour_limit
-from femgear.gears.fillet import BasicRack
+from femgear.gears import profile as iv
+from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear, tooth_thickness
-from femgear.gears.iso6336 import mesh_stiffness_method_b, theoretical_single_stiffness
 from femgear.gears.kinematics import torques
-from femgear.gears.planetary import PlanetarySet, equal_planet_angles
+from femgear.gears.planetary import (
+    PlanetarySet,
+    equal_planet_angles,
+    feasible_angles,
+    working_pressure_angle,
+    zero_backlash_distance,
+)
+from femgear.gears.profile import BasicRack
+from validation.reference import gear_limits as limits
+from validation.reference.gear_limits import neighbour_limit
 
 A20, A25 = math.radians(20.0), math.radians(25.0)
 
@@ -24,8 +32,8 @@ def contact_ratio(teeth, alpha, *, internal=False):
     """Unshifted gears of module 1, addendum 1."""
     base = [0.5 * z * math.cos(alpha) for z in teeth]
     tips = 0.5 * teeth[0] + 1.0, 0.5 * teeth[1] + (-1.0 if internal else 1.0)
-    distance = iv.reference_centre_distance(*teeth, 1.0, internal=internal)
-    ratio = iv.contact_ratio_internal if internal else iv.contact_ratio_external
+    distance = 0.5 * (teeth[1] - teeth[0] if internal else sum(teeth))
+    ratio = limits.contact_ratio_internal if internal else limits.contact_ratio_external
     return ratio(tips[0], base[0], tips[1], base[1], distance, math.pi * math.cos(alpha))
 
 
@@ -54,22 +62,23 @@ def test_contact_ratio_of_external_pairs(teeth, alpha, value):
 
 
 def test_limiting_contact_ratio_of_racks():
-    assert iv.limiting_contact_ratio(A20) == pytest.approx(1.98080909704540, rel=1e-14)
+    assert limits.limiting_contact_ratio(A20) == pytest.approx(1.98080909704540, rel=1e-14)
     assert contact_ratio((10**9, 10**9), A20) == pytest.approx(1.98080909704540, rel=1e-6)
 
 
 def test_shifted_external_pair():
     """m = 3, 20/40, x = .3/.2."""
-    angle = iv.working_pressure_angle(20, 40, 0.3, 0.2, A20)
+    pair = Gear(20, 3e-3, A20, 0.3, 0.02, 1e-3), Gear(40, 3e-3, A20, 0.2, 0.02, 1e-3)
+    distance = 1e3 * zero_backlash_distance(*pair)
+    angle = working_pressure_angle(*pair, 1e-3 * distance)
     assert math.degrees(angle) == pytest.approx(22.3167069, abs=5e-8)
-    distance = 90.0 * math.cos(A20) / math.cos(angle)
     assert distance == pytest.approx(91.4197646, abs=5e-8)
     base, pitch = (30 * math.cos(A20), 60 * math.cos(A20)), 3 * math.pi * math.cos(A20)
     tips = 33 + 0.9, 63 + 0.6
-    full = iv.contact_ratio_external(tips[0], base[0], tips[1], base[1], distance, pitch)
+    full = limits.contact_ratio_external(tips[0], base[0], tips[1], base[1], distance, pitch)
     assert full == pytest.approx(1.5291423, abs=5e-8)
     cut = 90 + 1.5 - distance  # tips shortened to keep the clearance
-    short = iv.contact_ratio_external(tips[0] - cut, base[0], tips[1] - cut, base[1], distance, pitch)
+    short = limits.contact_ratio_external(tips[0] - cut, base[0], tips[1] - cut, base[1], distance, pitch)
     assert short == pytest.approx(1.4931623, abs=5e-8)
 
 
@@ -77,21 +86,23 @@ def test_contact_ratio_of_internal_pairs():
     assert contact_ratio((20, 80), A20, internal=True) == pytest.approx(1.88968133, abs=5e-9)
     assert contact_ratio((40, 100), A25, internal=True) == pytest.approx(1.62987813, abs=5e-9)
     base = 17 * math.cos(A20), 81 * math.cos(A20)  # 17/81, m = 2, both shifted by 0.2: standard distance
-    value = iv.contact_ratio_internal(17 + 2.4, base[0], 81 - 1.6, base[1], 64.0, 2 * math.pi * math.cos(A20))
+    value = limits.contact_ratio_internal(
+        17 + 2.4, base[0], 81 - 1.6, base[1], 64.0, 2 * math.pi * math.cos(A20)
+    )
     assert value == pytest.approx(1.74362843, abs=5e-9)
 
 
 def test_undercut_limits():
-    assert iv.undercut_teeth(A20) == pytest.approx(17.0972643, abs=5e-8)
+    assert limits.undercut_teeth(A20) == pytest.approx(17.0972643, abs=5e-8)
     assert iv.undercut_shift(10, A20) == pytest.approx(0.4151111, abs=5e-8)
     assert iv.undercut_shift(12, A20) == pytest.approx(0.2981333, abs=5e-8)
 
 
 def test_pointed_tips():
-    assert iv.pointed_tip_shift(12, A20) == pytest.approx(0.8202039, abs=5e-8)
-    assert iv.pointed_tip_shift(20, A20) == pytest.approx(1.2223485, abs=5e-8)
+    assert limits.pointed_tip_shift(12, A20) == pytest.approx(0.8202039, abs=5e-8)
+    assert limits.pointed_tip_shift(20, A20) == pytest.approx(1.2223485, abs=5e-8)
     base = 10 * math.cos(A20)
-    assert base / math.cos(iv.pointed_tip_angle(20, 0.0, A20)) == pytest.approx(11.5383374, abs=5e-8)
+    assert base / math.cos(limits.pointed_tip_angle(20, 0.0, A20)) == pytest.approx(11.5383374, abs=5e-8)
     gear = Gear(20, 1e-3, A20, 0.0, 1e-2, 5e-3)
     assert tooth_thickness(gear, gear.tip_radius) == pytest.approx(0.6948800e-3, abs=5e-11)
 
@@ -103,7 +114,7 @@ def test_rings_free_of_involute_interference():
             ring
             for ring in range(planet + 8, 400)
             if 0.5 * ring - 1 > 0.5 * ring * math.cos(A20)
-            and iv.internal_interference(
+            and limits.internal_interference(
                 0.5 * ring - 1,
                 0.5 * planet * math.cos(A20),
                 0.5 * ring * math.cos(A20),
@@ -113,7 +124,7 @@ def test_rings_free_of_involute_interference():
         ]
         assert free[0] == least
     base = 27 * math.cos(A20), 108 * math.cos(A20)
-    assert iv.internal_interference(105.0, *base, 81.0) == pytest.approx(-0.77, abs=5e-3)
+    assert limits.internal_interference(105.0, *base, 81.0) == pytest.approx(-0.77, abs=5e-3)
 
 
 def test_helical_conversions():
@@ -126,7 +137,7 @@ def test_helical_conversions():
     base = 10 * module * math.cos(alpha_t), 20 * module * math.cos(alpha_t)
     tips = 10 * module + 3.0, 20 * module + 3.0
     pitch = math.pi * module * math.cos(alpha_t)
-    value = iv.contact_ratio_external(tips[0], base[0], tips[1], base[1], 30 * module, pitch)
+    value = limits.contact_ratio_external(tips[0], base[0], tips[1], base[1], 30 * module, pitch)
     assert value == pytest.approx(1.5609328, abs=5e-8)
     assert iv.overlap_ratio(40.0, 3.0, beta) == pytest.approx(1.0984621, abs=5e-8)
 

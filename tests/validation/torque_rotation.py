@@ -18,9 +18,9 @@ from femgear.contact.bodies import RING_STATE, make_bodies, make_sectors
 from femgear.contact.flanks import flank_load_columns, flank_stations, joining_depth
 from femgear.contact.solve import solve_contact, tangent_stiffness
 from femgear.fe.elasticity import Material
-from femgear.gears.fillet import BasicRack
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
+from femgear.gears.profile import BasicRack
 from femgear.threads import one_blas_thread
 from validation.planetary import reference_set
 from validation.reference.torque_rotation import GearPair, TorqueRotation, torque_rotation

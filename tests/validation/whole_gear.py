@@ -15,10 +15,9 @@ import numpy as np
 
 from femgear.contact.assembly import mesh_pairs
 from femgear.contact.flanks import LEFT, RIGHT
-from femgear.fe.compliance import symmetric_factor
-from femgear.fe.elasticity import edge_load, to_skfem
+from femgear.fe.compliance import cyclic_displacement, symmetric_factor
 from femgear.fe.grid import copy_nodes, rotated_copies
-from femgear.fe.stress import cyclic_displacement
+from validation.reference.plane_elasticity import edge_load, to_skfem
 
 if TYPE_CHECKING:
     from femgear.contact.bodies import Sector

@@ -145,7 +145,7 @@ def free_modes(
     from skfem import Basis, BilinearForm, ElementTriP3
 
     from femgear.fe.compliance import symmetric_factor
-    from femgear.fe.elasticity import to_skfem
+    from validation.reference.plane_elasticity import to_skfem
     from validation.whole_gear import _ascending, _elastic
 
     grid = _ascending(grid)

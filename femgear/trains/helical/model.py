@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.gears import involute
+from femgear.gears import profile
 from femgear.solvers.linear.modal import residual_output, solve_modes, viscous_damping
 from femgear.system.assembler import mesh_elements
 from femgear.system.elements import GearMeshes
@@ -233,7 +233,7 @@ def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_widt
     """
     s = planetary_set
     normal_module = s.sun.module * math.cos(helix_angle)
-    overlap = involute.overlap_ratio(face_width, normal_module, helix_angle)
+    overlap = profile.overlap_ratio(face_width, normal_module, helix_angle)
     return np.array([[s.contact_ratio_sun_planet, overlap], [s.contact_ratio_planet_ring, overlap]])
 
 

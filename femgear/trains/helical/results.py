@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.gears import involute
-from femgear.gears.helix import virtual_teeth
+from femgear.gears import profile
+from femgear.gears.planetary import virtual_teeth
 from femgear.report.tables import Block
 from femgear.storage.dataset import (
     FOURIER,
@@ -232,7 +232,7 @@ def describe_helical(case: HelicalCase, planetary: PlanetarySet) -> tuple[Block,
 def _teeth(case: HelicalCase, s: PlanetarySet) -> Block:
     helical, normal = case.helical, case.sun
     beta = helical.helix_angle
-    base = involute.base_helix_angle(normal.pressure_angle, beta)
+    base = profile.base_helix_angle(normal.pressure_angle, beta)
     ratios = contact_ratios(s, helix_angle=beta, face_width=case.set.face_width)
     rows = [
         (name, *(f"{value:.4f}" for value in values))

@@ -167,14 +167,14 @@ def section_stiffness(
 
 
 def virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
-    """`femgear.gears.helix.virtual_set` of a case.
+    """`femgear.gears.planetary.virtual_set` of a case.
 
     Raises
     ------
     CaseError
         E-HELICAL-SECTION: they cannot be made.
     """
-    from femgear.gears.helix import virtual_set
+    from femgear.gears.planetary import virtual_set
 
     try:
         return virtual_set(gears, case.helical.helix_angle)

