@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from femgear.contact.sides import flank_side
+from femgear.contact.flank_pairs import flank_side
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
