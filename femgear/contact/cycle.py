@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -213,6 +213,30 @@ class MeshCycle:
         return (self.force > 0) & (self.back_force > 0)
 
 
+_PRESSURES = ("pressure", "pressure_offset", "pressure_centre")
+_AXES = {
+    "mt": (
+        "deflection",
+        "force",
+        "back_force",
+        "stiffness",
+        "max_pressure",
+        "edge_contact",
+        "held_stiffness",
+    ),
+    "mst": ("tooth_load", "path", "back_tooth_load", "back_path", "pressure_centre"),
+    "gms": ("tooth", "back_tooth"),
+    "t": ("sun_arc", "residual", "iterations"),
+    "nt": ("open_planets",),
+    "mmt": ("held_compliance",),
+    "msct": ("pressure",),
+    "mc": ("pressure_offset",),
+}
+"""Axes of the arrays of a cycle: gear, mesh, planet n, tooth pair (slot), cell, position (time)."""
+_ODD = ("path", "back_path", "tooth", "back_tooth", "pressure_offset", "pressure_centre")
+"""What counts the other way round in the mirror image."""
+
+
 def walk_mesh_cycle(
     planetary_set: PlanetarySet,
     bodies: Bodies,
@@ -285,8 +309,6 @@ def cycle_without_load(
     *,
     periods: int,
     contact: str,
-    pairs: int = 1,
-    member_names: tuple[str, ...] = (),
     options: CycleOptions | None = None,
 ) -> MeshCycle:
     """Make the defined result without load: nothing touches, nothing is stiff, no pressure has a place.
@@ -298,43 +320,29 @@ def cycle_without_load(
         [mesh periods].
     periods, contact
         As in `MeshCycle`.
-    pairs : int
-        Simultaneous tooth pairs T.
-    member_names : tuple of str
     options : CycleOptions, optional
-        Whether there are pressures, and stiffnesses with held bodies.
+        Whether there are pressures, and in how many cells.
     """
     options, N, P = options or CycleOptions(), n_planets, len(position)
-    optional = {}
-    if options.pressures:
-        optional |= {
-            "pressure": np.zeros((2 * N, pairs, options.cells, P)),
-            "pressure_offset": np.zeros((2 * N, options.cells)),
-            "pressure_centre": np.zeros((2 * N, pairs, P)),
-        }
-    if options.held_bodies is not None:
-        optional |= {"held_stiffness": np.zeros((2 * N, P)), "held_compliance": np.zeros((2 * N, 2 * N, P))}
-    by_mesh = ("deflection", "force", "back_force", "stiffness", "max_pressure")
-    by_pair = ("tooth_load", "path", "back_tooth_load", "back_path")
+    size = {"g": 2, "m": 2 * N, "n": N, "s": 1, "c": options.cells, "t": P}
+    kinds = {"tooth": int, "back_tooth": int, "iterations": int, "edge_contact": bool}
+    values: dict[str, Any] = {
+        name: np.zeros([size[axis] for axis in axes], kinds.get(name, float))
+        for axes, names in _AXES.items()
+        for name in names
+        if not name.startswith("held") and (options.pressures or name not in _PRESSURES)
+    }
+    values["open_planets"] = np.ones((N, P), bool)
     return MeshCycle(
         position=position,
-        sun_arc=np.zeros(P),
-        tooth=np.zeros((2, 2 * N, pairs), int),
-        back_tooth=np.zeros((2, 2 * N, pairs), int),
         bearing_force=np.zeros((N, 2, P)),
-        edge_contact=np.zeros((2 * N, P), bool),
-        open_planets=np.ones((N, P), bool),
-        residual=np.zeros(P),
-        iterations=np.zeros(P, int),
-        member_motion=np.zeros((len(member_names), P)),
-        member_names=member_names,
+        member_motion=np.zeros((0, P)),
+        member_names=(),
         periods=periods,
         contact=contact,
         unknowns=0,
         message="no torque: no tooth carries load and the mesh stiffness is zero",
-        **{name: np.zeros((2 * N, P)) for name in by_mesh},
-        **{name: np.zeros((2 * N, pairs, P)) for name in by_pair},
-        **optional,
+        **values,
     )
 
 
@@ -374,50 +382,45 @@ class _Walk:
         )
         if options.planet_gaps is not None:
             setup = setup.with_planet_gaps(options.planet_gaps)
-        record = cycle_without_load(
-            N,
-            empty.position,
-            periods=empty.periods,
-            contact=empty.contact,
-            pairs=setup.near.shape[2],
-            member_names=self.members.names,
-            options=options,
-        )
         load = np.zeros(N + 1 + int(self.members.free.sum()))
         load[N] = self.sun_torque / self.planetary_set.sun.base_radius
-        previous, overflow, missed, unknowns = None, False, 0.0, 0
+        found, previous, overflow, missed, unknowns = [], None, False, 0.0, 0
         for p in range(len(empty.position)):
             problem = assemble_contact(setup, self.bodies, p, self.members)
             start = None if previous is None else _warm_start(problem, *previous)
             H, gap, G = problem.compliance, problem.gap, problem.G
             state, active = solve_position(H, gap, G, load, self.springs, start=start)
             previous = problem, active
-            _collect(problem, state, setup, self.members, record)
+            found.append(_at_position(problem, state, setup, self.members, options.pressures))
             if options.held_bodies is not None:
-                _collect_held(assemble_contact(setup, options.held_bodies, p), state, setup, record)
+                held = assemble_contact(setup, options.held_bodies, p)
+                found[-1] |= _with_held_bodies(held, state, setup, found[-1]["force"])
             unknowns = max(unknowns, len(problem.gap))
             overflow |= problem.touches_window_end(state.active, setup)
             if empty.contact == "profile":
-                missed = max(missed, setup.missed(p, record.deflection[:, p]))
+                missed = max(missed, setup.missed(p, found[-1]["deflection"]))
             if options.progress is not None:
                 options.progress(p + 1, len(empty.position))
+        record = self._record(found, setup, unknowns)
         if overflow:
             share = enlarged(share, max(record.force.max(), record.back_force.max()))
         nearest = max(nearest, 1.2 * missed) if missed > nearest or overflow else nearest
-        return self._finished(record, setup, unknowns), share, nearest
+        return record, share, nearest
 
-    def _finished(self, record: MeshCycle, setup: MeshWindows, unknowns: int) -> MeshCycle:
-        """The record with what follows from it: places of the tooth pairs, pins, message."""
-        N = setup.n_planets
+    def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
+        """The record from what was found at its positions: with places of the tooth pairs, pins, message."""
+        N, cells = setup.n_planets, setup.cells
         drive, back = slice(0, 2 * N), slice(2 * N, 4 * N)
-        path = np.moveaxis(setup.zeta, 2, 1)
-        found = {"path": path[drive], "tooth": setup.tooth[:, drive]}
-        if self.options.both_flanks:
-            found |= {"back_path": path[back], "back_tooth": setup.tooth[:, back]}
+        values = {name: np.stack([one[name] for one in found], axis=-1) for name in found[0]}
+        path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
+        values |= {"path": path[drive], "tooth": tooth[:, drive]}
+        looked = self.options.both_flanks
+        values["back_path"] = path[back] if looked else np.zeros_like(path)
+        values["back_tooth"] = tooth[:, back] if looked else np.zeros_like(tooth)
         if self.options.pressures:
-            cells = setup.cells
-            found["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]
-            found["pressure_centre"] = np.moveaxis(setup.centre[drive], 2, 1)
+            values["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]
+            values["pressure_centre"] = np.moveaxis(setup.centre[drive], 2, 1)
+        record = replace(self.empty, **values)
         unloaded = record.force[:N] + record.back_force[:N] <= 0.0
         message = "all positions by the active set"
         if unloaded.any():
@@ -433,8 +436,8 @@ class _Walk:
             bearing_force=pin_forces(self.planetary_set, record.force, record.back_force),
             open_planets=unloaded,
             unknowns=unknowns,
+            member_names=self.members.names,
             message=message,
-            **found,
         )
 
 
@@ -444,14 +447,10 @@ def _warm_start(problem: ContactProblem, previous: ContactProblem, active) -> np
     return np.concatenate([problem.warm_start(previous, active[:cells]), active[cells:]])
 
 
-def _collect(
-    problem: ContactProblem,
-    state: ContactState,
-    setup: MeshWindows,
-    members: MovingMembers,
-    record: MeshCycle,
-) -> None:
-    """Put mesh quantities of one position into the arrays of the record."""
+def _at_position(
+    problem: ContactProblem, state: ContactState, setup: MeshWindows, members: MovingMembers, pressures: bool
+) -> dict[str, Any]:
+    """What `MeshCycle` keeps of one position, by the names of its fields, less their last axis."""
     N, p = problem.n_planets, problem.position
     if not state.residual <= LARGEST_RESIDUAL:
         raise ContactError(
@@ -461,30 +460,33 @@ def _collect(
             limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
             remedy="look for stiffnesses, clearances or separations of very different size",
         )
-    record.residual[p], record.iterations[p] = state.residual, state.iterations
     tooth_load = np.zeros((4 * N, setup.near.shape[2]))
     np.add.at(tooth_load, (problem.mesh, problem.pair), state.loads)
-    record.tooth_load[..., p], record.back_tooth_load[..., p] = np.split(tooth_load, 2)
     force = np.bincount(problem.mesh, weights=state.loads, minlength=4 * N)
-    record.force[:, p], record.back_force[:, p] = np.split(force, 2)
-    record.sun_arc[p] = state.motions[N]
     # sprung members yield under the mesh forces, free ones are unknowns of the problem
     motion, sprung = np.zeros(len(members.names)), ~members.free
     motion[members.free] = state.motions[N + 1 :]
     pulled = members.approach[:, sprung].T @ force[: len(members.approach)]
     motion[sprung] = -pulled / members.stiffness[sprung]
-    record.member_motion[:, p] = motion
-    moved = members.approach[: 2 * N] @ motion
-    record.deflection[:, p] = rotation_approach(N) @ state.motions[: N + 1] + moved
-    record.stiffness[:, p] = _tangents(problem, state, setup)
     at_edge = problem.at_flank_end(state.active, setup)
-    pressure = _equal_cell_pressure(problem, state.loads, setup)
-    inside = np.ones(pressure.shape[:2], bool)
+    inside = np.ones(setup.near.shape[::2], bool)
     inside[problem.mesh[at_edge], problem.pair[at_edge]] = False
-    record.edge_contact[:, p] = ~inside[: 2 * N].all(axis=1)
-    record.max_pressure[:, p] = np.where(inside, pressure.max(axis=2), 0.0).max(axis=1)[: 2 * N]
-    if record.pressure is not None:
-        record.pressure[..., p] = pressure[: 2 * N]
+    pressure = _equal_cell_pressure(problem, state.loads, setup)
+    found = {
+        "deflection": rotation_approach(N) @ state.motions[: N + 1] + members.approach[: 2 * N] @ motion,
+        "sun_arc": state.motions[N],
+        "force": force[: 2 * N],
+        "back_force": force[2 * N :],
+        "stiffness": _tangents(problem, state, setup),
+        "tooth_load": tooth_load[: 2 * N],
+        "back_tooth_load": tooth_load[2 * N :],
+        "member_motion": motion,
+        "edge_contact": ~inside[: 2 * N].all(axis=1),
+        "max_pressure": np.where(inside, pressure.max(axis=2), 0.0).max(axis=1)[: 2 * N],
+        "residual": state.residual,
+        "iterations": state.iterations,
+    }
+    return found | {"pressure": pressure[: 2 * N]} if pressures else found
 
 
 def _equal_cell_pressure(problem: ContactProblem, loads, setup: MeshWindows) -> np.ndarray:
@@ -506,40 +508,14 @@ def _tangents(problem: ContactProblem, state: ContactState, setup: MeshWindows) 
     return found.reshape(-1, 2 * problem.n_planets).sum(axis=0)
 
 
-def _collect_held(
-    problem: ContactProblem, state: ContactState, setup: MeshWindows, record: MeshCycle
-) -> None:
-    """Put stiffness and coupling of the meshes in the same contact with held bodies into the record."""
-    meshes, p = 2 * problem.n_planets, problem.position
-    assert record.held_stiffness is not None and record.held_compliance is not None
-    record.held_stiffness[:, p] = _tangents(problem, state, setup)
-    if (record.force[:, p] > 0).all():
+def _with_held_bodies(problem: ContactProblem, state: ContactState, setup: MeshWindows, force) -> dict:
+    """Stiffness of the meshes and compliance between them in the same contact with held bodies."""
+    meshes = 2 * problem.n_planets
+    coupling = np.zeros((meshes, meshes))
+    if (force > 0).all():
         drive = state.active & (problem.mesh < meshes)
-        tangent = mesh_tangent_matrix(problem.H, drive, problem.mesh, meshes)
-        record.held_compliance[..., p] = np.linalg.inv(tangent)
-
-
-_AXES = {
-    "mt": (
-        "deflection",
-        "force",
-        "back_force",
-        "stiffness",
-        "max_pressure",
-        "edge_contact",
-        "held_stiffness",
-    ),
-    "mst": ("tooth_load", "path", "back_tooth_load", "back_path", "pressure_centre"),
-    "gms": ("tooth", "back_tooth"),
-    "t": ("sun_arc", "residual", "iterations"),
-    "nt": ("open_planets",),
-    "mmt": ("held_compliance",),
-    "msct": ("pressure",),
-    "mc": ("pressure_offset",),
-}
-"""Axes of the arrays of a cycle: gear, mesh, planet n, tooth pair (slot), cell, position (time)."""
-_ODD = ("path", "back_path", "tooth", "back_tooth", "pressure_offset", "pressure_centre")
-"""What counts the other way round in the mirror image."""
+        coupling = np.linalg.inv(mesh_tangent_matrix(problem.H, drive, problem.mesh, meshes))
+    return {"held_stiffness": _tangents(problem, state, setup), "held_compliance": coupling}
 
 
 def _seen_from_front(cycle: MeshCycle, planetary_set: PlanetarySet, order) -> MeshCycle:

@@ -14,7 +14,7 @@ phase between the mesh with the sun and that with the ring.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -443,11 +443,27 @@ def _body_ranges(planetary_set, kind, root: RootStress, acting, teeth: LoadedTee
             found = _largest_tension(field, teeth, target, m, samples)
             worst[target] = max(worst.get(target, found), found)
     for target in acting:
-        start = acting[0] if kind == "planet" else target
         rows = slice(target[2] * m, (target[2] + 1) * m)
-        found = _range(kind, target, (high[:, rows], low[:, rows]), teeth, z)
-        history = _history(field[:, rows][:, found.point], teeth, start[:2], step) if one else None
-        yield replace(found, worst=worst[target][1:], history=history)
+        top, bottom = high[:, rows], low[:, rows]
+        widest = (top - bottom).argmax(axis=1)
+        own = np.arange(alike), widest
+        tooth = int((top - bottom)[own].argmax())
+        point = int(widest[tooth])
+        # seen from behind the teeth are counted the other way round
+        number = (-1 if teeth.reverse else 1) * np.arange(z) % alike
+        start = acting[0] if kind == "planet" else target
+        yield RootRange(
+            kind=kind,
+            mesh=target[0],
+            gear=target[1],
+            point=point,
+            maximum=float(top[tooth, point]),
+            minimum=float(bottom[tooth, point]),
+            tooth_maximum=top[own][number],
+            tooth_minimum=bottom[own][number],
+            worst=worst[target][1:],
+            history=_history(field[:, rows][:, point], teeth, start[:2], step) if one else None,
+        )
 
 
 def _by_turn(teeth: LoadedTeeth):
@@ -467,29 +483,6 @@ def _largest_tension(field, teeth: LoadedTeeth, target, m, samples) -> tuple[flo
     slot, sample = np.unravel_index(loaded.argmax(), loaded.shape)
     slot_of_cycle = len(loaded) - 1 - slot if teeth.reverse else slot
     return float(loaded[slot, sample]), int(slot_of_cycle), int(samples[sample])
-
-
-def _range(kind, target, extremes, teeth: LoadedTeeth, z) -> RootRange:
-    """Range of one flank's root from the largest and the smallest stress of teeth not alike, (alike, m)."""
-    high, low = extremes
-    widest = (high - low).argmax(axis=1)
-    own = np.arange(len(high)), widest
-    tooth = int((high - low)[own].argmax())
-    point = int(widest[tooth])
-    # seen from behind the teeth are counted the other way round
-    number = (-1 if teeth.reverse else 1) * np.arange(z) % len(high)
-    return RootRange(
-        kind=kind,
-        mesh=target[0],
-        gear=target[1],
-        point=point,
-        maximum=float(high[tooth, point]),
-        minimum=float(low[tooth, point]),
-        tooth_maximum=high[own][number],
-        tooth_minimum=low[own][number],
-        worst=(0, 0),
-        history=None,
-    )
 
 
 def _history(places: np.ndarray, teeth: LoadedTeeth, start, step: int) -> np.ndarray:
