@@ -9,7 +9,7 @@ HARMONICS = {"excitation_harmonics": 6, "harmonics": 12}
 
 @pytest.mark.benchmark(group="Compliance of the planet's flanks")
 def test_one_sector(benchmark, reference):
-    from femgear.contact.flanks import flank_compliance
+    from femgear.contact.bodies import flank_compliance
 
     sector = reference.sectors.planet
     arguments = (sector.grid, sector.gear, reference.material, sector.stiffness)

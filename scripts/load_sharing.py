@@ -81,7 +81,7 @@ def _checked(gap: float, text: str) -> float:
 
 def _solve(case, gaps, planet, progress):
     """What all gaps share, and one mesh cycle for each of them."""
-    from femgear.contact.cycle import walk_either_flank
+    from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
     from femgear.gears.deviations import common_period
     from femgear.run import grid_cache
     from femgear.study.linearised import design_basis, sun_torque
@@ -96,7 +96,7 @@ def _solve(case, gaps, planet, progress):
     for gap in gaps:
         separation = np.zeros(gears.n_planets)
         separation[planet - 1] = gap
-        cycle = walk_either_flank(
+        cycle = walk_mesh_cycle(
             gears,
             basis.bodies,
             sun_torque=sun_torque(case, gears),
@@ -105,8 +105,10 @@ def _solve(case, gaps, planet, progress):
             deviations=deviations,
             supports=basis.supports,
             periods=periods,
-            planet_gaps=separation,
-            progress=lambda done, total, gap=gap: progress(f"gap {gap * 1e6:g} um", done, total),
+            options=CycleOptions(
+                planet_gaps=separation,
+                progress=lambda done, total, gap=gap: progress(f"gap {gap * 1e6:g} um", done, total),
+            ),
         )
         cycles.append(cycle)
     return cycles, deviations is None and case.static.members == "fixed"

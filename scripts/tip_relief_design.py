@@ -123,9 +123,9 @@ def _checked(amount: float, text: str, module: float) -> float:
 
 def _mean_deflection(basis, torque: float, contact: str) -> float:
     """Mean deflection of the sun-planet meshes without relief [m]."""
-    from femgear.contact.cycle import walk_either_flank
+    from femgear.contact.cycle import walk_mesh_cycle
 
-    cycle = walk_either_flank(basis.gears, basis.bodies, sun_torque=torque, positions=8, contact=contact)
+    cycle = walk_mesh_cycle(basis.gears, basis.bodies, sun_torque=torque, positions=8, contact=contact)
     return float(cycle.deflection[: basis.gears.n_planets].mean())
 
 

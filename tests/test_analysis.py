@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from validation.cases import reference_case
+from validation.reference.sensor_in_time import symmetry_leakage
 
 from femgear.case import text as case_text
 from femgear.errors import CaseError
-from femgear.housing.orders import OrderSpectrum, symmetry_leakage
+from femgear.housing.orders import OrderSpectrum
 from femgear.system.series import harmonics_of, sample
 from femgear.trains.elastic.checks import max_nodal_diameter
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes

@@ -7,16 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from validation.reference.root_stress import set_root_stress
 
-from femgear.contact.flanks import LEFT, RIGHT
-from femgear.contact.load_spectrum import LOAD_BINS, LoadedTeeth, body_stress, load_spectrum, loaded_teeth
-from femgear.contact.root_stress import (
-    LOADED,
-    root_stress_cycle,
-    set_root_stress,
-    tooth_history,
-    worst_history,
-)
+from femgear.contact.flank_pairs import LEFT, RIGHT
+from femgear.contact.root_stress import LOADED, body_stress, root_stress_cycle
+from femgear.contact.tooth_loads import LOAD_BINS, LoadedTeeth, load_spectrum, loaded_teeth
 from femgear.gears.gear import half_thickness_angle
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static import stages as static_stages
@@ -65,7 +60,8 @@ def fields(static, result, *, reverse=False):
     bodies.append((result.influences.ring, [(N + j, 1, LEFT) for j in range(N)]))
     positions = np.arange(static.cycle.position.size)
     for root, acting in bodies:
-        yield body_stress(static.planetary_set, root, acting, teeth, positions), acting, teeth
+        numbers = np.arange(len(root.influence))
+        yield body_stress(static.planetary_set, root, acting, teeth, positions, numbers), acting, teeth
 
 
 def assert_fields_are_root_cycles(static, result, cycles, *, reverse=False):
@@ -272,8 +268,8 @@ def assert_kept_is_the_worst_of_all(static, result, *, reverse):
         assert part.stress.size < 0.5 * root.stress.size
         # teeth that no error reaches are equally loaded: the worst of the record need not be the only one
         position = (first * each + part.worst[1]) % len(cycle.position)
-        a = tooth_history(root, start=(position // each - part.worst[0]) % cycle.periods)
-        b = worst_history(part)
+        a = root.history((position // each - part.worst[0]) % cycle.periods)
+        b = part.history()
         assert a.path == pytest.approx(b.path)
         assert a.stress == pytest.approx(b.stress, rel=1e-9, abs=1e-3)
         assert root.tension[part.worst[0], position] == pytest.approx(root.tension.max(), rel=1e-12)

@@ -10,7 +10,7 @@ from validation.reference.plane_elasticity import edge_load
 
 from femgear.case.case import planetary_set, set_deviations
 from femgear.cli import main
-from femgear.contact.flanks import flank_load_columns, flank_stations
+from femgear.contact.bodies import flank_load_columns, flank_stations
 from femgear.contact.solve import solve_contact
 from femgear.errors import ContactError, FemgearError, GridError
 from femgear.fe.compliance import condense_sector, dof_pairs, interpolation

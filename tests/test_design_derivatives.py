@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.contact.cycle import walk_either_flank
+from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import no_deviations
@@ -55,7 +55,7 @@ def parameter(name, gears, back):
 def differences(gears, bodies, variant, value, step, **options):
     """Central differences of whole solutions: sun_arc, deflection, share."""
     low, high = (
-        walk_either_flank(gears, bodies, deviations=variant(value + h), **options) for h in (-step, step)
+        walk_mesh_cycle(gears, bodies, deviations=variant(value + h), **options) for h in (-step, step)
     )
     names = "sun_arc", "deflection", "load_share"
     return [(getattr(high, name) - getattr(low, name)) / (2 * step) for name in names]
@@ -87,7 +87,7 @@ def test_the_linearised_solution_is_that_of_the_walk(basis):
     variant, value, _ = parameter("amount", basis.gears, False)
     options = {"sun_torque": TORQUE, "positions": 8, "supports": SPRUNG, "deviations": variant(value)}
     linear = linearise(basis.gears, basis.bodies, **options)
-    cycle = walk_either_flank(basis.gears, basis.bodies, **options)
+    cycle = walk_mesh_cycle(basis.gears, basis.bodies, **options)
     for name in ("position", "sun_arc", "deflection", "force"):
         np.testing.assert_allclose(getattr(linear, name), getattr(cycle, name), rtol=1e-11)
     some = linearise(basis.gears, basis.bodies, only=[5, 2], **options)
@@ -244,7 +244,7 @@ def test_slopes_of_the_peak_to_peak_are_those_of_whole_solutions(basis):
         left, right = peak_to_peak_slopes(linear.deflection[:3], found.deflection[:3], step=1e-10)
         peaks = [
             np.ptp(
-                walk_either_flank(gears, basis.bodies, deviations=variant(amount + h), **options).deflection[
+                walk_mesh_cycle(gears, basis.bodies, deviations=variant(amount + h), **options).deflection[
                     :3
                 ],
                 axis=1,

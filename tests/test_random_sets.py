@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from random_sets import RandomSet, equal_planets, random_set, symmetry
+from validation.reference.sensor_in_time import symmetry_leakage
 
 from femgear.gears.kinematics import torques
-from femgear.housing.orders import OrderSpectrum, symmetry_leakage
+from femgear.housing.orders import OrderSpectrum
 from femgear.system.series import harmonics_of, sample
 from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes

@@ -1,0 +1,63 @@
+"""Contact: gears as elastic bodies, the contact problem of a planetary set, and its mesh cycle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = [
+    "RIGID",
+    "Bodies",
+    "ContactProblem",
+    "ContactState",
+    "CycleOptions",
+    "LoadedPeriod",
+    "MeshCycle",
+    "MeshWindows",
+    "RootStresses",
+    "Sectors",
+    "Supports",
+    "assemble_contact",
+    "deformed_set",
+    "in_windows",
+    "load_spectrum",
+    "loaded_image",
+    "loaded_period",
+    "loaded_teeth",
+    "make_bodies",
+    "make_sectors",
+    "mesh_tangent_matrix",
+    "mesh_windows",
+    "mirrored_set",
+    "moving_members",
+    "root_ranges",
+    "root_stress_cycle",
+    "solve_contact",
+    "tangent_stiffness",
+    "walk_mesh_cycle",
+]
+
+_HOME = {
+    "assembly": ("ContactProblem", "MeshWindows", "assemble_contact", "in_windows", "mesh_windows"),
+    "bodies": ("Bodies", "Sectors", "make_bodies", "make_sectors"),
+    "cycle": ("CycleOptions", "MeshCycle", "walk_mesh_cycle"),
+    "flank_pairs": ("loaded_image", "mirrored_set"),
+    "loaded_period": ("LoadedPeriod", "loaded_period"),
+    "root_stress": ("RootStresses", "root_ranges", "root_stress_cycle"),
+    "solve": ("ContactState", "mesh_tangent_matrix", "solve_contact", "tangent_stiffness"),
+    "supports": ("RIGID", "Supports", "moving_members"),
+    "tooth_loads": ("deformed_set", "load_spectrum", "loaded_teeth"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Public names are imported when they are first asked for: the solver needs scipy.linalg."""
+    from importlib import import_module
+
+    for module, names in _HOME.items():
+        if name in names:
+            return getattr(import_module(f"femgear.contact.{module}"), name)
+    raise AttributeError(f"module 'femgear.contact' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,97 +1,145 @@
-"""The contact problem of a planetary set at one position: cells, separations, compliance, motions."""
+"""The contact problem of a planetary set at one position: windows of pressure cells, separations, compliance.
+
+Tooth pairs that may touch have a window of pressure cells around the point of their smallest separation
+(`mesh_windows`); the cells of all windows at one position are the candidates of the contact problem
+(`assemble_contact`).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from femgear.contact.candidates import (
+from femgear.contact.bodies import station_weights
+from femgear.contact.flank_pairs import (
+    BACK_SIDE,
+    DRIVE_SIDE,
+    LEFT,
+    RIGHT,
     FlankPair,
-    Windows,
-    cell_centres,
-    cell_edges,
-    flank_pair,
+    FlankSide,
+    admissible_arcs,
+    flank_side,
+    mesh_pairs,
     pair_separations,
     profile_form,
-    window_polynomials,
-    windows,
+    separation,
+    side_teeth,
 )
-from femgear.contact.flanks import LEFT, RIGHT, FlankCompliance, station_weights
-from femgear.contact.halfplane import hertz_line, surface_displacement
-from femgear.contact.sides import BACK, DRIVE, flank_side, side_teeth
+from femgear.contact.local_compliance import hertz_half_width, surface_displacement
+from femgear.errors import ContactError
 
 if TYPE_CHECKING:
+    from femgear.contact.bodies import Bodies, FlankCompliance
     from femgear.contact.supports import MovingMembers
     from femgear.fe.elasticity import Material
     from femgear.gears.deviations import SetDeviations
     from femgear.gears.planetary import PlanetarySet
 
+WINDOW_NODES = np.array([0.0, 0.5, 1.0])
+WIDTH = 3.2
+"""Of a window, in Hertzian half widths under the force that sizes it."""
+HELD = 2.56
+"""A window holds the contact of this many times that force: the square of half its width."""
+ROUGH_STIFFNESS = 10e9
+"""Stiffness of a mesh per face width, to size windows [N/m^2]."""
+
+Found = TypeVar("Found")
+
 
 @dataclass(frozen=True)
-class Bodies:
-    """Flank compliances of the three kinds of gears and their common material."""
-
-    sun: FlankCompliance
-    planet: FlankCompliance
-    ring: FlankCompliance
-    material: Material
-    face_width: float
-
-
-@dataclass(frozen=True)
-class MeshWindows:
-    """Contact windows of all meshes and positions; arrays lead with (meshes, P, pairs).
-
-    There are 2N meshes, or 4N with the back flanks.
+class Windows:
+    """Windows of pressure cells of one kind of mesh; ``...`` stands for (meshes, P, pairs).
 
     Parameters
     ----------
-    zeta : array
-        Path coordinates [m].
-    near : bool array
-        Candidate pairs.
-    smallest_gap : array
-        Smallest separation in the window [m].
-    gap : array (..., cells)
-        Separation at the cells [m].
-    roll : tuple of two arrays (..., 3)
+    zeta : (...) array
+        Path coordinate of the tooth pair [m].
+    near : (...) bool array
+        Whether the pair comes near enough to be a candidate.
+    gap : (..., cells) array
+        Separation at the cell centres [m]; infinite outside the flanks.
+    roll : (2, ..., nodes) array
         Roll lengths of the window nodes on gear 1 and gear 2 [m].
-    edge : tuple of two bool arrays
-        Whether the low and the high end of the window are ends of a flank.
-    tooth : tuple of two integer arrays (2N, pairs)
+    at_edge : (2, ...) bool array
+        Whether the low and the high end of the window are ends of a flank (a tip corner or the start of the
+        involute).
+    layout : (...) int array
+        How the window is divided into cells, see `cell_edges`.
+    centre : (...) array
+        From the point on the path of contact to the middle of the window, along flank 1 [m].
+    cell : (meshes,) array
+        Mean width of a pressure cell along the profile [m].
+    """
+
+    zeta: np.ndarray
+    near: np.ndarray
+    gap: np.ndarray
+    roll: np.ndarray
+    at_edge: np.ndarray
+    layout: np.ndarray
+    centre: np.ndarray
+    cell: np.ndarray
+
+
+@dataclass(frozen=True)
+class MeshWindows(Windows):
+    """Contact windows of all meshes and positions: of 2N meshes, or of 4N with the back flanks.
+
+    Parameters
+    ----------
+    n_planets : int
+    tooth : (2, meshes, pairs) int array
         Tooth numbers on gear 1 and gear 2 during the first mesh period.
     turns : (P,) int array
         Mesh periods passed at each position; one of the record's periods has one number.
-    layout : int array
-        Division of the window into cells, see `candidates.cell_edges`.
     local : (2, 4, cells, cells) array
         Half-plane compliance of both bodies within a window [m/N], for the two kinds of mesh and all layouts.
-    cell : (2N,) array
-        Mean width of a pressure cell along the profile [m].
-    cell_area : (2N, 4, cells) array
-        Areas of the pressure cells [m^2].
-    centre : array
-        From the point on the path of contact to the middle of the window, along flank 1 [m].
+    cell_area : (meshes, 4, cells) array
+        Areas of the pressure cells in all layouts [m^2].
     """
 
     n_planets: int
-    positions: int
-    pairs: int
-    zeta: np.ndarray
-    near: np.ndarray
-    smallest_gap: np.ndarray
-    gap: np.ndarray
-    roll: tuple[np.ndarray, np.ndarray]
-    edge: tuple[np.ndarray, np.ndarray]
-    tooth: tuple[np.ndarray, np.ndarray]
+    tooth: np.ndarray
     turns: np.ndarray
-    layout: np.ndarray
     local: np.ndarray
-    cell: np.ndarray
     cell_area: np.ndarray
-    centre: np.ndarray
+
+    @property
+    def cells(self) -> int:
+        """Pressure cells in a window."""
+        return self.gap.shape[-1]
+
+    @cached_property
+    def smallest_gap(self) -> np.ndarray:
+        """Smallest separation in every window [m], shape (meshes, P, pairs)."""
+        return self.gap.min(axis=-1)
+
+    def with_planet_gaps(self, planet_gaps) -> MeshWindows:
+        """Add separations (N,) [m] of the sun-side drive flanks of the planets."""
+        gap = self.gap.copy()
+        gap[: self.n_planets] += np.asarray(planet_gaps, float)[:, None, None, None]
+        return replace(self, gap=gap)
+
+    def missed(self, position: int, deflection) -> float:
+        """Separation from the nearest pair within which no omitted pair penetrates [m]; zero if none does.
+
+        Parameters
+        ----------
+        position : int
+        deflection : (2N,) array
+            Approach of the drive flanks of every mesh [m].
+        """
+        gap = self.smallest_gap[:, position]
+        # a back flank approaches when its drive flank parts
+        approach = np.concatenate([deflection, -np.asarray(deflection)])[: len(gap)]
+        penetrates = ~self.near[:, position] & (gap < approach[:, None])
+        relative = approach - gap.min(axis=1)
+        return float(relative[penetrates.any(axis=1)].max(initial=0.0))
 
 
 @dataclass(frozen=True)
@@ -128,14 +176,14 @@ class ContactProblem:
 
     def touches_window_end(self, active: np.ndarray, setup: MeshWindows) -> bool:
         """Whether a contact ends where its window ends, other than at an end of a flank."""
-        low, high = (edge[self.mesh, self.position, self.pair] for edge in setup.edge)
-        last = setup.gap.shape[-1] - 1
+        low, high = setup.at_edge[:, self.mesh, self.position, self.pair]
+        last = setup.cells - 1
         return bool(np.any(active & (((self.cell == 0) & ~low) | ((self.cell == last) & ~high))))
 
     def at_flank_end(self, active: np.ndarray, setup: MeshWindows) -> np.ndarray:
         """Whether each candidate belongs to a contact that reaches the end of a flank, shape (n,)."""
-        low, high = (edge[self.mesh, self.position, self.pair] for edge in setup.edge)
-        window = self.mesh * setup.pairs + self.pair
+        low, high = setup.at_edge[:, self.mesh, self.position, self.pair]
+        window = self.mesh * setup.near.shape[2] + self.pair
         last = np.zeros(int(window.max()) + 1, int)
         np.maximum.at(last, window, self.cell)
         ends = active & (((self.cell == 0) & low) | ((self.cell == last[window]) & high))
@@ -144,48 +192,19 @@ class ContactProblem:
         return reached[window]
 
 
-def mesh_pairs(planetary_set: PlanetarySet) -> tuple[FlankPair, FlankPair]:
-    """The flank pairs sun-planet and planet-ring."""
-    s = planetary_set
-    return (
-        flank_pair(s.sun, s.planet, s.centre_distance, s.working_pressure_angle_sun_planet),
-        flank_pair(s.planet, s.ring, s.centre_distance, s.working_pressure_angle_planet_ring),
-    )
-
-
-def acting_flanks(n_planets: int) -> tuple[list, list, list]:
-    """Drive flanks (mesh, gear of the pair, side) of the sun, of every planet and of the ring."""
-    N = n_planets
-    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
-    planets = [[(n, 1, LEFT), (N + n, 0, RIGHT)] for n in range(N)]
-    return [(j, 0, LEFT) for j in range(N)], planets, [(N + j, 1, LEFT) for j in range(N)]
-
-
-def contact_half_width(pair: FlankPair, line_load: float, material: Material) -> float:
-    """Largest Hertzian half width on the path of contact [m] of one tooth pair under `line_load` [N/m]."""
-    begin, end = pair.path
-    zeta = np.linspace(begin, end, 51)[1:-1]
-    rho_1, rho_2 = pair.pitch_roll_1 + zeta, pair.pitch_roll_2 - pair.sign * zeta
-    radius = (rho_1 * rho_2 / (rho_2 + pair.sign * rho_1)).max()
-    modulus = material.youngs_modulus / (2 * (1 - material.poisson_ratio**2))
-    return hertz_line(line_load, radius, modulus).half_width
-
-
 def mesh_windows(
     planetary_set: PlanetarySet,
     bodies: Bodies,
     *,
     share: float,
-    positions: int | np.ndarray,
-    cells: int,
     nearest: float,
-    contact: str,
-    periods: int = 1,
+    positions: int | np.ndarray,
+    contact: str = "profile",
+    cells: int = 36,
     deviations: SetDeviations | None = None,
-    planet_gaps=None,
     both_flanks: bool = False,
 ) -> MeshWindows:
-    """Windows of every mesh at every position.
+    """Place the contact windows of every mesh at every position.
 
     Parameters
     ----------
@@ -193,48 +212,78 @@ def mesh_windows(
     bodies : Bodies
     share : float
         Mesh force that sizes the windows [N].
-    positions : int or (P,) array
-        Number of equidistant positions in one mesh period, or the positions themselves [mesh periods].
-    cells : int
-        Pressure cells in a window.
     nearest : float
         Pairs are candidates whose separation exceeds that of the nearest pair of their mesh by less [m].
+    positions : int or (P,) array
+        Number of equidistant positions in one mesh period, or the positions themselves [mesh periods].
     contact : {"profile", "line_of_action"}
-    periods : int
-        Number of mesh periods.
+    cells : int
+        Pressure cells in a window.
     deviations : SetDeviations, optional
-    planet_gaps : (N,) array, optional
-        Extra separation of the sun-side flanks of each planet [m].
     both_flanks : bool
         Back flanks as well, as meshes 2N .. 4N - 1.
     """
-    pitch = planetary_set.sun.base_pitch
-    pairs = mesh_pairs(planetary_set)
-    tau = cycle_positions(positions, periods=periods)
+    tau = cycle_positions(positions)
     # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
     turns = (np.ceil(tau) if tau[-1] <= 0.0 else np.floor(tau)).astype(int)
-    begin = min(p.path[0] for p in pairs) / pitch
-    end = max(p.path[1] for p in pairs) / pitch
-    count = int(np.ceil(end - begin)) + 4
+    N, pairs = planetary_set.n_planets, mesh_pairs(planetary_set)
+    line_load = share / bodies.face_width
+    widths = [WIDTH * _contact_half_width(pair, line_load, bodies.material) for pair in pairs]
     found, teeth = [], []
-    for direction in (DRIVE, BACK) if both_flanks else (DRIVE,):
+    for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
         side = flank_side(planetary_set, direction)
-        passed = direction * (tau - turns)
-        lowest = np.floor(begin - side.phase - np.ceil(passed.max())).astype(int) - 1
-        index = lowest[:, None] + np.arange(count)
-        zeta = pitch * (passed[None, :, None] + side.phase[:, None, None] + index[:, None, :])
-        tooth = side_teeth(planetary_set, index, direction)
+        zeta, tooth = _tooth_pairs(planetary_set, pairs, side, tau - turns)
         shift = pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
         shift += side.clearance[:, None, None]
-        if direction > 0 and planet_gaps is not None:
-            shift[: planetary_set.n_planets] += np.asarray(planet_gaps, float)[:, None, None]
-        form = [profile_form(planetary_set, deviations, kind, direction < 0) for kind in (0, 1)]
-        found += _side_windows(
-            planetary_set, bodies, pairs, zeta, shift, form, share, cells, nearest, contact
-        )
+        for kind, rows in enumerate((slice(0, N), slice(N, 2 * N))):
+            options = {
+                "width": widths[kind],
+                "cells": cells,
+                "nearest": nearest,
+                "line_of_action": contact == "line_of_action",
+                "form": profile_form(planetary_set, deviations, kind, direction < 0),
+            }
+            found.append(windows(pairs[kind], zeta[rows], shift=shift[rows], **options))
         teeth.append(tooth)
-    tooth = tuple(np.concatenate([t[gear] for t in teeth]) for gear in (0, 1))
-    return _gather(found, tooth, turns, planetary_set.n_planets, bodies, cells)
+    return _gathered(found, np.concatenate(teeth, axis=1), turns, bodies, cells)
+
+
+def in_windows(
+    attempt: Callable[[float, float], tuple[Found, float, float]], share: float, nearest: float
+) -> Found:
+    """Find something in windows that contain the contact; they are enlarged until they do.
+
+    Parameters
+    ----------
+    attempt : callable
+        ``(share, nearest) -> found, share, nearest``: what is found in these windows, and the windows to
+        try next; the same ones where they contain the contact.
+    share, nearest : float
+        Of the first windows, as `mesh_windows` takes them [N], [m].
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-WINDOW
+    """
+    for _ in range(8):
+        found, *wider = attempt(share, nearest)
+        if wider == [share, nearest]:
+            return found
+        share, nearest = wider
+    raise ContactError(
+        "the contact windows do not contain the contact after seven enlargements",
+        code="E-CONTACT-WINDOW",
+        remedy="reduce operation.torque or the errors",
+    )
+
+
+def enlarged(share: float, force: float) -> float:
+    """Load [N] that sizes windows twice as wide, and twice again until they hold a mesh force [N]."""
+    share *= 4.0
+    while share < force / HELD:
+        share *= 4.0
+    return share
 
 
 def cycle_positions(positions, *, periods: int = 1) -> np.ndarray:
@@ -244,20 +293,111 @@ def cycle_positions(positions, *, periods: int = 1) -> np.ndarray:
     return np.arange(positions * periods) / positions
 
 
+def windows(
+    pair: FlankPair,
+    zeta,
+    *,
+    width: float,
+    cells: int,
+    nearest: float,
+    line_of_action: bool,
+    form: Callable | None = None,
+    shift: float | np.ndarray = 0.0,
+) -> Windows:
+    """Place pressure cells around the point of smallest separation of every tooth pair.
+
+    Parameters
+    ----------
+    pair : FlankPair
+    zeta : array
+        Path coordinates [m].
+    width : float
+        Width of a window [m].
+    cells : int
+        Number of pressure cells in it.
+    nearest : float
+        Pairs (last axis) whose smallest separation exceeds that of the nearest pair by more than this [m]
+        are no candidates.
+    line_of_action : bool
+        Only pairs on the theoretical path of contact, as for rigid gears.
+    form : callable, optional
+        Separation that deviations of both profiles add, from the roll lengths on flank 1 and 2 [m].
+    shift : array, broadcast with `zeta`
+        Separation that errors of position add to a whole pair [m].
+    """
+    zeta = np.asarray(zeta, float)
+    low, high = admissible_arcs(pair, zeta)
+    nominal = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * pair.base_radius_1)
+    centre = np.clip(nominal, low, np.maximum(low, high))
+    if form is not None:
+        centre = _nearest_arc(pair, zeta, centre, low, high, 6.0 * width, form)
+    start = np.clip(centre - 0.5 * width, low, np.maximum(low, high - width))
+    tiny = 1e-9 * width
+    at_edge = np.stack([start <= low + tiny, start + width >= high - tiny])
+    layout = at_edge[0] + 2 * at_edge[1]
+    arc = start[..., None] + width * cell_centres(cells)[layout]
+    gap = _separation_at(pair, zeta[..., None], arc, form) + np.asarray(shift)[..., None]
+    gap = np.where(arc < high[..., None], gap, np.inf)
+    node_arc = np.minimum(start[..., None] + WINDOW_NODES * width, np.maximum(high, low + width)[..., None])
+    roll_1 = np.sqrt(2 * pair.base_radius_1 * node_arc)
+    roll_2 = separation(pair, zeta[..., None], roll_1)[1]
+    begin, end = pair.path
+    smallest = np.where(low < high, gap.min(axis=-1), np.inf)
+    on_path = (zeta >= begin) & (zeta <= end)
+    return Windows(
+        zeta=zeta,
+        near=on_path if line_of_action else smallest - smallest.min(axis=-1, keepdims=True) < nearest,
+        gap=gap,
+        roll=np.stack([roll_1, roll_2]),
+        at_edge=at_edge,
+        layout=layout,
+        centre=start + 0.5 * width - nominal,
+        cell=np.full(len(zeta), width / cells),
+    )
+
+
+def cell_edges(cells: int) -> np.ndarray:
+    """Cell edges as fractions of a window: inside a flank, at its low end, at its high end, at both.
+
+    Where flanks end they meet at an angle: a light load is carried within some micrometres of the corner, so
+    that the cells there shrink to ``1 / cells^2`` of the window.
+
+    Returns
+    -------
+    (4, cells + 1) array
+    """
+    t = np.linspace(0.0, 1.0, cells + 1)
+    return np.stack([t, t**2, 1.0 - (1.0 - t) ** 2, np.sin(0.5 * np.pi * t) ** 2])
+
+
+def cell_centres(cells: int) -> np.ndarray:
+    """Middles of the cells as fractions of a window, shape (4, cells)."""
+    edges = cell_edges(cells)
+    return 0.5 * (edges[:, 1:] + edges[:, :-1])
+
+
+def equal_cells(cells: int) -> np.ndarray:
+    """Share of every cell (last axis) of the layouts that lies in each of equal cells, (4, cells, cells)."""
+    edges, equal = cell_edges(cells), np.linspace(0.0, 1.0, cells + 1)
+    low, high = edges[:, None, :-1], edges[:, None, 1:]
+    overlap = np.minimum(high, equal[1:, None]) - np.maximum(low, equal[:-1, None])
+    return np.maximum(overlap, 0.0) / (high - low)
+
+
 def assemble_contact(
     setup: MeshWindows, bodies: Bodies, position: int, members: MovingMembers | None = None
 ) -> ContactProblem:
-    """The complementarity problem of all meshes at one position.
+    """Assemble the complementarity problem of all meshes at one position.
 
     The motions are those of the planets and of the sun, as arcs on their base circles [m], positive in the
     direction in which the sun drives, and then the free motions of `members`.
     """
     N = setup.n_planets
     mesh, pair = np.nonzero(setup.near[:, position])
-    cells = setup.gap.shape[-1]
+    cells = setup.cells
     H = _regular_part(setup, bodies, position, mesh, pair)
     layout, n = setup.layout[mesh, position, pair], len(mesh)
-    polynomials = window_polynomials(cells)[layout]
+    polynomials = _window_polynomials(cells)[layout]
     H = polynomials[:, None] @ H.transpose(0, 2, 1, 3) @ polynomials.transpose(0, 2, 1)
     H[np.arange(n), np.arange(n)] += setup.local[mesh // N % 2, layout]
     H[np.arange(n), np.arange(n)] += _corner_part(setup, bodies, position, mesh, pair, polynomials)
@@ -296,44 +436,43 @@ def rotation_approach(n_planets: int) -> np.ndarray:
     return approach
 
 
-def local_compliance(width: float, cells: int, bodies: Bodies) -> np.ndarray:
+def _tooth_pairs(planetary_set, pairs, side: FlankSide, passed) -> tuple[np.ndarray, np.ndarray]:
+    """Path coordinates (2N, P, pairs) [m] and teeth (2, 2N, pairs) of all pairs that may come near.
+
+    `passed` (P,) are the positions less the mesh periods passed.
+    """
+    pitch = planetary_set.sun.base_pitch
+    begin = min(p.path[0] for p in pairs) / pitch
+    end = max(p.path[1] for p in pairs) / pitch
+    passed = side.direction * passed
+    lowest = np.floor(begin - side.phase - np.ceil(passed.max())).astype(int) - 1
+    index = lowest[:, None] + np.arange(int(np.ceil(end - begin)) + 4)
+    zeta = pitch * (passed[None, :, None] + side.phase[:, None, None] + index[:, None, :])
+    return zeta, side_teeth(planetary_set, index, side.direction)
+
+
+def _contact_half_width(pair: FlankPair, line_load: float, material: Material) -> float:
+    """Largest Hertzian half width on the path of contact [m] of one tooth pair under `line_load` [N/m]."""
+    begin, end = pair.path
+    zeta = np.linspace(begin, end, 51)[1:-1]
+    rho_1, rho_2 = pair.pitch_roll_1 + zeta, pair.pitch_roll_2 - pair.sign * zeta
+    radius = (rho_1 * rho_2 / (rho_2 + pair.sign * rho_1)).max()
+    modulus = material.youngs_modulus / (2 * (1 - material.poisson_ratio**2))
+    return hertz_half_width(line_load, radius, modulus)
+
+
+def _window_compliance(width: float, cells: int, bodies: Bodies) -> np.ndarray:
     """Half-plane compliance of both flanks between the cells of a window, shape (4, cells, cells) [m/N]."""
     material, centre = bodies.material, width * cell_centres(cells)
     half = 0.5 * width * np.diff(cell_edges(cells))
     distance = centre[:, :, None] - centre[:, None, :]
-    # reciprocal between cells of different widths
-    return (
-        sum(
-            surface_displacement(distance, h, material.shear_modulus, material.poisson_ratio)
-            for h in (half[:, :, None], half[:, None, :])
-        )
-        / bodies.face_width
-    )
+    constants = material.shear_modulus, material.poisson_ratio
+    # of both cells of a pair: reciprocal between cells of different widths
+    loaded = surface_displacement(distance, half[:, :, None], *constants)
+    return (loaded + surface_displacement(distance, half[:, None, :], *constants)) / bodies.face_width
 
 
-def _side_windows(planetary_set, bodies, pairs, zeta, shift, form, share, cells, nearest, contact):
-    """Windows of both kinds of mesh on one side of the teeth."""
-    N = planetary_set.n_planets
-    found = []
-    for kind, pair in enumerate(pairs):
-        half_width = contact_half_width(pair, share / bodies.face_width, bodies.material)
-        rows = slice(kind * N, (kind + 1) * N)
-        found.append(
-            windows(
-                pair,
-                zeta[rows],
-                width=3.2 * half_width,
-                cells=cells,
-                nearest=nearest,
-                line_of_action=contact == "line_of_action",
-                form=form[kind],
-                shift=shift[rows],
-            )
-        )
-    return found
-
-
-def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows:
+def _gathered(found: list[Windows], tooth, turns, bodies: Bodies, cells: int) -> MeshWindows:
     """Join all meshes and drop the leading and trailing pairs that never come near."""
     used = np.concatenate([w.near.any(axis=1) for w in found])
     # every mesh keeps the same number of pairs, starting at its own first candidate
@@ -341,31 +480,21 @@ def _gather(found: list[Windows], tooth, turns, N, bodies, cells) -> MeshWindows
     count = int((used.shape[1] - used[:, ::-1].argmax(axis=1) - first).max())
     first = np.minimum(first, used.shape[1] - count)
     take = first[:, None] + np.arange(count)
-    row = np.arange(len(used))[:, None]
-
-    def join(name):
-        joined = np.concatenate([getattr(w, name) for w in found])
-        return np.moveaxis(np.moveaxis(joined, 2, 1)[row, take], 1, 2)
-
-    gap = join("gap")
-    shares = np.diff(cell_edges(cells))
+    mesh = np.arange(len(used))
+    places = mesh[:, None, None], np.arange(len(turns))[:, None], take[:, None, :]
+    parts = {}
+    for name in (f.name for f in fields(Windows)):
+        of_gears = name in ("roll", "at_edge")
+        whole = np.concatenate([getattr(w, name) for w in found], axis=int(of_gears))
+        parts[name] = whole if name == "cell" else whole[:, *places] if of_gears else whole[places]
+    area = parts["cell"] * cells * bodies.face_width
     return MeshWindows(
-        n_planets=N,
-        positions=len(turns),
-        pairs=count,
-        zeta=join("zeta"),
-        near=join("near"),
-        smallest_gap=gap.min(axis=-1),
-        gap=gap,
-        roll=(join("roll_1"), join("roll_2")),
-        edge=(join("at_low_edge"), join("at_high_edge")),
-        tooth=(tooth[0][row, take], tooth[1][row, take]),
+        **parts,
+        n_planets=len(found[0].cell),
+        tooth=tooth[:, mesh[:, None], take],
         turns=turns,
-        layout=join("layout"),
-        local=np.stack([local_compliance(w.cell * cells, cells, bodies) for w in found[:2]]),
-        cell=np.repeat([w.cell for w in found], N),
-        cell_area=np.repeat([w.cell * cells * bodies.face_width * shares for w in found], N, axis=0),
-        centre=join("centre"),
+        local=np.stack([_window_compliance(w.cell[0] * cells, cells, bodies) for w in found[:2]]),
+        cell_area=area[:, None, None] * np.diff(cell_edges(cells)),
     )
 
 
@@ -392,14 +521,13 @@ def _regular_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair) -> n
     return S
 
 
-def _add_body(S, body: FlankCompliance, setup, position, mesh, pair, members, gear, side):
+def _add_body(S, body: FlankCompliance, setup: MeshWindows, position, mesh, pair, members, gear, side):
     """Add the compliance of one body between the windows `members` that lie on it."""
     if not len(members):
         return
     j, i = mesh[members], pair[members]
-    roll = np.where(gear[:, None] == 0, setup.roll[0][j, position, i], setup.roll[1][j, position, i])
-    tooth = np.where(gear == 0, setup.tooth[0][j, i], setup.tooth[1][j, i])
-    index, weight = station_weights(roll, body.roll)
+    tooth = setup.tooth[gear, j, i]
+    index, weight = station_weights(setup.roll[gear, j, position, i], body.roll)
     index = index + side[:, None, None] * len(body.roll)
     lag = (tooth[:, None] - tooth[None, :]) % len(body.regular)
     values = body.regular[
@@ -417,10 +545,32 @@ def _corner_part(setup: MeshWindows, bodies: Bodies, position, mesh, pair, polyn
     sun_side = mesh // setup.n_planets % 2 == 0
     of_gear = ((bodies.sun, bodies.planet), (bodies.planet, bodies.ring))
     for rows, flanks in zip((sun_side, ~sun_side), of_gear, strict=True):
-        for roll, flank in zip(setup.roll, flanks, strict=True):
-            arc = roll[mesh[rows], position, pair[rows]] ** 2 / (2 * flank.base_radius)
+        for gear, flank in enumerate(flanks):
+            arc = setup.roll[gear, mesh[rows], position, pair[rows]] ** 2 / (2 * flank.base_radius)
             away = np.einsum("wcn,wn->wc", polynomials[rows], np.abs(arc - flank.corner.arc))
             # cells beyond the end of a flank are no candidates
             away = np.maximum(away, 1e-12)
             total[rows] += flank.corner.surface(away[:, :, None], away[:, None, :])
     return total / bodies.face_width
+
+
+def _window_polynomials(cells: int) -> np.ndarray:
+    """Quadratic Lagrange polynomials of the window nodes at the cell centres, shape (4, cells, 3)."""
+    t = cell_centres(cells)
+    return np.stack([(2 * t - 1) * (t - 1), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
+
+
+def _separation_at(pair: FlankPair, zeta, arc, form):
+    """Separation at arc lengths on flank 1, deviations of the profiles included."""
+    roll_1 = np.sqrt(2 * pair.base_radius_1 * np.maximum(arc, 0.0))
+    gap, roll_2 = separation(pair, zeta, roll_1)
+    return gap if form is None else gap + form(roll_1, roll_2)
+
+
+def _nearest_arc(pair: FlankPair, zeta, centre, low, high, reach, form):
+    """Arc length of the smallest separation within `reach` of the contact of the unmodified flanks."""
+    begin = np.maximum(centre - reach, low)
+    end = np.maximum(np.minimum(centre + reach, high), begin)
+    arc = begin[..., None] + (end - begin)[..., None] * np.linspace(0.0, 1.0, 97)
+    best = _separation_at(pair, zeta[..., None], arc, form).argmin(axis=-1)
+    return np.take_along_axis(arc, best[..., None], axis=-1)[..., 0]

@@ -1,25 +1,41 @@
-"""From gears to flank compliances, and from tooth loads back to the deformed gears.
+"""Gears as elastic bodies: one sector of finite elements each, and the compliance of all their flanks.
 
 Every gear has one sector grid, one stiffness matrix and one factorisation (`make_sectors`, `make_bodies`).
-The displacement fields of all gears of a set under the tooth loads of one position follow from the same
-sectors (`deformed_set`).
+
+A concentrated load on a finite-element surface has no converged displacement. What converges is the
+displacement at a depth ``d`` under the flank. The half-plane displacement at that depth, which has the
+same singularity, is subtracted, and so is what the wedge at the tip corner yields more than the half plane
+(`femgear.contact.local_compliance`). What remains is the regular part of the flank's compliance. It is smooth
+along the flank, so it may be interpolated, and it is extrapolated from the depths d and 2d to the surface.
+The contact solution adds half plane and corner at the surface under its pressure cells.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.contact.assembly import Bodies, acting_flanks, mesh_pairs
-from femgear.contact.candidates import tooth_zero_angles
-from femgear.contact.flanks import flank_compliance, flank_load_columns, flank_stations
+from femgear.contact.flank_pairs import LEFT, RIGHT, mesh_pairs
+from femgear.contact.local_compliance import TipCorner, depth_displacement, tip_corner
+from femgear.errors import CaseError
+from femgear.fe.compliance import (
+    condense_sector,
+    directional,
+    interpolation,
+    mirror_nodes,
+    mirrored_columns,
+    split_sector,
+    tooth_compliance,
+)
+from femgear.fe.elasticity import tangential_stress
+from femgear.gears.gear import tooth_thickness
 
 if TYPE_CHECKING:
-    from femgear.contact.cycle import MeshCycle
-    from femgear.fe.elasticity import Material
+    from femgear.fe.compliance import SectorSchur
+    from femgear.fe.elasticity import BoundaryStress, Material
     from femgear.fe.grid import Grid
     from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
@@ -35,7 +51,7 @@ class Sector:
 
     gear: Gear
     grid: Grid
-    stiffness: object
+    stiffness: Any
 
 
 @dataclass(frozen=True)
@@ -47,6 +63,79 @@ class Sectors:
     ring: Sector
 
 
+@dataclass(frozen=True)
+class FlankStations:
+    """Nodes of the left flank with their inward normals, ordered by roll length."""
+
+    nodes: np.ndarray
+    roll: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+
+
+@dataclass(frozen=True)
+class ObservedRoot:
+    """Root of a tooth seen by the same factorisation as its flanks; the sectors are not tied yet.
+
+    Parameters
+    ----------
+    along : BoundaryStress
+        Functionals of the tangential stress along the root of the left flank.
+    stations : FlankStations
+        Where the loads act.
+    schur : SectorSchur
+        Sector with these loads and observations, those of the cuts themselves included.
+    """
+
+    along: BoundaryStress
+    stations: FlankStations
+    schur: SectorSchur
+
+
+@dataclass(frozen=True)
+class FlankCompliance:
+    """Regular compliance between the flank stations of all teeth of one gear.
+
+    Parameters
+    ----------
+    roll : (n,) array
+        Roll lengths of the stations [m], equidistant and ascending.
+    base_radius : float
+        [m].
+    regular : (teeth, 2n, 2n) array
+        ``regular[k, a, b]``: displacement into the body [m] at station ``a`` of tooth ``i`` per unit inward
+        normal force [N] at station ``b`` of tooth ``i - k``, less half plane and tip corner where both lie
+        on the same flank. Stations of the left flank first, then those of the right flank.
+    depth : (n,) array
+        Depth under each station at which body and half plane are joined [m].
+    corner : TipCorner
+        What was taken out for the corner at the tip.
+    unknowns : int
+        Degrees of freedom of the whole body that the sector stands for.
+    root : ObservedRoot, optional
+        For the stresses in the roots, where they were observed too.
+    """
+
+    roll: np.ndarray
+    base_radius: float
+    regular: np.ndarray
+    depth: np.ndarray
+    corner: TipCorner
+    unknowns: int
+    root: ObservedRoot | None = None
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Flank compliances of the three kinds of gears and their common material."""
+
+    sun: FlankCompliance
+    planet: FlankCompliance
+    ring: FlankCompliance
+    material: Material
+    face_width: float
+
+
 def make_sectors(
     planetary_set: PlanetarySet,
     material: Material,
@@ -55,7 +144,7 @@ def make_sectors(
     refine: float = 1.0,
     cache: Path | None = None,
 ) -> Sectors:
-    """Mesh one sector of each gear and assemble its stiffness.
+    """Mesh one sector of each gear and assemble its stiffness matrix.
 
     Parameters
     ----------
@@ -79,7 +168,7 @@ def make_sectors(
     sectors = []
     for gear, grid in zip(gears, grids, strict=True):
         whole = mirror(grid)
-        state = RING_STATE if gear.internal else TEETH_STATE
+        state: Any = RING_STATE if gear.internal else TEETH_STATE
         matrix = stiffness(whole, material, state=state, thickness=gear.face_width)
         sectors.append(Sector(gear, whole, matrix))
     return Sectors(*sectors)
@@ -88,7 +177,7 @@ def make_sectors(
 def make_bodies(
     sectors: Sectors, material: Material, *, depth: float | None = None, ring_foundation=None
 ) -> Bodies:
-    """Flank compliances with sun and planets held at their bores and the ring at its outer surface.
+    """Compute the flank compliances, sun and planets held at their bores and the ring at its outer surface.
 
     Parameters
     ----------
@@ -100,18 +189,18 @@ def make_bodies(
         Stiffness of an elastic foundation of the ring, which then is not held [N/m].
     """
     # the ring's roots need a solution of their own: its sector is not of one plane state, see `root_stress`
-    compliances = [
+    sun, planet = (
         flank_compliance(
             s.grid, s.gear, material, s.stiffness, held="rim", depth=depth, root_state=TEETH_STATE
         )
         for s in (sectors.sun, sectors.planet)
-    ]
-    bodies = Bodies(*compliances, None, material=material, face_width=sectors.sun.gear.face_width)
-    return with_ring(bodies, sectors, depth=depth, ring_foundation=ring_foundation)
+    )
+    ring = _ring_compliance(sectors.ring, material, depth, ring_foundation)
+    return Bodies(sun, planet, ring, material, face_width=sectors.sun.gear.face_width)
 
 
 def with_ring(bodies: Bodies, sectors: Sectors, *, depth: float | None, ring_foundation=None) -> Bodies:
-    """The same bodies with the ring held at its outer surface, or on an elastic foundation.
+    """Exchange the ring: held at its outer surface, or on an elastic foundation.
 
     Parameters
     ----------
@@ -119,15 +208,97 @@ def with_ring(bodies: Bodies, sectors: Sectors, *, depth: float | None, ring_fou
     depth, ring_foundation
         As for `make_bodies`.
     """
-    ring, held, stiffness = sectors.ring, "rim", sectors.ring.stiffness
-    if ring_foundation is not None:
-        stiffness, held = stiffness + ring_foundation, None
-    found = flank_compliance(ring.grid, ring.gear, bodies.material, stiffness, held=held, depth=depth)
-    return replace(bodies, ring=found)
+    return replace(bodies, ring=_ring_compliance(sectors.ring, bodies.material, depth, ring_foundation))
+
+
+def flank_compliance(
+    grid: Grid,
+    gear: Gear,
+    material: Material,
+    stiffness,
+    *,
+    held: str | None,
+    depth: float | None = None,
+    root_state: str | None = None,
+) -> FlankCompliance:
+    """Compute the regular flank compliance of a whole gear from the grid of one sector.
+
+    Parameters
+    ----------
+    grid : Grid
+        Mirror-symmetric sector with boundaries ``flank_left``, ``cut_left``, ``cut_right`` and `held`.
+    gear : Gear
+    material : Material
+    stiffness : (2n, 2n) sparse matrix
+        Stiffness of the sector [N/m].
+    held : str
+        Boundary that is held: ``"rim"`` is the bore of an external gear and the outer surface of a ring.
+    depth : float, optional
+        Largest joining depth [m]; see `joining_depth`.
+    root_state : str, optional
+        Plane state of the whole of `stiffness`: the stresses in the roots are observed with the flanks.
+
+    Raises
+    ------
+    CaseError
+        When the depth reaches out of the tooth or the sector can move freely.
+    """
+    along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
+    stations, depths, schur = _condensed(grid, gear, stiffness, held, depth, along)
+    root = None
+    if along is not None:
+        schur, seen = _split_observations(schur, 2 * len(stations.roll))
+        root = ObservedRoot(along, stations, with_cut(seen, grid, held, along))
+    found = _without_half_plane(gear, material, stations, depths, tooth_compliance(schur), len(grid.points))
+    return replace(found, root=root)
+
+
+def flank_stations(grid: Grid, gear: Gear) -> FlankStations:
+    """Vertices of the left flank, shape (n,), with inward unit normals, shape (n, 2)."""
+    nodes = np.unique(np.asarray(grid.boundaries["flank_left"])[:, :2])
+    points = np.asarray(grid.points)[nodes]
+    order = np.argsort(np.hypot(*points.T))
+    nodes, points = nodes[order], points[order]
+    radius = np.hypot(*points.T)
+    pressure_angle = np.arccos(np.minimum(gear.base_radius / radius, 1.0))
+    sign = -1.0 if gear.internal else 1.0
+    outward = np.arctan2(points[:, 1], points[:, 0]) + np.pi / 2 - sign * pressure_angle
+    normals = -np.column_stack([np.cos(outward), np.sin(outward)])
+    roll = gear.base_radius * np.tan(pressure_angle)
+    return FlankStations(nodes, roll, points, normals)
+
+
+def joining_depth(gear: Gear, radius, depth: float | None) -> np.ndarray:
+    """Joining depth under flank points [m]: a quarter of the module, less where the tooth is thin.
+
+    Parameters
+    ----------
+    gear : Gear
+    radius : (n,) array
+        [m].
+    depth : float, optional
+        Upper limit instead of a quarter of the module [m].
+
+    Returns
+    -------
+    (n,) array
+        At most 0.3 of the tooth thickness at each radius, so that twice the depth stays in the tooth.
+    """
+    limit = 0.25 * gear.module if depth is None else depth
+    return np.minimum(limit, 0.3 * tooth_thickness(gear, radius))
+
+
+def flank_load_columns(grid: Grid, stations: FlankStations) -> np.ndarray:
+    """Unit inward normal nodal forces at the stations, shape (2 n_nodes, n)."""
+    loads = np.zeros((2 * len(grid.points), len(stations.nodes)))
+    column = np.arange(len(stations.nodes))
+    loads[2 * stations.nodes, column] = stations.normals[:, 0]
+    loads[2 * stations.nodes + 1, column] = stations.normals[:, 1]
+    return loads
 
 
 def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> np.ndarray:
-    """Unit inward normal force spread evenly over the active flank of the ring tooth, shape (2n, 1).
+    """Spread a unit inward normal force evenly over the active flank of the ring tooth, (2n, 1) nodal forces.
 
     Parameters
     ----------
@@ -137,8 +308,6 @@ def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> n
     side : float
         +1 loads the left flank, -1 the right one.
     """
-    from femgear.fe.compliance import mirror_nodes, mirrored_columns
-
     stations = flank_stations(grid, planetary_set.ring)
     pair = mesh_pairs(planetary_set)[1]
     active = pair.roll_on(1, pair.path)
@@ -150,93 +319,131 @@ def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> n
     return load if side > 0 else mirrored_columns(load, mirror_nodes(grid))
 
 
-@dataclass(frozen=True)
-class DeformedBody:
-    """One gear in the frame of the set: where its sector 0 is turned to and how every sector moves.
+def root_functionals(grid: Grid, gear: Gear, material: Material, *, state: str) -> BoundaryStress:
+    """Tangential stress along fillet and root arc of the left flank, in the direction of the boundary."""
+    names = tuple(name for name in ("fillet_left", "root_left") if name in grid.boundaries)
+    return tangential_stress(grid, material, names[::-1] if gear.internal else names, state=state)
+
+
+def with_cut(schur: SectorSchur, grid: Grid, held: str | None, along: BoundaryStress) -> SectorSchur:
+    """Add what the root functionals see of the cut itself: the last edge of the root ends on it."""
+    _, right, left = split_sector(grid, held)
+    both = np.hstack([along.columns, mirrored_columns(along.columns, mirror_nodes(grid))])
+    return replace(schur, observation_cut=schur.observation_cut + np.stack([both[right], both[left]]))
+
+
+def station_weights(roll, stations):
+    """Compute cubic Lagrange weights on equidistant stations.
 
     Parameters
     ----------
-    name : str
-    kind : str
-        ``"sun"``, ``"planet"`` or ``"ring"``.
-    centre : (2,) array
-        [m].
-    angle : float
-        Angle of the centreline of sector 0 [rad].
-    displacement : (count, n, 2) array
-        Of every node of every sector, in the frame of that sector [m].
+    roll : array of any shape
+        Roll lengths [m]; values outside the stations are extrapolated by at most half a spacing.
+    stations : (n,) array
+
+    Returns
+    -------
+    index : integer array, shape (..., 4)
+    weight : array, shape (..., 4)
     """
+    step = (stations[-1] - stations[0]) / (len(stations) - 1)
+    position = np.clip((np.asarray(roll) - stations[0]) / step, -0.5, len(stations) - 0.5)
+    first = np.clip(np.floor(position).astype(int) - 1, 0, len(stations) - 4)
+    t = position - first
+    weight = np.stack(
+        [
+            -(t - 1) * (t - 2) * (t - 3) / 6,
+            t * (t - 2) * (t - 3) / 2,
+            -t * (t - 1) * (t - 3) / 2,
+            t * (t - 1) * (t - 2) / 6,
+        ],
+        axis=-1,
+    )
+    return first[..., None] + np.arange(4), weight
 
-    name: str
-    kind: str
-    centre: np.ndarray
-    angle: float
-    displacement: np.ndarray
+
+def _ring_compliance(ring: Sector, material: Material, depth, foundation) -> FlankCompliance:
+    """Flank compliance of the ring, held at its outer surface or on a foundation [N/m]."""
+    held, stiffness = ("rim", ring.stiffness) if foundation is None else (None, ring.stiffness + foundation)
+    return flank_compliance(ring.grid, ring.gear, material, stiffness, held=held, depth=depth)
 
 
-def deformed_set(
-    planetary_set: PlanetarySet, sectors: Sectors, cycle: MeshCycle, *, position: int = 0
-) -> tuple[DeformedBody, ...]:
-    """Elastic displacement of sun, planets and ring, each held as in the static problem.
+def _condensed(grid, gear, stiffness, held, depth, along=None):
+    """Stations, joining depths (n, 1) and the condensed sector that observes at both depths, and `along`."""
+    stations = flank_stations(grid, gear)
+    depths = joining_depth(gear, np.hypot(*stations.points.T), depth)[:, None]
+    _check_depth(depth, stations)
+    observations = [
+        directional(
+            interpolation(grid, stations.points + factor * depths * stations.normals), stations.normals
+        )
+        for factor in (1.0, 2.0)
+    ]
+    if along is not None:
+        observations.append(along.columns)
+    schur = condense_sector(
+        grid,
+        stiffness,
+        count=gear.teeth,
+        held=held,
+        loads=flank_load_columns(grid, stations),
+        observations=np.hstack(observations),
+    )
+    return stations, depths, schur
 
-    The load of each tooth pair acts at its point on the line of action; the half-plane indentation, a few
-    tenths of a micrometre deep, is not part of the field.
 
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-        With the torque on the left flanks of the sun (mirror the set otherwise).
-    sectors : Sectors
-    cycle : MeshCycle
-        Of that set.
-    position : int
-        Index into ``cycle.position``.
-    """
-    s = planetary_set
-    sun_angle, planet_angles, ring_angle = tooth_zero_angles(s, float(cycle.position[position]))
-    on_sun, on_planets, on_ring = acting_flanks(s.n_planets)
-    bodies = [("sun", "sun", sectors.sun, np.zeros(2), sun_angle, on_sun)]
-    for n, psi in enumerate(s.planet_angles):
-        centre = s.centre_distance * np.array([np.cos(psi), np.sin(psi)])
-        bodies.append((f"planet {n + 1}", "planet", sectors.planet, centre, planet_angles[n], on_planets[n]))
-    bodies.append(("ring", "ring", sectors.ring, np.zeros(2), ring_angle, on_ring))
-    return tuple(
-        DeformedBody(name, kind, centre, float(angle), _displacement(s, sector, cycle, position, acting))
-        for name, kind, sector, centre, angle, acting in bodies
+def _split_observations(schur: SectorSchur, first: int) -> tuple[SectorSchur, SectorSchur]:
+    """The first observations of either half of the sector, and the others."""
+    rows = np.arange(len(schur.C)).reshape(2, -1)
+
+    def part(some) -> SectorSchur:
+        return replace(schur, C=schur.C[some], observation_cut=schur.observation_cut[..., some])
+
+    return part(rows[:, :first].ravel()), part(rows[:, first:].ravel())
+
+
+def _without_half_plane(gear, material, stations, depths, compliance, nodes) -> FlankCompliance:
+    """Take the local parts out of the compliance (teeth, 4n, 2n) at both depths and go on to the surface."""
+    n, teeth = len(stations.roll), len(compliance)
+    compliance = compliance.reshape(teeth, 2, 2, n, 2 * n)
+    arc = stations.roll**2 / (2 * gear.base_radius)
+    offset = arc[:, None] - arc[None, :]
+    corner = tip_corner(gear, material)
+    away = np.abs(arc - corner.arc)
+    # a load on the corner itself stands a thousandth of the module beside it, far less than any depth
+    loaded = np.maximum(away, 1e-3 * gear.module)
+    parts = []
+    for level, factor in enumerate((1.0, 2.0)):
+        # columns of the observations are mirrored as one block: (side, level, station)
+        at_depth = compliance[:, :, level].reshape(teeth, 2 * n, 2 * n).copy()
+        local = depth_displacement(offset, factor * depths, material.shear_modulus, material.poisson_ratio)
+        local += corner.depth(away[:, None], factor * depths, loaded[None, :])
+        for side in (LEFT, RIGHT):
+            block = slice(side * n, (side + 1) * n)
+            at_depth[0, block, block] -= local / gear.face_width
+        parts.append(at_depth)
+    regular = 2.0 * parts[0] - parts[1]
+    # reciprocity holds for the exact field; the two depths break it by the size of the discretisation error
+    regular = 0.5 * (regular + np.roll(regular[::-1], 1, axis=0).transpose(0, 2, 1))
+    return FlankCompliance(
+        roll=stations.roll,
+        base_radius=gear.base_radius,
+        regular=regular,
+        depth=depths[:, 0],
+        corner=corner,
+        unknowns=teeth * 2 * nodes,
     )
 
 
-def _displacement(planetary_set, sector: Sector, cycle, position, acting):
-    """Displacement of one body; `acting` lists (mesh, gear of the pair, drive flank) of its meshes."""
-    from femgear.fe.compliance import cyclic_displacement, mirror_nodes, mirrored_columns
-
-    stations = flank_stations(sector.grid, sector.gear)
-    left = flank_load_columns(sector.grid, stations)
-    columns = (left, mirrored_columns(left, mirror_nodes(sector.grid)))
-    loads = np.zeros((sector.gear.teeth, left.shape[0]))
-    pairs = mesh_pairs(planetary_set)
-    N, turns = planetary_set.n_planets, int(np.floor(cycle.position[position]))
-    sides = (
-        (cycle.tooth, cycle.path, cycle.tooth_load, columns),
-        (cycle.back_tooth, cycle.back_path, cycle.back_tooth_load, columns[::-1]),
-    )
-    for mesh, gear, drive in acting:
-        pair = pairs[mesh >= N]
-        # with every mesh period the sun's teeth move on by one, those of planets and ring back
-        moved_on = -1 if mesh < N and gear == 0 else 1
-        for tooth, path, tooth_load, flanks in sides:
-            for t in np.flatnonzero(tooth_load[mesh, :, position] > 0.0):
-                roll = pair.roll_on(gear, path[mesh, t, position])
-                number = (tooth[gear, mesh, t] + moved_on * turns) % sector.gear.teeth
-                force = tooth_load[mesh, t, position]
-                loads[number] += force * (flanks[drive] @ _hat(roll, stations.roll))
-    return cyclic_displacement(sector.grid, sector.stiffness, loads, held="rim")
-
-
-def _hat(roll: float, stations: np.ndarray) -> np.ndarray:
-    """Linear interpolation weights of one roll length."""
-    weight = np.zeros(len(stations))
-    upper = int(np.clip(np.searchsorted(stations, roll), 1, len(stations) - 1))
-    t = (roll - stations[upper - 1]) / (stations[upper] - stations[upper - 1])
-    weight[upper - 1], weight[upper] = 1 - t, t
-    return weight
+def _check_depth(depth: float | None, stations: FlankStations) -> None:
+    """Under half an element below a nodal load the finite-element field is still that of the single node."""
+    spacing = float(np.linalg.norm(np.diff(stations.points, axis=0), axis=1).max())
+    if depth is not None and not depth >= 0.5 * spacing:
+        raise CaseError(
+            f"a joining depth of {1e3 * depth:.4g} mm is within the elements at the flank",
+            code="E-DEPTH",
+            key="static.depth",
+            value=f"{1e3 * depth:.4g} mm",
+            limit=f"at least half an element of the flank, {500 * spacing:.4g} mm",
+            remedy="leave static.depth out, give a larger one, or raise static.flank_elements",
+        )

@@ -1,44 +1,80 @@
-"""One walk through the mesh cycle: all 2N meshes of a planetary set solved together at each position.
+"""The walk through the mesh cycle: all 2N meshes of a planetary set solved together at each position.
 
 It gives loads, motions and stiffness of the meshes (`MeshCycle`). A negative torque loads the other flanks:
-it is the mirror image of a set under a positive one (`walk_either_flank`).
+it is the mirror image of a set under a positive one (`femgear.contact.flank_pairs`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femgear.contact.assembly import (
-    Bodies,
+    ROUGH_STIFFNESS,
     ContactProblem,
     MeshWindows,
     assemble_contact,
     cycle_positions,
+    enlarged,
+    equal_cells,
+    in_windows,
     mesh_windows,
     rotation_approach,
 )
-from femgear.contact.bearings import BearingSprings, bearing_springs, pin_forces, solve_position
-from femgear.contact.candidates import equal_cells
-from femgear.contact.sides import mirrored_set
-from femgear.contact.solve import mesh_tangent_matrix, tangent_stiffness
-from femgear.contact.supports import RIGID, MovingMembers, Supports, moving_members
+from femgear.contact.flank_pairs import loaded_image
+from femgear.contact.solve import ContactState, mesh_tangent_matrix, tangent_stiffness
+from femgear.contact.supports import (
+    RIGID,
+    BearingSprings,
+    MovingMembers,
+    Supports,
+    bearing_springs,
+    moving_members,
+    pin_forces,
+    solve_position,
+)
 from femgear.errors import ContactError
-from femgear.gears.deviations import mirrored_deviations
 
 if TYPE_CHECKING:
+    from femgear.contact.bodies import Bodies
     from femgear.gears.deviations import SetDeviations
     from femgear.gears.planetary import PlanetarySet
 
-ROUGH_STIFFNESS = 10e9
-"""Stiffness of a mesh per face width, to size windows [N/m^2]."""
-HELD = 2.56
-"""A window is 3.2 half widths wide: it holds the contact of this many times the force that sized it."""
 LARGEST_RESIDUAL = 1e-9
 """Of contact conditions and equilibrium; rounding leaves 1e-14."""
+
+
+@dataclass(frozen=True)
+class CycleOptions:
+    """What a walk through the mesh cycle looks at and keeps besides.
+
+    Parameters
+    ----------
+    cells : int
+        Pressure cells in a contact window.
+    planet_gaps : (N,) array, optional
+        Extra separation of the sun-side flanks of each planet [m].
+    both_flanks : bool
+        Look for contact on the back flanks as well. Without torque, only these can be loaded: both flanks
+        of teeth that are wedged.
+    pressures : bool
+        Keep the pressure distributions of the drive flanks.
+    held_bodies : Bodies, optional
+        The bodies with the ring held at its outer surface: keep stiffness and compliance between all meshes
+        of the same contact with these bodies.
+    progress : callable, optional
+        Called with (positions done, positions).
+    """
+
+    cells: int = 36
+    planet_gaps: np.ndarray | list[float] | None = None
+    both_flanks: bool = False
+    pressures: bool = False
+    held_bodies: Bodies | None = None
+    progress: Callable[[int, int], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -66,7 +102,8 @@ class MeshCycle:
     path : (2N, T, P) array
         Path coordinate of each tooth pair, from the pitch point in the direction of motion [m].
     tooth : (2, 2N, T) int array
-        Tooth numbers of the pairs on gear 1 and gear 2 in the first mesh period, see `tooth_zero_angles`.
+        Tooth numbers of the pairs on gear 1 and gear 2 in the first mesh period, see
+        `femgear.contact.flank_pairs`.
     back_tooth_load : (2N, T, P) array
         Load of each tooth pair on the back flanks [N]; the T places are those of the back side's own pairs.
         This and the next two are zero where back flanks were not looked at.
@@ -176,6 +213,30 @@ class MeshCycle:
         return (self.force > 0) & (self.back_force > 0)
 
 
+_PRESSURES = ("pressure", "pressure_offset", "pressure_centre")
+_AXES = {
+    "mt": (
+        "deflection",
+        "force",
+        "back_force",
+        "stiffness",
+        "max_pressure",
+        "edge_contact",
+        "held_stiffness",
+    ),
+    "mst": ("tooth_load", "path", "back_tooth_load", "back_path", "pressure_centre"),
+    "gms": ("tooth", "back_tooth"),
+    "t": ("sun_arc", "residual", "iterations"),
+    "nt": ("open_planets",),
+    "mmt": ("held_compliance",),
+    "msct": ("pressure",),
+    "mc": ("pressure_offset",),
+}
+"""Axes of the arrays of a cycle: gear, mesh, planet n, tooth pair (slot), cell, position (time)."""
+_ODD = ("path", "back_path", "tooth", "back_tooth", "pressure_offset", "pressure_centre")
+"""What counts the other way round in the mirror image."""
+
+
 def walk_mesh_cycle(
     planetary_set: PlanetarySet,
     bodies: Bodies,
@@ -183,21 +244,21 @@ def walk_mesh_cycle(
     sun_torque: float,
     positions: int | np.ndarray = 64,
     contact: str = "profile",
-    cells: int = 36,
     deviations: SetDeviations | None = None,
     supports: Supports = RIGID,
     periods: int = 1,
-    planet_gaps=None,
-    both_flanks: bool = False,
-    pressures: bool = False,
-    held_bodies: Bodies | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    options: CycleOptions | None = None,
 ) -> MeshCycle:
-    """Static transmission error, load sharing and mesh stiffness over the mesh cycle.
+    """Compute static transmission error, load sharing and mesh stiffness over the mesh cycle.
 
     Sun and planets are held at their bores, the ring at its outer surface. At every position one
     complementarity problem holds for the pressures of all meshes: no penetration, no tension, equilibrium
     of every planet and of every floating member, and the sun's torque.
+
+    For a negative torque the right flanks of the sun carry. Position zero is then where the right flanks of
+    "sun-planet 1" touch at the pitch point, and positions still run with the rotation of the sun. The
+    mirror image, which is solved, turns the other way: its record ends at position zero, so that records
+    which do not close hold the same configurations too.
 
     Parameters
     ----------
@@ -205,13 +266,11 @@ def walk_mesh_cycle(
     bodies : Bodies
         Flank compliances and material.
     sun_torque : float
-        Torque on the sun [N m], not negative (mirror the set for the other flanks).
+        Torque on the sun, of either sign [N m].
     positions : int or (P,) array
         Number of equidistant positions in one mesh period, or the positions themselves [mesh periods].
     contact : {"profile", "line_of_action"}
         Candidates on the whole profiles, or only on the theoretical path of contact.
-    cells : int
-        Pressure cells in a contact window.
     deviations : SetDeviations, optional
         Micro-geometry and errors.
     supports : Supports
@@ -219,173 +278,29 @@ def walk_mesh_cycle(
     periods : int
         Mesh periods in the record; errors that belong to teeth or turn with a member need
         `gears.deviations.common_period` of them.
-    planet_gaps : (N,) array, optional
-        Extra separation of the sun-side flanks of each planet [m].
-    both_flanks : bool
-        Look for contact on the back flanks as well. Without torque, only these can be loaded: both flanks
-        of teeth that are wedged.
-    pressures : bool
-        Keep the pressure distributions of the drive flanks.
-    held_bodies : Bodies, optional
-        The bodies with the ring held at its outer surface: keep stiffness and compliance between all meshes
-        of the same contact with these bodies.
-    progress : callable, optional
-        Called with (positions done, positions).
-
-    Returns
-    -------
-    MeshCycle
+    options : CycleOptions, optional
 
     Raises
     ------
     ContactError
         When the contact problem cannot be solved or no window size contains the contact.
     """
-    N = planetary_set.n_planets
+    options = options or CycleOptions()
     position = cycle_positions(positions, periods=periods)
-    nothing = cycle_without_load(
-        N, position, periods=periods, contact=contact, cells=cells, pressures=pressures
-    )
-    if not (sun_torque > 0 or both_flanks):
-        return nothing
-    members = moving_members(planetary_set, supports, both_flanks=both_flanks)
-    springs = bearing_springs(planetary_set, supports, members)
-    width = bodies.face_width
-    # without torque the windows begin with what one micrometre of wedging may carry
-    share = sun_torque / (planetary_set.sun.base_radius * N) or 1e-6 * ROUGH_STIFFNESS * width
-    enlarge, nearest = 1.0, 3.0 * share / (ROUGH_STIFFNESS * width)
-    for _ in range(8):
-        setup = mesh_windows(
-            planetary_set,
-            bodies,
-            share=share * enlarge**2,
-            positions=positions,
-            cells=cells,
-            nearest=nearest,
-            contact=contact,
-            periods=periods,
-            deviations=deviations,
-            planet_gaps=planet_gaps,
-            both_flanks=both_flanks,
-        )
-        found, overflow, missed = _walk(
-            planetary_set, bodies, setup, sun_torque, members, springs, pressures, held_bodies, progress
-        )
-        missed = missed if contact == "profile" else 0.0
-        if not overflow and missed <= nearest:
-            cycle = replace(nothing, **found)
-            return cycle if cycle.force.any() else nothing
-        if overflow:
-            enlarge = _enlarged(enlarge, share, max(found["force"].max(), found["back_force"].max()))
-        nearest = max(nearest, 1.2 * missed)
-    raise ContactError(
-        "the contact windows do not contain the contact after seven enlargements",
-        code="E-CONTACT-WINDOW",
-        remedy="reduce operation.torque or the errors",
-    )
-
-
-def walk_either_flank(
-    planetary_set,
-    bodies,
-    *,
-    sun_torque,
-    positions=64,
-    contact="profile",
-    deviations=None,
-    supports=RIGID,
-    periods=1,
-    planet_gaps=None,
-    both_flanks=False,
-    pressures=False,
-    held_bodies=None,
-    progress=None,
-) -> MeshCycle:
-    """`walk_mesh_cycle` for a torque of either sign; results keep the order of planets and positions.
-
-    For a negative torque the right flanks of the sun carry. Position zero is then where the right flanks of
-    "sun-planet 1" touch at the pitch point, and positions still run with the rotation of the sun. The
-    mirror image turns the other way: its record ends at position zero, so that records which do not close
-    hold the same configurations too.
-    """
-    options = {
-        "contact": contact,
-        "supports": supports,
-        "periods": periods,
-        "both_flanks": both_flanks,
-        "pressures": pressures,
-        "held_bodies": held_bodies,
-        "progress": progress,
-    }
-    if sun_torque >= 0:
-        return walk_mesh_cycle(
-            planetary_set,
-            bodies,
-            sun_torque=sun_torque,
-            positions=positions,
-            deviations=deviations,
-            planet_gaps=planet_gaps,
-            **options,
-        )
-    mirrored, order = mirrored_set(planetary_set)
-    turned = None if planet_gaps is None else np.asarray(planet_gaps, float)[order]
-    if deviations is not None:
-        deviations = mirrored_deviations(deviations, planetary_set, mirrored, order)
-    cycle = walk_mesh_cycle(
-        mirrored,
-        bodies,
-        sun_torque=-sun_torque,
-        deviations=deviations,
-        planet_gaps=turned,
-        positions=-cycle_positions(positions, periods=periods)[::-1],
-        **options,
-    )
-    return _seen_from_front(cycle, planetary_set, order)
-
-
-def _seen_from_front(cycle: MeshCycle, planetary_set, order) -> MeshCycle:
-    """Results of the mirror image in the order of planets and positions of the original."""
-    planet = np.argsort(order)
-    mesh, axis = np.concatenate([planet, planet + len(order)]), planetary_set.planet_angles[0]
-    by_mesh = ("deflection", "force", "back_force", "stiffness", "max_pressure", "edge_contact")
-    found = {name: getattr(cycle, name)[mesh][:, ::-1] for name in by_mesh}
-    found |= {name: getattr(cycle, name)[::-1] for name in ("sun_arc", "residual", "iterations")}
-    # the pair that comes first along the path leaves first when the rotation is seen from behind
-    for side in ("", "back_"):
-        found[f"{side}tooth_load"] = getattr(cycle, f"{side}tooth_load")[mesh][:, ::-1, ::-1]
-        found[f"{side}path"] = -getattr(cycle, f"{side}path")[mesh][:, ::-1, ::-1]
-        found[f"{side}tooth"] = -getattr(cycle, f"{side}tooth")[:, mesh][:, :, ::-1]
-    if cycle.pressure is not None:
-        found["pressure"] = cycle.pressure[mesh][:, ::-1, ::-1, ::-1]
-        found["pressure_offset"] = -cycle.pressure_offset[mesh][:, ::-1]
-        found["pressure_centre"] = -cycle.pressure_centre[mesh][:, ::-1, ::-1]
-    if cycle.held_stiffness is not None:
-        found["held_stiffness"] = cycle.held_stiffness[mesh][:, ::-1]
-        found["held_compliance"] = cycle.held_compliance[mesh][:, mesh][:, :, ::-1]
-    return replace(
-        cycle,
-        position=0.0 - cycle.position[::-1],
-        open_planets=cycle.open_planets[planet][:, ::-1],
-        bearing_force=_reflected(cycle.bearing_force, axis)[planet][:, :, ::-1],
-        member_motion=_reflected_motion(cycle, axis, planet)[:, ::-1],
-        **found,
-    )
-
-
-def _reflected(vectors: np.ndarray, axis: float) -> np.ndarray:
-    """Vectors (m, 2, P) reflected in the line at the angle `axis`."""
-    c, s = np.cos(2 * axis), np.sin(2 * axis)
-    return np.einsum("ij,mjp->mip", np.array([[c, s], [s, -c]]), vectors)
-
-
-def _reflected_motion(cycle: MeshCycle, axis: float, back) -> np.ndarray:
-    """Motions of the members reflected in the line through the first planet, planets in their own order."""
-    vectors = _reflected(cycle.member_motion.reshape(-1, 2, cycle.member_motion.shape[1]), axis)
-    names = [name.split(":")[0] for name in cycle.member_names[::2]]
-    planets = [i for i, name in enumerate(names) if name.startswith("planet")]
-    if planets:
-        vectors[planets] = vectors[planets][back]
-    return vectors.reshape(cycle.member_motion.shape)
+    solved, order, deviations = loaded_image(planetary_set, sun_torque, deviations)
+    mirrored = solved is not planetary_set
+    if mirrored:
+        position = -position[::-1]
+        if options.planet_gaps is not None:
+            options = replace(options, planet_gaps=np.asarray(options.planet_gaps, float)[order])
+    record = cycle_without_load(solved.n_planets, position, periods=periods, contact=contact, options=options)
+    if sun_torque or options.both_flanks:
+        members = moving_members(solved, supports, both_flanks=options.both_flanks)
+        springs = bearing_springs(solved, supports, members)
+        walk = _Walk(solved, bodies, abs(sun_torque), deviations, members, springs, record, options)
+        found = in_windows(walk.attempt, *walk.first_windows())
+        record = found if found.force.any() else record
+    return _seen_from_front(record, planetary_set, order) if mirrored else record
 
 
 def cycle_without_load(
@@ -394,82 +309,136 @@ def cycle_without_load(
     *,
     periods: int,
     contact: str,
-    cells: int,
-    pressures: bool = False,
+    options: CycleOptions | None = None,
 ) -> MeshCycle:
-    """The defined result without load: nothing touches, nothing is stiff, no pressure has a place."""
-    N, positions = n_planets, len(position)
-    zero, teeth = np.zeros((2 * N, positions)), np.zeros((2 * N, 1, positions))
-    found = {}
-    if pressures:
-        found = {
-            "pressure": np.zeros((2 * N, 1, cells, positions)),
-            "pressure_offset": np.zeros((2 * N, cells)),
-            "pressure_centre": teeth,
-        }
+    """Make the defined result without load: nothing touches, nothing is stiff, no pressure has a place.
+
+    Parameters
+    ----------
+    n_planets : int
+    position : (P,) array
+        [mesh periods].
+    periods, contact
+        As in `MeshCycle`.
+    options : CycleOptions, optional
+        Whether there are pressures, and in how many cells.
+    """
+    options, N, P = options or CycleOptions(), n_planets, len(position)
+    size = {"g": 2, "m": 2 * N, "n": N, "s": 1, "c": options.cells, "t": P}
+    kinds = {"tooth": int, "back_tooth": int, "iterations": int, "edge_contact": bool}
+    values: dict[str, Any] = {
+        name: np.zeros([size[axis] for axis in axes], kinds.get(name, float))
+        for axes, names in _AXES.items()
+        for name in names
+        if not name.startswith("held") and (options.pressures or name not in _PRESSURES)
+    }
+    values["open_planets"] = np.ones((N, P), bool)
     return MeshCycle(
         position=position,
-        deflection=zero,
-        sun_arc=np.zeros(positions),
-        force=zero,
-        back_force=zero,
-        stiffness=zero,
-        tooth_load=teeth,
-        path=teeth,
-        tooth=np.zeros((2, 2 * N, 1), int),
-        back_tooth_load=teeth,
-        back_path=teeth,
-        back_tooth=np.zeros((2, 2 * N, 1), int),
-        bearing_force=np.zeros((N, 2, positions)),
-        max_pressure=zero,
-        edge_contact=np.zeros((2 * N, positions), bool),
-        open_planets=np.ones((N, positions), bool),
-        residual=np.zeros(positions),
-        iterations=np.zeros(positions, int),
-        member_motion=np.zeros((0, positions)),
+        bearing_force=np.zeros((N, 2, P)),
+        member_motion=np.zeros((0, P)),
         member_names=(),
         periods=periods,
         contact=contact,
         unknowns=0,
         message="no torque: no tooth carries load and the mesh stiffness is zero",
-        **found,
+        **values,
     )
 
 
-def _enlarged(enlarge: float, share: float, force: float) -> float:
-    """Twice the window width, and twice again until windows sized by `share` hold the largest force."""
-    enlarge *= 2.0
-    while share * enlarge**2 < force / HELD:
-        enlarge *= 2.0
-    return enlarge
+@dataclass(frozen=True)
+class _Walk:
+    """A set under a torque that is not negative, and the record without load at the positions to solve."""
 
+    planetary_set: PlanetarySet
+    bodies: Bodies
+    sun_torque: float
+    deviations: SetDeviations | None
+    members: MovingMembers
+    springs: BearingSprings | None
+    empty: MeshCycle
+    options: CycleOptions
 
-def _walk(
-    planetary_set, bodies, setup: MeshWindows, sun_torque, members, springs, pressures, held_bodies, progress
-) -> tuple[dict, bool, float]:
-    """All positions with one set of windows, as fields of `MeshCycle`.
+    def first_windows(self) -> tuple[float, float]:
+        """Share [N] and nearest [m] of the first windows, as `mesh_windows` takes them."""
+        s, width = self.planetary_set, self.bodies.face_width
+        # without torque what one micrometre of wedging may carry
+        share = self.sun_torque / (s.sun.base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
+        return share, 3.0 * share / (ROUGH_STIFFNESS * width)
 
-    Also whether a contact ran into the end of its window, and the `nearest` that would have held all pairs.
-    """
-    N, P = planetary_set.n_planets, setup.positions
-    load = np.zeros(N + 1 + int(members.free.sum()))
-    load[N] = sun_torque / planetary_set.sun.base_radius
-    out = _empty_record(setup, members, pressures, held_bodies is not None)
-    previous, overflow, missed = None, False, 0.0
-    for p in range(P):
-        problem = assemble_contact(setup, bodies, p, members)
-        start = None if previous is None else _warm_start(problem, *previous)
-        state, active = solve_position(problem, springs, load, start=start)
-        previous = (problem, active)
-        _collect(problem, state, setup, members, out, p)
-        if held_bodies is not None:
-            _collect_held(assemble_contact(setup, held_bodies, p), state, setup, out, p)
-        out["unknowns"] = max(out["unknowns"], len(problem.gap))
-        overflow |= problem.touches_window_end(state.active, setup)
-        missed = max(missed, _penetrated_outsider(setup, p, out["deflection"][:, p]))
-        if progress is not None:
-            progress(p + 1, P)
-    return _finished(planetary_set, setup, springs, out), overflow, missed
+    def attempt(self, share: float, nearest: float) -> tuple[MeshCycle, float, float]:
+        """Solve all positions in windows of one size, see `in_windows`."""
+        options, empty, N = self.options, self.empty, self.planetary_set.n_planets
+        setup = mesh_windows(
+            self.planetary_set,
+            self.bodies,
+            share=share,
+            nearest=nearest,
+            positions=empty.position,
+            contact=empty.contact,
+            cells=options.cells,
+            deviations=self.deviations,
+            both_flanks=options.both_flanks,
+        )
+        if options.planet_gaps is not None:
+            setup = setup.with_planet_gaps(options.planet_gaps)
+        load = np.zeros(N + 1 + int(self.members.free.sum()))
+        load[N] = self.sun_torque / self.planetary_set.sun.base_radius
+        found, previous, overflow, missed, unknowns = [], None, False, 0.0, 0
+        for p in range(len(empty.position)):
+            problem = assemble_contact(setup, self.bodies, p, self.members)
+            start = None if previous is None else _warm_start(problem, *previous)
+            H, gap, G = problem.compliance, problem.gap, problem.G
+            state, active = solve_position(H, gap, G, load, self.springs, start=start)
+            previous = problem, active
+            found.append(_at_position(problem, state, setup, self.members, options.pressures))
+            if options.held_bodies is not None:
+                held = assemble_contact(setup, options.held_bodies, p)
+                found[-1] |= _with_held_bodies(held, state, setup, found[-1]["force"])
+            unknowns = max(unknowns, len(problem.gap))
+            overflow |= problem.touches_window_end(state.active, setup)
+            if empty.contact == "profile":
+                missed = max(missed, setup.missed(p, found[-1]["deflection"]))
+            if options.progress is not None:
+                options.progress(p + 1, len(empty.position))
+        record = self._record(found, setup, unknowns)
+        if overflow:
+            share = enlarged(share, max(record.force.max(), record.back_force.max()))
+        nearest = max(nearest, 1.2 * missed) if missed > nearest or overflow else nearest
+        return record, share, nearest
+
+    def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
+        """The record from what was found at its positions: with places of the tooth pairs, pins, message."""
+        N, cells = setup.n_planets, setup.cells
+        drive, back = slice(0, 2 * N), slice(2 * N, 4 * N)
+        values = {name: np.stack([one[name] for one in found], axis=-1) for name in found[0]}
+        path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
+        values |= {"path": path[drive], "tooth": tooth[:, drive]}
+        looked = self.options.both_flanks
+        values["back_path"] = path[back] if looked else np.zeros_like(path)
+        values["back_tooth"] = tooth[:, back] if looked else np.zeros_like(tooth)
+        if self.options.pressures:
+            values["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]
+            values["pressure_centre"] = np.moveaxis(setup.centre[drive], 2, 1)
+        record = replace(self.empty, **values)
+        unloaded = record.force[:N] + record.back_force[:N] <= 0.0
+        message = "all positions by the active set"
+        if unloaded.any():
+            message += "; some planets lose all load"
+            if self.springs is not None:
+                message += ", their places within the clearance of their bearings are not determined"
+        if record.wedged.any():
+            message += "; some teeth are wedged between both flanks"
+        if (record.back_force[~record.wedged] > 0).any():
+            message += "; some meshes carry on their back flanks alone"
+        return replace(
+            record,
+            bearing_force=pin_forces(self.planetary_set, record.force, record.back_force),
+            open_planets=unloaded,
+            unknowns=unknowns,
+            member_names=self.members.names,
+            message=message,
+        )
 
 
 def _warm_start(problem: ContactProblem, previous: ContactProblem, active) -> np.ndarray:
@@ -478,68 +447,11 @@ def _warm_start(problem: ContactProblem, previous: ContactProblem, active) -> np
     return np.concatenate([problem.warm_start(previous, active[:cells]), active[cells:]])
 
 
-def _empty_record(setup: MeshWindows, members: MovingMembers, pressures: bool, coupling: bool) -> dict:
-    """Arrays that `_collect` fills; those of teeth and cells lead with all meshes, back sides included."""
-    N, P, meshes = setup.n_planets, setup.positions, setup.near.shape[0]
-    out = {name: np.zeros((2 * N, P)) for name in ("deflection", "force", "back_force", "stiffness")}
-    out |= {
-        "max_pressure": np.zeros((meshes, P)),
-        "edge_contact": np.zeros((meshes, P), bool),
-        "tooth_load": np.zeros((meshes, setup.pairs, P)),
-        "member_motion": np.zeros((len(members.names), P)),
-        "sun_arc": np.zeros(P),
-        "residual": np.zeros(P),
-        "iterations": np.zeros(P, int),
-        "member_names": members.names,
-        "unknowns": 0,
-    }
-    if pressures:
-        out["pressure"] = np.zeros((2 * N, setup.pairs, setup.gap.shape[-1], P))
-    if coupling:
-        out |= {"held_stiffness": np.zeros((2 * N, P)), "held_compliance": np.zeros((2 * N, 2 * N, P))}
-    return out
-
-
-def _finished(planetary_set, setup: MeshWindows, springs: BearingSprings | None, out: dict) -> dict:
-    """The record with what follows from it: sides of the teeth apart, pins, messages."""
-    N = setup.n_planets
-    drive, back = slice(0, 2 * N), slice(2 * N, 4 * N)
-    load, path, tooth = out.pop("tooth_load"), np.moveaxis(setup.zeta, 2, 1), np.stack(setup.tooth)
-    for name in ("max_pressure", "edge_contact"):
-        out[name] = out[name][drive]
-    out |= {"tooth_load": load[drive], "path": path[drive], "tooth": tooth[:, drive]}
-    looked = len(load) > 2 * N
-    out |= {
-        "back_tooth_load": load[back] if looked else np.zeros_like(load),
-        "back_path": path[back] if looked else np.zeros_like(path),
-        "back_tooth": tooth[:, back] if looked else np.zeros_like(tooth),
-    }
-    if "pressure" in out:
-        cells = setup.gap.shape[-1]
-        out["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]
-        out["pressure_centre"] = np.moveaxis(setup.centre[drive], 2, 1)
-    out["bearing_force"] = pin_forces(planetary_set, out["force"], out["back_force"])
-    out["open_planets"] = out["force"][:N] + out["back_force"][:N] <= 0.0
-    message = "all positions by the active set"
-    if out["open_planets"].any():
-        message += "; some planets lose all load"
-        message += ", their places within the clearance of their bearings are not determined" * bool(springs)
-    wedged = (out["force"] > 0) & (out["back_force"] > 0)
-    if wedged.any():
-        message += "; some teeth are wedged between both flanks"
-    if (out["back_force"][~wedged] > 0).any():
-        message += "; some meshes carry on their back flanks alone"
-    return out | {"message": message}
-
-
-def _collect(problem: ContactProblem, state, setup: MeshWindows, members: MovingMembers, out, p):
-    """Mesh quantities of one position."""
-    N, meshes = problem.n_planets, setup.near.shape[0]
-    loads = state.loads
-    force = np.bincount(problem.mesh, weights=loads, minlength=meshes)
-    out["force"][:, p] = force[: 2 * N]
-    out["back_force"][: meshes - 2 * N, p] = force[2 * N :]
-    out["sun_arc"][p] = state.motions[N]
+def _at_position(
+    problem: ContactProblem, state: ContactState, setup: MeshWindows, members: MovingMembers, pressures: bool
+) -> dict[str, Any]:
+    """What `MeshCycle` keeps of one position, by the names of its fields, less their last axis."""
+    N, p = problem.n_planets, problem.position
     if not state.residual <= LARGEST_RESIDUAL:
         raise ContactError(
             f"the contact solution at position {p} violates its conditions by {state.residual:.2g}",
@@ -548,61 +460,92 @@ def _collect(problem: ContactProblem, state, setup: MeshWindows, members: Moving
             limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
             remedy="look for stiffnesses, clearances or separations of very different size",
         )
-    out["residual"][p], out["iterations"][p] = state.residual, state.iterations
+    tooth_load = np.zeros((4 * N, setup.near.shape[2]))
+    np.add.at(tooth_load, (problem.mesh, problem.pair), state.loads)
+    force = np.bincount(problem.mesh, weights=state.loads, minlength=4 * N)
     # sprung members yield under the mesh forces, free ones are unknowns of the problem
-    motion = np.zeros(len(members.names))
+    motion, sprung = np.zeros(len(members.names)), ~members.free
     motion[members.free] = state.motions[N + 1 :]
-    sprung = ~members.free
-    motion[sprung] = -(members.approach[:, sprung].T @ force) / members.stiffness[sprung]
-    out["member_motion"][:, p] = motion
-    moved = members.approach[: 2 * N] @ motion
-    out["deflection"][:, p] = rotation_approach(N) @ state.motions[: N + 1] + moved
-    out["stiffness"][:, p] = _tangents(problem, state, setup)
-    np.add.at(out["tooth_load"][:, :, p], (problem.mesh, problem.pair), loads)
+    pulled = members.approach[:, sprung].T @ force[: len(members.approach)]
+    motion[sprung] = -pulled / members.stiffness[sprung]
     at_edge = problem.at_flank_end(state.active, setup)
-    np.logical_or.at(out["edge_contact"][:, p], problem.mesh, at_edge)
-    pressure = _equal_cell_pressure(problem, loads, setup, p)
-    inside = np.ones(pressure.shape[:2], bool)
+    inside = np.ones(setup.near.shape[::2], bool)
     inside[problem.mesh[at_edge], problem.pair[at_edge]] = False
-    out["max_pressure"][:, p] = np.where(inside, pressure.max(axis=2), 0.0).max(axis=1)
-    if "pressure" in out:
-        out["pressure"][..., p] = pressure[: 2 * N]
+    pressure = _equal_cell_pressure(problem, state.loads, setup)
+    found = {
+        "deflection": rotation_approach(N) @ state.motions[: N + 1] + members.approach[: 2 * N] @ motion,
+        "sun_arc": state.motions[N],
+        "force": force[: 2 * N],
+        "back_force": force[2 * N :],
+        "stiffness": _tangents(problem, state, setup),
+        "tooth_load": tooth_load[: 2 * N],
+        "back_tooth_load": tooth_load[2 * N :],
+        "member_motion": motion,
+        "edge_contact": ~inside[: 2 * N].all(axis=1),
+        "max_pressure": np.where(inside, pressure.max(axis=2), 0.0).max(axis=1)[: 2 * N],
+        "residual": state.residual,
+        "iterations": state.iterations,
+    }
+    return found | {"pressure": pressure[: 2 * N]} if pressures else found
 
 
-def _equal_cell_pressure(problem: ContactProblem, loads, setup: MeshWindows, p) -> np.ndarray:
+def _equal_cell_pressure(problem: ContactProblem, loads, setup: MeshWindows) -> np.ndarray:
     """Mean pressures of equal cells, however the windows are divided, (meshes, pairs, cells) [Pa]."""
     carries = np.flatnonzero(loads)
     mesh, pair, cell = problem.mesh[carries], problem.pair[carries], problem.cell[carries]
-    pressure = np.zeros((setup.near.shape[0], setup.pairs, setup.gap.shape[-1]))
-    shares = equal_cells(pressure.shape[2])[setup.layout[mesh, p, pair], :, cell]
+    pressure = np.zeros((setup.near.shape[0], setup.near.shape[2], setup.cells))
+    shares = equal_cells(setup.cells)[setup.layout[mesh, problem.position, pair], :, cell]
     area = setup.cell_area[mesh].mean(axis=(1, 2))
     np.add.at(pressure, (mesh, pair), shares * (loads[carries] / area)[:, None])
     return pressure
 
 
-def _tangents(problem: ContactProblem, state, setup: MeshWindows) -> np.ndarray:
+def _tangents(problem: ContactProblem, state: ContactState, setup: MeshWindows) -> np.ndarray:
     """Tangent stiffness of every mesh (2N,), both flanks together [N/m]."""
-    window = problem.mesh * setup.pairs + problem.pair
-    meshes = setup.near.shape[0]
+    meshes, _, pairs = setup.near.shape
+    window = problem.mesh * pairs + problem.pair
     found = tangent_stiffness(problem.H, state, problem.mesh, window, problem.cell, meshes)
     return found.reshape(-1, 2 * problem.n_planets).sum(axis=0)
 
 
-def _collect_held(problem: ContactProblem, state, setup: MeshWindows, out, p):
-    """Stiffness and compliance between the meshes of the same contact with other bodies."""
+def _with_held_bodies(problem: ContactProblem, state: ContactState, setup: MeshWindows, force) -> dict:
+    """Stiffness of the meshes and compliance between them in the same contact with held bodies."""
     meshes = 2 * problem.n_planets
-    out["held_stiffness"][:, p] = _tangents(problem, state, setup)
-    if (out["force"][:, p] > 0).all():
+    coupling = np.zeros((meshes, meshes))
+    if (force > 0).all():
         drive = state.active & (problem.mesh < meshes)
-        tangent = mesh_tangent_matrix(problem.H, drive, problem.mesh, meshes)
-        out["held_compliance"][..., p] = np.linalg.inv(tangent)
+        coupling = np.linalg.inv(mesh_tangent_matrix(problem.H, drive, problem.mesh, meshes))
+    return {"held_stiffness": _tangents(problem, state, setup), "held_compliance": coupling}
 
 
-def _penetrated_outsider(setup: MeshWindows, p, deflection) -> float:
-    """Separation from the nearest pair within which no omitted pair penetrates [m]; zero if none does."""
-    gap = setup.smallest_gap[:, p]
-    # a back flank approaches when its drive flank parts
-    deflection = np.concatenate([deflection, -deflection])[: len(gap)]
-    penetrates = ~setup.near[:, p] & (gap < deflection[:, None])
-    relative = deflection - gap.min(axis=1)
-    return float(relative[penetrates.any(axis=1)].max(initial=0.0))
+def _seen_from_front(cycle: MeshCycle, planetary_set: PlanetarySet, order) -> MeshCycle:
+    """Results of the mirror image in the order of planets and positions of the original."""
+    planet, angle = np.argsort(order), planetary_set.planet_angles[0]
+    own = {"m": np.concatenate([planet, planet + len(order)]), "n": planet, "g": np.arange(2)}
+    found = {}
+    for name, axes in ((name, axes) for axes, names in _AXES.items() for name in names):
+        values = getattr(cycle, name)
+        if values is None:
+            continue
+        for number, axis in enumerate(axes):
+            # the pair that comes first along the path leaves first when the rotation is seen from behind
+            place = own[axis] if axis in own else slice(None, None, -1)
+            values = values[(slice(None),) * number + (place,)]
+        found[name] = -values if name in _ODD else values
+    motion = _reflected(cycle.member_motion.reshape(-1, 2, len(cycle.position)), angle)
+    planets = [i for i, name in enumerate(cycle.member_names[::2]) if name.startswith("planet")]
+    if planets:
+        motion[planets] = motion[planets][planet]
+    return replace(
+        cycle,
+        position=0.0 - cycle.position[::-1],
+        bearing_force=_reflected(cycle.bearing_force, angle)[planet][:, :, ::-1],
+        member_motion=motion.reshape(cycle.member_motion.shape)[:, ::-1],
+        **found,
+    )
+
+
+def _reflected(vectors: np.ndarray, angle: float) -> np.ndarray:
+    """Vectors (m, 2, P) reflected in the line at an angle [rad]."""
+    c, s = np.cos(2 * angle), np.sin(2 * angle)
+    return np.einsum("ij,mjp->mip", np.array([[c, s], [s, -c]]), vectors)

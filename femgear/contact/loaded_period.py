@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.cycle import walk_either_flank
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.supports import RIGID, Supports
 
 if TYPE_CHECKING:
-    from femgear.contact.assembly import Bodies
+    from femgear.contact.bodies import Bodies
     from femgear.contact.cycle import MeshCycle
     from femgear.gears.deviations import SetDeviations
     from femgear.gears.planetary import PlanetarySet
@@ -148,7 +148,7 @@ def loaded_period(
     first = -(-positions // parts)
 
     def solved(tau) -> _Record:
-        cycle = walk_either_flank(
+        cycle = walk_mesh_cycle(
             planetary_set,
             bodies,
             sun_torque=sun_torque,
@@ -156,8 +156,7 @@ def loaded_period(
             contact=contact,
             deviations=deviations,
             supports=supports,
-            held_bodies=held_bodies,
-            progress=progress,
+            options=CycleOptions(held_bodies=held_bodies, progress=progress),
         )
         return _record(cycle, planetary_set.base_pitch)
 
@@ -189,8 +188,15 @@ def _record(cycle: MeshCycle, base_pitch: float) -> _Record:
     for p in range(len(cycle.position)):
         mesh, pair = np.nonzero(cycle.tooth_load[..., p] > 0)
         loaded[p] = frozenset(zip(mesh.tolist(), place[mesh, pair, p].tolist(), strict=True))
-    values = (cycle.deflection, cycle.force, cycle.stiffness, cycle.held_stiffness, cycle.held_compliance)
-    return _Record(cycle.position, *values, loaded)
+    return _Record(
+        position=cycle.position,
+        deflection=cycle.deflection,
+        force=cycle.force,
+        stiffness=cycle.stiffness,
+        held_stiffness=np.asarray(cycle.held_stiffness),
+        compliance=np.asarray(cycle.held_compliance),
+        loaded=loaded,
+    )
 
 
 def _unresolved(record: _Record) -> np.ndarray:
@@ -245,8 +251,9 @@ def _whole_period(planetary_set, record: _Record, symmetry: int, parts: int) -> 
         rows.append([getattr(record, name)[mesh][:, shown] for name in names])
         moved = np.concatenate([(np.arange(N) - ahead * (step * part % parts)) % N + s for s in (0, N)])
         mean += compliance[np.ix_(moved, moved)] / parts
-    joined = [np.concatenate(values, axis=1) for values in zip(*rows, strict=True)]
-    return LoadedPeriod(np.concatenate(position), *joined, mean)
+    joined = (np.concatenate(values, axis=1) for values in zip(*rows, strict=True))
+    found = dict(zip(names, joined, strict=True))
+    return LoadedPeriod(position=np.concatenate(position), held_compliance=mean, **found)
 
 
 def _mean_weights(position: np.ndarray, period: float) -> np.ndarray:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import get_lapack_funcs
 
 from femgear.errors import ContactError
 
@@ -23,6 +23,8 @@ PATIENCE = 3  # block steps without progress before single pivots
 ROUNDING = 1e-13  # gaps and loads below this share of their terms are rounding
 _RIGID = 1e-6  # elastic displacements below this share of the gaps are those of rigid bodies
 NULL = 1e-10  # relative eigenvalue below which a motion is not restrained
+
+dpotrf, dtrtrs = get_lapack_funcs(("potrf", "trtrs"), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def factor(H):
     ContactError
         E-CONTACT-COMPLIANCE when the matrix is not positive definite.
     """
-    lower, info = lapack.dpotrf(H, lower=1, clean=0)
+    lower, info = dpotrf(H, lower=1, clean=0)
     if info:
         lowest = np.linalg.eigvalsh(H)[0]
         raise ContactError(
@@ -109,7 +111,7 @@ def factor(H):
 
 def forward(lower, columns):
     """``L^-1 columns`` for a lower factor (n, n) and columns (n,) or (n, k)."""
-    return lapack.dtrtrs(lower, columns, lower=1)[0]
+    return dtrtrs(lower, columns, lower=1)[0]
 
 
 def solve_step(problem: Problem, active: np.ndarray) -> Step:
@@ -180,7 +182,7 @@ def _solve_bordered(problem: Problem, index: np.ndarray):
         offset = forward(lower, gap + H @ touching - G @ motions)
         balance = problem.load - G.T @ touching + half.T @ offset
         change = held @ ((held.T @ balance) / values[~free])
-        touching += lapack.dtrtrs(lower, half @ change - offset, lower=1, trans=1)[0]
+        touching += dtrtrs(lower, half @ change - offset, lower=1, trans=1)[0]
         motions += change
     loads[index] = touching
     return loads, motions, null
@@ -194,8 +196,8 @@ def _residual(problem: Problem, active, loads, gaps) -> float:
     force = max(np.abs(loads).max(initial=0.0), np.abs(problem.load).max(initial=0.0)) or 1.0
     imbalance = np.abs(problem.G.T @ loads - problem.load).max(initial=0.0)
     touching = np.abs(gaps[active]).max(initial=0.0)
-    return float(max(touching / length, -gaps.min(initial=0.0) / length,
-                     -loads.min(initial=0.0) / force, imbalance / force))  # fmt: skip
+    penetration, pull = -gaps.min(initial=0.0), -loads.min(initial=0.0)
+    return float(max(touching / length, penetration / length, pull / force, imbalance / force))
 
 
 def _settle(problem: Problem, null, gaps, active):

@@ -1,21 +1,25 @@
-"""Stress in the tooth roots over the mesh cycle, by superposition of the loads of all tooth pairs.
+"""Stress in the tooth roots over the mesh cycle, and the range of stress that a tooth goes through in a turn.
 
 The finite-element sector of a gear gives once and for all the tangential stress along the root of a tooth
 per unit force at any flank station of any tooth of the body. The loads of the contact solution then add up
 to the stress at every position, loads on neighbouring teeth and on the other flank included.
+
+Every tooth of a planet is bent one way by the sun and the other way by the ring. The stress field of a whole
+body, all its teeth under all its loads, gives both in the right order: a tooth that moves on by one pitch a
+mesh period takes the place of its neighbour, so the field of all places over one mesh period is the history
+of one tooth over one turn. Which place is which is told by the tooth numbers of the cycle, and they carry the
+phase between the mesh with the sun and that with the ring.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.assembly import acting_flanks, mesh_pairs
-from femgear.contact.flanks import (
-    LEFT,
-    RIGHT,
+from femgear.contact.bodies import (
     ObservedRoot,
     flank_load_columns,
     flank_stations,
@@ -23,9 +27,12 @@ from femgear.contact.flanks import (
     station_weights,
     with_cut,
 )
+from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks
+from femgear.contact.tooth_loads import LoadedTeeth, loaded_teeth
+from femgear.fe.compliance import condense_sector, tooth_compliance
+from femgear.fe.elasticity import stiffness
 
 if TYPE_CHECKING:
-    from femgear.contact.bodies import Sectors
     from femgear.contact.cycle import MeshCycle
     from femgear.fe.elasticity import Material
     from femgear.fe.grid import Grid
@@ -33,6 +40,7 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 LOADED, BACK = 0, 1
+"""Root of the loaded flank and of the back flank in `RootCycle.stress`."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +86,25 @@ class RootStresses:
         sun, planets, ring = acting_flanks(n_planets)
         on_planets = [("planet", self.planet, acting) for acting in planets]
         return [("sun", self.sun, sun), *on_planets, ("ring", self.ring, ring)]
+
+
+@dataclass(frozen=True)
+class RootHistory:
+    """One tooth on its way through one mesh.
+
+    Parameters
+    ----------
+    path : (S,) array
+        Path coordinate of its tooth pair in base pitches, 0 at the pitch point.
+    load : (S,) array
+        [N]
+    stress : (S, 2, m) array
+        Along the roots of the loaded and of the back flank [Pa].
+    """
+
+    path: np.ndarray
+    load: np.ndarray
+    stress: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -139,24 +166,59 @@ class RootCycle:
         slot, position = int(slot[k]), int(position[k])
         return slot, position, int(loaded[slot, position].argmax())
 
+    def history(self, start: int | None = None) -> RootHistory:
+        """Follow one tooth from slot to slot through the mesh.
+
+        Parameters
+        ----------
+        start : int, optional
+            Mesh period of the record in which the tooth enters the first slot, by default that of the tooth
+            with the largest stress in the root of its loaded flank; records of one period serve all teeth.
+        """
+        slots, positions = self.path.shape
+        if start is None:
+            worst, at, _ = self.worst
+            start = (at * self.periods // positions - worst) % self.periods
+        each = positions // self.periods
+        slot = np.repeat(np.arange(slots), each)
+        position = (start + slot) % self.periods * each + np.tile(np.arange(each), slots)
+        return RootHistory(self.path[slot, position], self.load[slot, position], self.stress[slot, position])
+
 
 @dataclass(frozen=True)
-class RootHistory:
-    """One tooth on its way through one mesh.
+class RootRange:
+    """Largest and smallest stress in the root of one flank during a turn of its gear against the carrier.
 
     Parameters
     ----------
-    path : (S,) array
-        Path coordinate of its tooth pair in base pitches, 0 at the pitch point.
-    load : (S,) array
-        [N]
-    stress : (S, 2, m) array
-        Along the roots of the loaded and of the back flank [Pa].
+    kind : str
+        ``"sun"``, ``"planet"`` or ``"ring"``.
+    mesh, gear : int
+        The flank is that which gear 1 (0) or gear 2 (1) has in the mesh.
+    point : int
+        Root point with the largest difference of the two stresses.
+    maximum, minimum : float
+        There [Pa].
+    tooth_maximum, tooth_minimum : (z,) arrays
+        The same of every tooth, each at the point where the two differ most [Pa].
+    worst : tuple of int
+        Slot and position of the cycle with the largest stress in this root.
+    history : (z P,) array or None
+        Stress at `point` in the order of time, from a quarter of a turn before the tooth is at the pitch
+        point of this mesh, or in the case of planets of that with the sun [Pa]; None for records of several
+        mesh periods.
     """
 
-    path: np.ndarray
-    load: np.ndarray
-    stress: np.ndarray
+    kind: str
+    mesh: int
+    gear: int
+    point: int
+    maximum: float
+    minimum: float
+    tooth_maximum: np.ndarray
+    tooth_minimum: np.ndarray
+    worst: tuple[int, int]
+    history: np.ndarray | None
 
 
 def root_stress(
@@ -168,7 +230,7 @@ def root_stress(
     support=None,
     state: str = "plane strain",
 ) -> RootStress:
-    """Root stress influence of a whole gear from the grid of one sector.
+    """Compute the root stress influence of a whole gear from the grid of one sector.
 
     The whole sector has one plane state: the stresses of a plane body under given forces do not depend on
     its elastic constants (Michell's theorem; Timoshenko and Goodier, "Theory of Elasticity", 3rd ed.,
@@ -193,9 +255,6 @@ def root_stress(
     GridError
         When the body can move freely or the root is not one chain of edges.
     """
-    from femgear.fe.compliance import condense_sector
-    from femgear.fe.elasticity import stiffness
-
     along = root_functionals(grid, gear, material, state=state)
     matrix = stiffness(grid, material, state=state, thickness=gear.face_width)
     stations = flank_stations(grid, gear)
@@ -211,16 +270,14 @@ def root_stress(
 
 
 def observed_root_stress(gear: Gear, root: ObservedRoot) -> RootStress:
-    """Root stress influence of a whole gear from what was observed with its flank compliance.
+    """Compute the root stress influence of a whole gear from what was observed with its flank compliance.
 
     Parameters
     ----------
     gear : Gear
     root : ObservedRoot
-        Of one sector of that gear, `flanks.flank_compliance` with ``root_state``.
+        Of one sector of that gear, `bodies.flank_compliance` with ``root_state``.
     """
-    from femgear.fe.compliance import tooth_compliance
-
     along, stations = root.along, root.stations
     order = slice(None, None, -1 if gear.internal else 1)
     m, n = len(along.arc), len(stations.roll)
@@ -238,17 +295,10 @@ def observed_root_stress(gear: Gear, root: ObservedRoot) -> RootStress:
     )
 
 
-def set_root_stress(sectors: Sectors, material: Material) -> RootStresses:
-    """Influences of sun, planet and ring, each held at its rim as in `bodies.make_bodies`."""
-    return RootStresses(
-        *(root_stress(s.grid, s.gear, material) for s in (sectors.sun, sectors.planet, sectors.ring))
-    )
-
-
 def root_stress_cycle(
     planetary_set: PlanetarySet, roots: RootStresses, cycle: MeshCycle, *, reverse: bool = False
 ) -> tuple[RootCycle, ...]:
-    """Root stress of both gears of every mesh at every position of the cycle.
+    """Compute the root stress of both gears of every mesh at every position of the cycle.
 
     Parameters
     ----------
@@ -257,8 +307,8 @@ def root_stress_cycle(
     cycle : MeshCycle
         Of that set. The load of a tooth pair acts at its point on the line of action.
     reverse : bool
-        Whether the cycle is that of a negative torque on the sun, `cycle.walk_either_flank`; the stress
-        field is then the mirror image of that on the other flanks.
+        Whether the cycle is that of a negative torque on the sun; the stress field is then the mirror image
+        of that on the other flanks.
 
     Returns
     -------
@@ -267,81 +317,93 @@ def root_stress_cycle(
         of the same teeth and add to both roots.
     """
     N = planetary_set.n_planets
+    teeth = loaded_teeth(cycle, reverse=reverse)
+    samples = np.arange(len(cycle.position))
     found = {}
     for kind, root, acting in roots.of_bodies(N):
-        loads = _tooth_loads(planetary_set, root, cycle, acting, reverse)
-        for target in acting:
-            found[target[:2]] = _one_mesh(planetary_set, kind, root, cycle, target, loads, reverse)
+        slots = [_slots(cycle.tooth[gear, mesh], kind) for mesh, gear, _ in acting]
+        # seen from behind the teeth are counted the other way round
+        numbers = np.concatenate(slots) * (-1 if reverse else 1)
+        field = body_stress(planetary_set, root, acting, teeth, samples, numbers)
+        for target, stress in zip(acting, np.split(field, len(acting)), strict=True):
+            found[target[:2]] = _root_cycle(planetary_set, kind, root, cycle, target, stress)
     return tuple(found[mesh, gear] for mesh in range(2 * N) for gear in (0, 1))
 
 
-def tooth_history(root: RootCycle, *, start: int = 0) -> RootHistory:
-    """Follow one tooth from slot to slot through the mesh.
+def root_ranges(
+    planetary_set: PlanetarySet, roots: RootStresses, teeth: LoadedTeeth, *, closes: bool = True
+) -> tuple[RootRange, ...]:
+    """Find the stress range in the root of every loaded flank, from the field of whole bodies.
 
     Parameters
     ----------
-    root : RootCycle
-    start : int
-        Mesh period of the record in which the tooth enters the first slot; records of one period serve all
-        teeth.
+    planetary_set : PlanetarySet
+    roots : RootStresses
+    teeth : LoadedTeeth
+    closes : bool
+        Whether the record repeats after its end: every tooth then meets every state that tooth numbers and
+        periods without a common divisor allow. Otherwise each tooth has what the record shows of it.
+
+    Returns
+    -------
+    tuple of RootRange
+        Gear 1 and gear 2 of mesh 0, then of mesh 1, and so on.
     """
-    slots, positions = root.path.shape
-    each = positions // root.periods
-    slot = np.repeat(np.arange(slots), each)
-    position = (start + slot) % root.periods * each + np.tile(np.arange(each), slots)
-    return RootHistory(root.path[slot, position], root.load[slot, position], root.stress[slot, position])
+    N = planetary_set.n_planets
+    found = {}
+    for kind, root, acting in roots.of_bodies(N):
+        for one in _body_ranges(planetary_set, kind, root, acting, teeth, closes):
+            found[one.mesh, one.gear] = one
+    return tuple(found[mesh, gear] for mesh in range(2 * N) for gear in (0, 1))
 
 
-def worst_history(root: RootCycle) -> RootHistory:
-    """History of the tooth with the largest stress in the root of its loaded flank."""
-    slot, position, _ = root.worst
-    period = position * root.periods // root.path.shape[1]
-    return tooth_history(root, start=(period - slot) % root.periods)
+def body_stress(
+    planetary_set: PlanetarySet, root: RootStress, acting, teeth: LoadedTeeth, samples, numbers
+) -> np.ndarray:
+    """Superpose the root stress of some teeth of one body at some positions.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    root : RootStress
+    acting : list of (mesh, gear, side)
+        The drive flanks of the body; the other flanks in the same meshes are its back flanks.
+    teeth : LoadedTeeth
+    samples : (p,) int array
+        Positions of the record.
+    numbers : (t,) int array
+        Teeth, by their numbers in the first mesh period.
+
+    Returns
+    -------
+    (t, 2 m, p) array
+        [Pa]; left root first.
+    """
+    z, n = len(root.influence), len(root.roll)
+    total = np.zeros((len(numbers), root.influence.shape[1], len(samples)))
+    for one in teeth.on_body(planetary_set, acting):
+        if one.load[samples].any():
+            forces = _station_forces(one.roll[samples], one.load[samples], root.roll)
+            flank = slice(one.flank * n, (one.flank + 1) * n)
+            columns = root.influence[(numbers - one.tooth) % z, :, flank].reshape(-1, n)
+            total += (columns @ forces).reshape(total.shape)
+    return total
 
 
-def station_forces(roll, load, stations) -> np.ndarray:
-    """Forces at the flank stations (T, n, P) [N] under loads (T, P) of teeth at roll lengths (T, P)."""
+def _station_forces(roll, load, stations) -> np.ndarray:
+    """Forces at the flank stations (n, p) [N] under the loads (p,) of a tooth at roll lengths (p,)."""
     index, weight = station_weights(roll, stations)
-    forces = np.zeros((len(roll), len(stations), roll.shape[1]))
-    t, p = np.indices(roll.shape)
-    np.add.at(forces, (t[..., None], index, p[..., None]), weight * load[..., None])
+    forces = np.zeros((len(stations), len(roll)))
+    np.add.at(forces, (index, np.arange(len(roll))[:, None]), weight * load[:, None])
     return forces
 
 
-def _tooth_loads(planetary_set, root: RootStress, cycle, acting, reverse) -> list:
-    """Loaded teeth of one body, each with its forces at the stations of both flanks (2 n, P) [N].
-
-    `acting` lists (mesh, gear of the pair, drive flank) of its meshes; back flanks are the opposite ones.
-    """
-    sides = [(cycle.tooth, cycle.path, cycle.tooth_load, False)]
-    if cycle.back_tooth_load.any():
-        sides.append((cycle.back_tooth, cycle.back_path, cycle.back_tooth_load, True))
-    loaded = []
-    for tooth, path, load, back in sides:
-        for mesh, gear, drive in acting:
-            flank = drive if not back else RIGHT if drive == LEFT else LEFT
-            pair = mesh_pairs(planetary_set)[int(mesh >= planetary_set.n_planets)]
-            roll = pair.roll_on(gear, -path[mesh] if reverse else path[mesh])
-            n, one_flank = len(root.roll), station_forces(roll, load[mesh], root.roll)
-            forces = np.zeros((len(roll), 2 * n, roll.shape[1]))
-            forces[:, flank * n : (flank + 1) * n] = one_flank
-            loaded += [one for one in zip(tooth[gear, mesh], forces, strict=True) if one[1].any()]
-    return loaded
-
-
-def _one_mesh(planetary_set, kind, root: RootStress, cycle, target, loads, reverse) -> RootCycle:
-    """Stress on the teeth of one mesh (mesh, gear, side) under the loads of all teeth of the body."""
+def _root_cycle(planetary_set, kind, root: RootStress, cycle: MeshCycle, target, stress) -> RootCycle:
+    """Root cycle of one mesh (mesh, gear, side) from the stress (T, 2 m, P) of the teeth in its slots."""
     mesh, gear, side = target
-    count = len(root.influence)
-    teeth = _slots(cycle.tooth[gear, mesh], kind)
-    # seen from behind the teeth are counted the other way round
-    sense = -1 if reverse else 1
-    total = np.zeros((len(teeth), root.influence.shape[1], len(cycle.position)))
-    for tooth, force in loads:
-        total += root.influence[sense * (teeth - tooth) % count] @ force
-    stress = total.reshape(len(teeth), 2, -1, len(cycle.position)).transpose(0, 3, 1, 2)
+    stress = stress.reshape(len(stress), 2, -1, len(cycle.position)).transpose(0, 3, 1, 2)
     path = cycle.path[mesh] / planetary_set.sun.base_pitch
-    load = np.zeros((len(teeth), len(cycle.position)))
+    load = np.zeros(stress.shape[:2])
     load[1:-1] = cycle.tooth_load[mesh]
     return RootCycle(
         kind=kind,
@@ -361,3 +423,77 @@ def _slots(teeth, kind) -> np.ndarray:
     # the sun's teeth come one after another, those of planets and ring the other way round
     step = 1 if kind == "sun" else -1
     return np.concatenate([teeth[:1] - step, teeth, teeth[-1:] + step])
+
+
+def _body_ranges(planetary_set, kind, root: RootStress, acting, teeth: LoadedTeeth, closes):
+    """Ranges of the roots of the acting flanks of one body."""
+    z, m = len(root.influence), len(root.arc)
+    # with every period the sun's teeth go on to the next higher place, those of planets and ring back
+    step = 1 if kind == "sun" else -1
+    alike = math.gcd(z, teeth.periods) if closes else z
+    high, low = np.full((alike, 2 * m), -np.inf), np.full((alike, 2 * m), np.inf)
+    worst = {}
+    one = closes and teeth.periods == 1
+    for samples in [_one_turn(teeth)] if one else _by_turn(teeth):
+        field = body_stress(planetary_set, root, acting, teeth, samples, np.arange(z))
+        of_tooth = (np.arange(z) - step * teeth.turn[samples[0]]) % alike
+        np.maximum.at(high, of_tooth, field.max(axis=-1))
+        np.minimum.at(low, of_tooth, field.min(axis=-1))
+        for target in acting:
+            found = _largest_tension(field, teeth, target, m, samples)
+            worst[target] = max(worst.get(target, found), found)
+    for target in acting:
+        rows = slice(target[2] * m, (target[2] + 1) * m)
+        top, bottom = high[:, rows], low[:, rows]
+        widest = (top - bottom).argmax(axis=1)
+        own = np.arange(alike), widest
+        tooth = int((top - bottom)[own].argmax())
+        point = int(widest[tooth])
+        # seen from behind the teeth are counted the other way round
+        number = (-1 if teeth.reverse else 1) * np.arange(z) % alike
+        start = acting[0] if kind == "planet" else target
+        yield RootRange(
+            kind=kind,
+            mesh=target[0],
+            gear=target[1],
+            point=point,
+            maximum=float(top[tooth, point]),
+            minimum=float(bottom[tooth, point]),
+            tooth_maximum=top[own][number],
+            tooth_minimum=bottom[own][number],
+            worst=worst[target][1:],
+            history=_history(field[:, rows][:, point], teeth, start[:2], step) if one else None,
+        )
+
+
+def _by_turn(teeth: LoadedTeeth):
+    """Positions of the record, one array a mesh period."""
+    return (np.flatnonzero(teeth.turn == turn) for turn in np.unique(teeth.turn))
+
+
+def _one_turn(teeth: LoadedTeeth) -> np.ndarray:
+    """Positions of a record of one period in the order of the turning seen in `teeth`."""
+    return np.arange(teeth.each)[:: -1 if teeth.reverse else 1]
+
+
+def _largest_tension(field, teeth: LoadedTeeth, target, m, samples) -> tuple[float, int, int]:
+    """Largest stress in the loaded roots of the teeth in one mesh, its slot and its position."""
+    mesh, gear, side = target
+    loaded = field[teeth.tooth[gear, mesh] % len(field), side * m : (side + 1) * m].max(axis=1)
+    slot, sample = np.unravel_index(loaded.argmax(), loaded.shape)
+    slot_of_cycle = len(loaded) - 1 - slot if teeth.reverse else slot
+    return float(loaded[slot, sample]), int(slot_of_cycle), int(samples[sample])
+
+
+def _history(places: np.ndarray, teeth: LoadedTeeth, start, step: int) -> np.ndarray:
+    """Stress of one tooth over a turn from that at all places (z, P), the pitch point after a quarter."""
+    mesh, gear = start
+    z, positions = places.shape
+    path = teeth.path[mesh, :, _one_turn(teeth)[0]]
+    slot = int(np.abs(path).argmin())
+    turn = places[(teeth.tooth[gear, mesh, slot] + step * np.arange(z)) % z].ravel()
+    if len(path) > 1:
+        turn = np.roll(turn, round(path[slot] / (path[1] - path[0]) * positions))
+    if teeth.reverse:
+        turn = np.roll(turn[::-1], 1)  # the first sample stays the first
+    return np.roll(turn, len(turn) // 4)

@@ -1,21 +1,40 @@
-"""Members that move: springs and free motions of sun, carrier, planets and ring in the static problem.
+"""Members that move: springs, free motions and bearing clearances of sun, carrier, planets and ring.
 
 A motion ``u`` of a member's axis changes the approach of the flanks at mesh ``j`` by ``B_j u``. A support of
 stiffness ``k`` carries ``B^T F = -k u`` (F the mesh forces), so its elasticity is the mesh compliance
 ``B k^-1 B^T``, one more term of H; a free motion is one more column of G with the equilibrium ``B^T F = 0``.
+
+A planet bearing with radial clearance ``g`` is a ring of one-sided springs. A planet that moves by ``u``
+against its pin closes the clearance in the direction ``e`` where ``e u = g``. With n springs around the pin,
+``w = g + p / k_s - e u >= 0, p >= 0, p w = 0`` is the condition of any other contact: gap ``g``, compliance
+``1 / k_s`` on the diagonal, arms ``e`` on the two free motions of the planet. ``k_s = 4 k / n`` gives a ring
+without clearance the stiffness ``k``, because half its springs carry and ``sum e e^T = n/4``. Many springs
+tend to a Winkler foundation around the pin.
+Planetary sets with clearance in their bearings: Guo, Keller and Parker, "Dynamic analysis of wind turbine
+planetary gears using an extended harmonic balance approach", NREL/CP-5000-55355, 2012.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.contact.solve import ContactState, solve_contact
 from femgear.errors import ContactError
+from femgear.gears.kinematics import mesh_normals, unheld_members
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
+
+SPRINGS = 120
+"""One-sided springs of a planet bearing with clearance: even, so that they are their own mirror image.
+
+The force then differs by less than 0.1 % from that of the continuous bearing where the planet moves by 1.1
+clearances or more, 0.4 % at 1.05 clearances. Under lighter loads the pin rests in a corner of the polygon:
+its place is never off by more than ``(pi/n)^2/2`` clearances, 0.04 % of them.
+"""
 
 
 @dataclass(frozen=True)
@@ -29,12 +48,7 @@ class Supports:
     planet : float, optional
         Bearing between each planet and its pin on the carrier; a planet cannot float.
     planet_clearance : float
-        Radial clearance of these bearings [m]; see `femgear.contact.bearings`.
-    planet_springs : int
-        Springs that then stand for a bearing. With 120 the force differs by less than 0.1 % from that of
-        the continuous bearing where the planet moves by 1.1 clearances or more, 0.4 % at 1.05 clearances.
-        Under lighter loads the pin rests in a corner of the polygon: its place is never off by more than
-        ``(pi/n)^2/2`` clearances, 0.04 % of them.
+        Radial clearance of these bearings [m]; see `BearingSprings`.
     """
 
     sun: float | None = None
@@ -42,7 +56,6 @@ class Supports:
     planet: float | None = None
     ring: float | None = None
     planet_clearance: float = 0.0
-    planet_springs: int = 120
 
     def __post_init__(self):
         for name in ("sun", "carrier", "planet", "ring"):
@@ -55,10 +68,7 @@ class Supports:
                 )
         if self.planet == 0.0:
             raise ContactError("a planet without bearing has no place", code="E-SUPPORT", limit="above 0 N/m")
-        self._check_clearance()
-
-    def _check_clearance(self):
-        clearance, springs = self.planet_clearance, self.planet_springs
+        clearance = self.planet_clearance
         if not (clearance >= 0 and np.isfinite(clearance)):
             raise ContactError(
                 f"the planet bearings have a radial clearance of {clearance} m",
@@ -73,14 +83,6 @@ class Supports:
                 value=clearance,
                 limit="a stiffness of the planet bearings above 0 N/m where they have clearance",
                 remedy="give Supports.planet, or no clearance",
-            )
-        # even numbers are their own mirror image; four springs are the fewest with one stiffness all round
-        if springs < 4 or springs % 2:
-            raise ContactError(
-                f"{springs} springs in a planet bearing",
-                code="E-SUPPORT",
-                value=springs,
-                limit="an even number, 4 or more",
             )
 
 
@@ -117,29 +119,36 @@ class MovingMembers:
         return (sprung / self.stiffness[~self.free]) @ sprung.T
 
 
-def force_directions(planetary_set: PlanetarySet, *, back: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Unit forces on the planets (from the sun) and on the ring (from the planets), each of shape (N, 2).
+@dataclass(frozen=True)
+class BearingSprings:
+    """One-sided springs of all planet bearings.
 
-    For the flanks that a positive torque on the sun loads, or the back flanks, in the frame of the carrier.
+    Parameters
+    ----------
+    clearance : float
+        Radial [m].
+    compliance : float
+        Of one spring [m/N].
+    arms : (N n, m) array
+        Approach of planet and pin at each of the n springs around every pin per unit free motion, in the
+        order of `MovingMembers.names` without sprung motions.
     """
-    from femgear.gears.kinematics import mesh_normals
 
-    normals = mesh_normals(planetary_set, back=back)
-    return normals[: planetary_set.n_planets], normals[planetary_set.n_planets :]
+    clearance: float
+    compliance: float
+    arms: np.ndarray
 
 
 def moving_members(
     planetary_set: PlanetarySet, supports: Supports, *, both_flanks: bool = False
 ) -> MovingMembers:
-    """The motions that the supports allow, each with its effect on every mesh.
+    """List the motions that the supports allow, each with its effect on the approach of every mesh.
 
     Raises
     ------
     ContactError
         E-MECHANISM: members float that the planets cannot hold.
     """
-    from femgear.gears.kinematics import unheld_members
-
     floating = [name for name in ("sun", "carrier", "ring") if getattr(supports, name) == 0.0]
     loose = unheld_members(planetary_set, floating, both_flanks=both_flanks)
     if loose:
@@ -152,32 +161,143 @@ def moving_members(
             remedy=f"give Supports.{loose[-1]} a stiffness [N/m], or None for a rigid support",
         )
     sides = [_one_side(planetary_set, supports, back) for back in (False, True)[: 1 + both_flanks]]
-    names, _, stiffness = sides[0]
-    return MovingMembers(names, np.vstack([approach for _, approach, _ in sides]), stiffness)
+    return replace(sides[0], approach=np.vstack([side.approach for side in sides]))
 
 
-def _one_side(planetary_set, supports, back):
-    """Names, approach (2N, m) and stiffness of the motions for one side of the teeth."""
+def bearing_springs(
+    planetary_set: PlanetarySet, supports: Supports, members: MovingMembers
+) -> BearingSprings | None:
+    """Springs of all planet bearings, or None for bearings without clearance.
+
+    The first spring of a planet points away from the centre of the set, so that turned and mirrored sets
+    have turned and mirrored springs.
+    """
+    if supports.planet is None or not supports.planet_clearance:
+        return None
+    N, n = planetary_set.n_planets, SPRINGS
+    names = [name for name, free in zip(members.names, members.free, strict=True) if free]
+    angle = np.asarray(planetary_set.planet_angles)[:, None] + 2 * np.pi * np.arange(n) / n
+    arms = np.zeros((N, n, len(names)))
+    for planet in range(N):
+        column = names.index(f"planet {planet + 1}: x")
+        arms[planet, :, column], arms[planet, :, column + 1] = np.cos(angle[planet]), np.sin(angle[planet])
+    compliance = n / (4.0 * supports.planet)
+    return BearingSprings(supports.planet_clearance, compliance, arms.reshape(N * n, -1))
+
+
+def solve_position(
+    H, gap, G, load, springs: BearingSprings | None = None, *, start=None
+) -> tuple[ContactState, np.ndarray]:
+    """Solve the contact of all meshes and bearings at one position.
+
+    Parameters
+    ----------
+    H, gap, G
+        Compliance (n, n) [m/N], separations (n,) [m] and approach (n, m) of the pressure cells, as for
+        `solve_contact`.
+    load : (m,) array
+        External load on the motions [N].
+    springs : BearingSprings, optional
+        Of the bearings; their motions are the last columns of ``G``.
+    start : bool array, optional
+        Candidates thought to touch: cells, then springs.
+
+    Returns
+    -------
+    state : ContactState
+        Of the pressure cells alone, with all motions.
+    active : bool array
+        Cells and springs that carry load, the ``start`` of the next position.
+
+    Raises
+    ------
+    ContactError
+        As `solve_contact`.
+    """
+    if springs is None:
+        state = solve_contact(H, gap, G, load, start=start)
+        return state, state.active
+    cells = len(gap)
+    near = np.ones(len(springs.arms), bool) if start is None else _beside(start[cells:])
+    while True:
+        guess = None if start is None else np.concatenate([start[:cells], start[cells:][near]])
+        state = solve_contact(*_with_springs(H, gap, G, springs, near), load, start=guess)
+        moved = springs.arms @ state.motions[-springs.arms.shape[1] :]
+        # those left out must be open; where one is not, all are asked
+        if near.all() or (moved[~near] <= springs.clearance).all():
+            break
+        near = np.ones(len(near), bool)
+    active = np.concatenate([state.active[:cells], np.zeros(len(near), bool)])
+    active[cells:][near] = state.active[cells:]
+    meshes = {name: getattr(state, name)[:cells] for name in ("loads", "gaps", "active")}
+    return replace(state, **meshes), active
+
+
+def pin_forces(planetary_set: PlanetarySet, force, back_force) -> np.ndarray:
+    """Compute the force of every pin on its planet [N], shape (N, 2, P), in the frame of the carrier.
+
+    What balances the mesh forces on the planet, whatever holds it: ``-(n_sp F_sp - n_pr F_pr)`` with the
+    normals of `femgear.gears.deviations.mesh_normals` on either side of the teeth.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    force, back_force : (2N, P) arrays
+        On drive and back flanks [N].
+    """
     N = planetary_set.n_planets
-    on_planet, on_ring = force_directions(planetary_set, back=back)
+    result = np.zeros((N, 2, np.shape(force)[1]))
+    for back, carried in ((False, force), (True, back_force)):
+        along = mesh_normals(planetary_set, back=back)[:, :, None] * np.asarray(carried)[:, None, :]
+        result += along[N:] - along[:N]
+    return result
+
+
+def _one_side(planetary_set: PlanetarySet, supports: Supports, back: bool) -> MovingMembers:
+    """Motions and their approach (2N, m) on one side of the teeth."""
+    N = planetary_set.n_planets
+    # forces of the sun on the planets, and of the planets on the ring
+    on_planet, on_ring = np.split(mesh_normals(planetary_set, back=back), 2)
     zero = np.zeros((N, 2))
-    names, columns, stiffness = [], [], []
-    for member, value, effect in (
+    moved = [
         ("sun", supports.sun, np.vstack([on_planet, zero])),
         ("carrier", supports.carrier, np.vstack([-on_planet, on_ring])),
         ("ring", supports.ring, np.vstack([zero, -on_ring])),
-    ):
-        if value is not None:
-            names += [f"{member}: x", f"{member}: y"]
-            columns.append(effect)
-            stiffness += [value, value]
-    if supports.planet is not None:
-        for n in range(N):
-            effect = np.zeros((2 * N, 2))
-            effect[n], effect[N + n] = -on_planet[n], on_ring[n]
-            names += [f"planet {n + 1}: x", f"planet {n + 1}: y"]
-            columns.append(effect)
-            # with clearance the springs of the bearing are candidates of the contact problem instead
-            stiffness += [0.0 if supports.planet_clearance else supports.planet] * 2
-    approach = np.hstack(columns) if columns else np.zeros((2 * N, 0))
-    return tuple(names), approach, np.array(stiffness, float)
+    ]
+    # with clearance the springs of the bearing are candidates of the contact problem instead
+    bearing = 0.0 if supports.planet_clearance else supports.planet
+    for n in range(N if supports.planet is not None else 0):
+        own = np.arange(N)[:, None] == n
+        moved.append(
+            (
+                f"planet {n + 1}",
+                bearing,
+                np.vstack([np.where(own, -on_planet, 0.0), np.where(own, on_ring, 0.0)]),
+            )
+        )
+    found = [(name, value, effect) for name, value, effect in moved if value is not None]
+    return MovingMembers(
+        names=tuple(f"{name}: {axis}" for name, _, _ in found for axis in "xy"),
+        approach=np.hstack([np.zeros((2 * N, 0)), *(effect for _, _, effect in found)]),
+        stiffness=np.array([value for _, value, _ in found for _ in "xy"], float),
+    )
+
+
+def _beside(active: np.ndarray) -> np.ndarray:
+    """Springs that carried and three on either side of them, around every pin."""
+    around = active.reshape(-1, SPRINGS)
+    return np.logical_or.reduce([np.roll(around, k, axis=1) for k in range(-3, 4)]).ravel()
+
+
+def _with_springs(H, gap, G, springs: BearingSprings, near: np.ndarray):
+    """Compliance, gaps and arms of the cells and then of the springs `near`."""
+    cells, arms = len(gap), springs.arms[near]
+    whole = np.zeros((cells + len(arms), cells + len(arms)))
+    whole[:cells, :cells] = H
+    whole[range(cells, len(whole)), range(cells, len(whole))] = springs.compliance
+    others = np.zeros((len(arms), G.shape[1] - arms.shape[1]))
+    return (
+        whole,
+        np.append(gap, np.full(len(arms), springs.clearance)),
+        np.vstack([G, np.hstack([others, arms])]),
+    )

@@ -10,11 +10,8 @@ from femgear.housing.orders import (
     band_pass,
     count_lobes,
     dominant_lines,
-    envelope,
-    line_sources,
     order_level,
     order_spectrum,
-    symmetry_leakage,
 )
 from femgear.housing.sensor import (
     HousingSignal,
@@ -22,12 +19,7 @@ from femgear.housing.sensor import (
     fixed_sensor_lines,
     fixed_sensor_signal,
     hanning_model,
-    heaviside_linear,
     heaviside_linear_lines,
-    passages,
-    phased_harmonics,
-    point_signals,
-    unresolved_share,
 )
 
 __all__ = [
@@ -42,18 +34,10 @@ __all__ = [
     "band_pass",
     "count_lobes",
     "dominant_lines",
-    "envelope",
     "fixed_sensor_lines",
     "fixed_sensor_signal",
     "hanning_model",
-    "heaviside_linear",
     "heaviside_linear_lines",
-    "line_sources",
     "order_level",
     "order_spectrum",
-    "passages",
-    "phased_harmonics",
-    "point_signals",
-    "symmetry_leakage",
-    "unresolved_share",
 ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.housing.sensor import check_teeth, read_only
+from femgear.housing.sensor import SensorLines, check_teeth, read_only
 
 
 @dataclass(frozen=True)
@@ -36,16 +36,10 @@ class OrderSpectrum:
         """Absolute values, shape (..., n_orders)."""
         return np.abs(self.value)
 
-    @property
-    def mean_square(self) -> np.ndarray:
-        """Mean square of the signal (Parseval), shape (...)."""
-        power = np.abs(self.value) ** 2
-        return power[..., 0] + power[..., 1:].sum(axis=-1) / 2
-
 
 @dataclass(frozen=True)
 class Line:
-    """One line: carrier order, amplitude in the unit of the spectrum, level [dB] below the strongest."""
+    """One line: carrier order, amplitude in the unit of the spectrum, level [dB] over the strongest."""
 
     order: float
     amplitude: float
@@ -82,7 +76,21 @@ class Lobes:
 
 @dataclass(frozen=True)
 class BandAnalysis:
-    """What is heard around one mesh harmonic at one speed: orders low..high, lines, envelope, lobes."""
+    """What is heard around one mesh harmonic at one speed.
+
+    Parameters
+    ----------
+    harmonic : int
+        Mesh harmonic, 1 upwards.
+    low, high : int
+        Carrier orders of the band, both included.
+    lines : tuple of Line
+        Strongest lines of the band, strongest first.
+    signal, envelope : (n_samples,) arrays
+        Band-passed signal and its envelope over the record, in the unit of the spectrum.
+    lobes : Lobes
+        Of the envelope.
+    """
 
     harmonic: int
     low: int
@@ -97,7 +105,7 @@ class BandAnalysis:
 
 
 def order_spectrum(signal, *, revolutions: int = 1) -> OrderSpectrum:
-    """Order spectrum of a signal that spans whole carrier revolutions (no window, no leakage).
+    """Compute the order spectrum of a signal that spans whole carrier revolutions (no window, no leakage).
 
     Parameters
     ----------
@@ -131,13 +139,25 @@ def order_spectrum(signal, *, revolutions: int = 1) -> OrderSpectrum:
     return OrderSpectrum(np.arange(value.shape[-1]) / revolutions, value, int(revolutions))
 
 
-def order_level(lines) -> np.ndarray:
-    """Root mean square of the acceleration of a fixed sensor [m/s^2], shape (...), from its `SensorLines`."""
+def order_level(lines: SensorLines) -> np.ndarray:
+    """Compute the root mean square acceleration of a fixed sensor [m/s^2], shape (...), without its mean."""
     return np.sqrt(0.5 * (np.abs(lines.acceleration[..., 1:]) ** 2).sum(axis=-1))
 
 
 def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum:
-    """Spectrum with the orders low..high (both included) alone; a brick wall, exact for periodic signals.
+    """Take the carrier orders low..high out of a spectrum: a brick wall, exact for periodic signals.
+
+    Parameters
+    ----------
+    spectrum : OrderSpectrum
+        Values of shape (..., n_orders).
+    low, high : float
+        Carrier orders, both included.
+
+    Returns
+    -------
+    OrderSpectrum
+        Of the same shape, zero outside the band.
 
     Raises
     ------
@@ -157,7 +177,7 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
 
 
 def analytic_signal(spectrum: OrderSpectrum, *, samples: int | None = None) -> np.ndarray:
-    """Analytic signal sum_k value[k] exp(i order[k] theta); real part the signal, modulus the envelope.
+    """Compute the analytic signal sum_k value[k] exp(i order[k] theta); its modulus is the envelope.
 
     Parameters
     ----------
@@ -175,26 +195,21 @@ def analytic_signal(spectrum: OrderSpectrum, *, samples: int | None = None) -> n
         ``E-SAMPLES`` for too few samples.
     """
     lines = spectrum.value.shape[-1]
-    samples = 4 * lines if samples is None else samples
-    if samples < 2 * lines - 1:
+    count = 4 * lines if samples is None else samples
+    if count < 2 * lines - 1:
         raise CaseError(
-            f"{samples} samples cannot carry {lines} lines",
+            f"{count} samples cannot carry {lines} lines",
             code="E-SAMPLES",
             key="samples",
-            value=samples,
+            value=count,
             limit=f"at least {2 * lines - 1}",
             remedy="ask for more samples",
         )
-    return np.fft.ifft(spectrum.value, samples, axis=-1) * samples
-
-
-def envelope(spectrum: OrderSpectrum, *, samples: int | None = None) -> np.ndarray:
-    """Envelope of a (band-passed) spectrum over its record: modulus of the analytic signal, (..., n)."""
-    return np.abs(analytic_signal(spectrum, samples=samples))
+    return np.fft.ifft(spectrum.value, count, axis=-1) * count
 
 
 def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int = 1) -> Lobes:
-    """Maxima of a periodic envelope that stand out by at least `threshold` times its largest value.
+    """Count the maxima of a periodic envelope that stand out by at least `threshold` times its largest value.
 
     The record is turned until it begins and ends at its lowest value, so that its seam is no edge
     and the prominences are those of the endless signal.
@@ -244,7 +259,7 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int =
 def dominant_lines(
     spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6, floor: float = -60.0
 ) -> tuple[Line, ...]:
-    """Strongest lines with orders low..high of one spectrum, strongest first.
+    """List the strongest lines with orders low..high of one spectrum, strongest first.
 
     Parameters
     ----------
@@ -294,7 +309,7 @@ def analyse_band(
     threshold: float = 0.1,
     count: int = 6,
 ) -> BandAnalysis:
-    """Band-pass around a mesh harmonic, its dominant lines, envelope and lobes.
+    """Analyse the band around a mesh harmonic: dominant lines, envelope and lobes of the signal.
 
     Parameters
     ----------
@@ -325,53 +340,6 @@ def analyse_band(
     low, high = harmonic * z_ring - half_width, harmonic * z_ring + half_width
     lines = dominant_lines(spectrum, low=low, high=high, count=count)
     analytic = analytic_signal(band_pass(spectrum, low, high))
-    lobes = count_lobes(np.abs(analytic), threshold=threshold, revolutions=spectrum.revolutions)
-    return BandAnalysis(harmonic, low, high, lines, analytic.real, np.abs(analytic), lobes)
-
-
-def symmetry_leakage(spectrum: OrderSpectrum, planets: int) -> np.ndarray:
-    """Largest amplitude at orders that are no multiple of the number of planets, over the largest of all.
-
-    Identical, equally spaced planets on a symmetric ring leave nothing there (McFadden and Smith,
-    1985): the sensor cannot tell the planets apart, so the signal repeats N times a revolution.
-
-    Returns
-    -------
-    (...) array
-        0 where there is no signal.
-    """
-    amplitude = spectrum.amplitude
-    others = np.abs(spectrum.order / planets - np.rint(spectrum.order / planets)) > 1e-9
-    largest = amplitude.max(axis=-1)
-    leak = amplitude[..., others].max(axis=-1, initial=0.0)
-    return np.divide(leak, largest, out=np.zeros_like(largest), where=largest > 0)
-
-
-def line_sources(
-    order: int, z_ring: int, *, direction: int, n_max: int, harmonics: int
-) -> tuple[tuple[int, int], ...]:
-    """Field components (h, n) heard at a carrier order: h z_ring - direction n = +order or -order.
-
-    Parameters
-    ----------
-    order : int
-        Carrier order, 0 upwards.
-    z_ring : int
-        Teeth of the ring.
-    direction : int
-        +1 where the carrier turns counter-clockwise, -1 clockwise.
-    n_max, harmonics : int
-        Largest |n| and h of the field.
-
-    Returns
-    -------
-    tuple of (h, n)
-        By ascending |n|.
-    """
-    found = {
-        (h, direction * (h * z_ring - heard))
-        for h in range(harmonics + 1)
-        for heard in (order, -order)
-        if abs(h * z_ring - heard) <= n_max
-    }
-    return tuple(sorted(found, key=lambda pair: (abs(pair[1]), pair)))
+    envelope = np.abs(analytic)
+    lobes = count_lobes(envelope, threshold=threshold, revolutions=spectrum.revolutions)
+    return BandAnalysis(harmonic, low, high, lines, np.real(analytic), envelope, lobes)

@@ -1,7 +1,6 @@
 """From the carrier frame to a fixed sensor: what the housing feels while the carrier turns.
 
-What cannot be computed is refused first; `motion_of` tells how the sensor moves past the field. The radial
-displacement of the ring's outer surface is given in the frame of the carrier,
+The radial displacement of the ring's outer surface is given in the frame of the carrier,
 
     u(phi, t) = Re sum_h sum_n U[h, n] exp(i n phi) exp(i h omega_m t),   h = 0..H, n = -n_max..n_max,
 
@@ -10,7 +9,8 @@ fixed omega_m = z_ring |Omega_c|: component (h, n) is heard at the carrier order
 Two forms: exact (one line a component) and the Heaviside/linear form, in which the sensor hands over between
 P points of the ring as it passes them: "Vibratory response of planetary gear sets housing by a spectral
 iterative approach - Modulation effects induced by carrier rotation", Eqs. (13)-(16), in closed form
-(`heaviside_linear_lines`) and written out in time (`heaviside_linear`).
+(`heaviside_linear_lines`). As printed there the arguments of the Heaviside functions are reversed and
+1/(t_{i+1} - t_i) is missing.
 
 Linear interpolation of exp(i n phi) between points first_point + 2 pi j / P is the sum over all
 integers q of sinc^2(m/P) exp(i m phi) exp(-i q P first_point) with m = n + q P and
@@ -126,7 +126,7 @@ def fixed_sensor_lines(
     mesh_frequency=None,
     max_order: int | None = None,
 ) -> SensorLines:
-    """Exact lines of a fixed sensor: component (h, n) at order ``h z_ring - sign(carrier_speed) n``.
+    """Compute the lines of a fixed sensor: component (h, n) at order ``h z_ring - sign(carrier_speed) n``.
 
     Components that fall on the same order add with their phases; negative orders are folded to
     positive ones (the conjugate). Where the carrier stands still there is no modulation and every
@@ -155,13 +155,13 @@ def fixed_sensor_lines(
         ``E-FIELD``, ``E-TEETH``, ``E-SPEED``, ``E-ORDERS``: data of the wrong shape or not finite, speeds
         of both directions, a ring that turns.
     """
-    field, n = checked_field(field)
-    motion = motion_of(field, z_ring, carrier_speed, mesh_frequency)
-    top = top_order(field, z_ring, max_order)
-    heard = field * np.exp(1j * n * checked_angle(sensor_angle))
-    two_sided = _heard_orders(heard, z_ring, motion.direction, top)
+    field, n = _checked_field(field)
+    direction, base_speed = _motion(field, z_ring, carrier_speed, mesh_frequency)
+    top = _top_order(field, z_ring, max_order)
+    heard = field * np.exp(1j * n * _checked_angle(sensor_angle))
+    two_sided = _heard_orders(heard, z_ring, direction, top)
     return SensorLines(
-        np.arange(top + 1), _folded(two_sided), motion.base_speed, float(sensor_angle), int(z_ring), "exact"
+        np.arange(top + 1), _folded(two_sided), base_speed, float(sensor_angle), int(z_ring), "exact"
     )
 
 
@@ -176,11 +176,11 @@ def heaviside_linear_lines(
     mesh_frequency=None,
     max_order: int | None = None,
 ) -> SensorLines:
-    """Lines of the Heaviside/linear form over P points of the ring (paper Eqs. (13)-(16)), in closed form.
+    """Compute the lines of the Heaviside/linear form over P points of the ring (paper Eqs. (13)-(16)).
 
     The acceleration has no natural end, see the head of this module: the order range is limited,
     default (H + 1) z_ring. P should be a multiple of the number of planets (or the points break the
-    symmetry of the set) and more than twice the largest n that matters (`unresolved_share`).
+    symmetry of the set) and more than twice the largest n that matters.
 
     Parameters
     ----------
@@ -200,24 +200,24 @@ def heaviside_linear_lines(
     CaseError
         As `fixed_sensor_lines`, and ``E-POINTS`` for less than 3 points.
     """
-    field, n = checked_field(field)
-    check_points(points)
-    motion = motion_of(field, z_ring, carrier_speed, mesh_frequency)
-    top = top_order(field, z_ring, max_order)
-    away = checked_angle(sensor_angle) - checked_angle(first_point)
+    field, n = _checked_field(field)
+    _check_points(points)
+    direction, base_speed = _motion(field, z_ring, carrier_speed, mesh_frequency)
+    top = _top_order(field, z_ring, max_order)
+    away = _checked_angle(sensor_angle) - _checked_angle(first_point)
     sampled = _sampled_components(field, n, points, first_point)
-    if motion.direction == 0:
+    if direction == 0:
         standing = _between_points(sampled, points, away)
         two_sided = _heard_orders(standing[..., None], z_ring, 0, top)
     else:
-        two_sided = _interpolated_orders(sampled, z_ring, motion.direction, top, away)
+        two_sided = _interpolated_orders(sampled, z_ring, direction, top, away)
     method = f"linear, {points} points"
     lines = _folded(two_sided)
-    return SensorLines(np.arange(top + 1), lines, motion.base_speed, float(sensor_angle), int(z_ring), method)
+    return SensorLines(np.arange(top + 1), lines, base_speed, float(sensor_angle), int(z_ring), method)
 
 
 def fixed_sensor_signal(lines: SensorLines, *, samples: int | None = None) -> HousingSignal:
-    """Displacement and acceleration over one revolution of the carrier, by inverse FFT of the lines.
+    """Synthesise displacement and acceleration over one carrier revolution by inverse FFT of the lines.
 
     Parameters
     ----------
@@ -237,179 +237,35 @@ def fixed_sensor_signal(lines: SensorLines, *, samples: int | None = None) -> Ho
         ``E-SAMPLES`` for too few samples.
     """
     top = int(lines.order[-1])
-    if samples is None:
-        samples = lines.z_ring * -(-4 * top // lines.z_ring)
-    if samples <= 2 * top:
+    count = lines.z_ring * -(-4 * top // lines.z_ring) if samples is None else samples
+    if count <= 2 * top:
         raise CaseError(
-            f"{samples} samples cannot carry {top} carrier orders",
+            f"{count} samples cannot carry {top} carrier orders",
             code="E-SAMPLES",
             key="samples",
-            value=samples,
+            value=count,
             limit=f"more than {2 * top} samples a carrier revolution",
             remedy="ask for more samples or lower max_order",
         )
-    revolution = np.arange(samples) / samples
+    revolution = np.arange(count) / count
     seconds = 2 * np.pi * revolution / lines.base_speed[..., None]
     return HousingSignal(
         revolution,
         seconds,
-        _synthesised(lines.displacement, samples),
-        _synthesised(lines.acceleration, samples),
+        _synthesised(lines.displacement, count),
+        _synthesised(lines.acceleration, count),
         lines.sensor_angle,
         lines.method,
     )
 
 
-def point_signals(field, z_ring: int, *, points: int, samples: int, first_point: float = 0.0) -> np.ndarray:
-    """Signals u_j(t) of P equidistant points that stand still in the carrier frame, over one revolution.
-
-    Parameters
-    ----------
-    field : (..., H + 1, 2 n_max + 1) complex array
-        Carrier-frame components; give them times -(h omega_m)^2 for the accelerations of the points.
-    z_ring : int
-        Teeth of the ring: mesh periods in a revolution.
-    points, first_point
-        As in `heaviside_linear_lines`.
-    samples : int
-        Number of time samples.
-
-    Returns
-    -------
-    (..., points, samples) array
-
-    Raises
-    ------
-    CaseError
-        ``E-FIELD``, ``E-TEETH``, ``E-POINTS``.
-    """
-    field, n = checked_field(field)
-    check_points(points)
-    check_teeth(z_ring)
-    angle = first_point + 2 * np.pi * np.arange(points) / points
-    turns = np.outer(np.arange(field.shape[-2]) * z_ring, np.arange(samples)) % samples / samples
-    at_points = np.swapaxes(field @ np.exp(1j * np.outer(n, angle)), -1, -2)
-    return (at_points @ np.exp(2j * np.pi * turns)).real
-
-
-def passages(points: int, sensor_angle: float, *, direction: int = 1, first_point: float = 0.0) -> np.ndarray:
-    """When a fixed sensor passes P equidistant carrier-frame points, as fractions of the revolution 0..1.
-
-    Parameters
-    ----------
-    points, first_point
-        As in `heaviside_linear_lines`.
-    sensor_angle : float
-        Angle of the sensor on the housing [rad].
-    direction : int
-        +1 where the carrier turns counter-clockwise, -1 clockwise.
-
-    Returns
-    -------
-    (points,) array, in the order of the points.
-    """
-    check_points(points)
-    start = direction * (checked_angle(sensor_angle) - checked_angle(first_point)) * points / (2 * np.pi)
-    passed = np.mod(start - direction * np.arange(points), points) / points
-    # mod rounds the smallest negative numbers up to the end of the revolution
-    return np.where(passed < 1, passed, 0.0)
-
-
-def heaviside_linear(signals, passed) -> np.ndarray:
-    """The paper's Eqs. (13)-(16) as written out in time: the sensor hands over from point to point.
-
-    u(t) = sum_i [H(t - t_i) - H(t - t_{i+1})] [u_i(t) + (t - t_i)/(t_{i+1} - t_i) (u_{i+1}(t) - u_i(t))],
-    t_i the time at which the sensor passes the i-th point on its way. As printed the arguments of the
-    Heaviside functions are reversed and 1/(t_{i+1} - t_i) is missing. H(0) = 1. Whatever the signals are
-    (displacements, or accelerations of the points) is interpolated; the acceleration of the fixed
-    point is the second derivative of the interpolated displacement, see `heaviside_linear_lines`.
-
-    Parameters
-    ----------
-    signals : (..., points, samples) array
-        Signals of the points over one revolution, as from `point_signals`.
-    passed : (points,) array
-        Fraction of the revolution at which each point is passed, 0 <= t_i < 1, all different, in any order.
-
-    Returns
-    -------
-    (..., samples) array
-
-    Raises
-    ------
-    CaseError
-        ``E-POINTS`` for passages that do not fit the signals, repeat or leave 0..1.
-    """
-    signals, passed = np.asarray(signals, dtype=float), np.asarray(passed, dtype=float)
-    bad = passed.shape != signals.shape[-2:-1] or np.unique(passed).size != passed.size
-    if bad or not np.all((passed >= 0) & (passed < 1)):
-        raise CaseError(
-            f"{passed.size} passages do not fit {signals.shape[-2]} points, repeat, or leave the revolution",
-            code="E-POINTS",
-            limit="one passage a point, all different, 0 <= t < 1",
-            remedy="take them from passages()",
-        )
-    sequence = np.argsort(passed)
-    here, onwards = signals[..., sequence, :], signals[..., np.roll(sequence, -1), :]
-    t = np.arange(signals.shape[-1]) / signals.shape[-1]
-    start = passed[sequence]
-    length = np.diff(start, append=start[0] + 1)
-    reached = np.heaviside(t - start[:, None], 1.0)
-    window = reached - np.roll(reached, -1, axis=0)
-    window[-1] += 1  # the last segment runs through the seam of the revolution
-    share = np.mod(t - start[:, None], 1.0) / length[:, None]
-    return np.einsum("pt,...pt->...t", window * (1 - share), here) + np.einsum(
-        "pt,...pt->...t", window * share, onwards
-    )
-
-
-def unresolved_share(field, points: int) -> np.ndarray:
-    """Share of the vibration (h >= 1) that P points cannot resolve: amplitude of the components |n| >= P/2.
-
-    Parameters
-    ----------
-    field : (..., H + 1, 2 n_max + 1) complex array
-    points : int
-
-    Returns
-    -------
-    (...) array
-        Root of the share of the sum of squares, 0..1; 0 where nothing vibrates.
-    """
-    field, n = checked_field(field)
-    check_points(points)
-    power = np.sum(np.abs(field[..., 1:, :]) ** 2, axis=-2)
-    lost, total = power[..., 2 * np.abs(n) >= points].sum(axis=-1), power.sum(axis=-1)
-    return np.sqrt(np.divide(lost, total, out=np.zeros_like(total), where=total > 0))
-
-
-def phased_harmonics(harmonics, mesh_phases) -> np.ndarray:
-    """Harmonics of planets that all do the same, each at its own mesh phase.
-
-    Parameters
-    ----------
-    harmonics : (..., H + 1) complex array
-        Mesh signal of a planet of phase zero: Re sum_h harmonics[h] exp(i h omega_m t).
-    mesh_phases : (N,) array
-        Phase of every planet's mesh with the ring, as a fraction of the mesh period.
-
-    Returns
-    -------
-    (..., N, H + 1) complex array
-    """
-    harmonics = np.asarray(harmonics, dtype=complex)
-    turns = np.outer(mesh_phases, np.arange(harmonics.shape[-1]))
-    return harmonics[..., None, :] * np.exp(2j * np.pi * turns)
-
-
 def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max: int = 24) -> np.ndarray:
-    """Carrier-frame field of the Hanning-window model, for `fixed_sensor_lines`.
+    """Compute the carrier-frame field of the Hanning-window model, for `fixed_sensor_lines`.
 
     Parameters
     ----------
     harmonics : (..., N, H + 1) complex array
-        Harmonics of every planet's mesh signal in common time, for example the mesh forces of the
-        planet-ring meshes, or from `phased_harmonics`.
+        Harmonics of every planet's mesh signal in common time, such as the forces of the planet-ring meshes.
     planet_angles : (N,) array
         Angles psi_p in the carrier frame [rad].
     width : float, optional
@@ -450,16 +306,8 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
     return np.swapaxes(riding @ harmonics, -1, -2)
 
 
-@dataclass(frozen=True)
-class Motion:
-    """How the sensor moves past the carrier-frame field: direction +1, 0, -1 and the speed orders count."""
-
-    direction: int
-    base_speed: np.ndarray
-
-
-def motion_of(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> Motion:
-    """Direction and base speed, refusing what the order analysis cannot express."""
+def _motion(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> tuple[int, np.ndarray]:
+    """Direction +1, 0 or -1 of the carrier and the speed that orders count (...) [rad/s], always positive."""
     check_teeth(z_ring)
     speed = np.asarray(carrier_speed, dtype=float)
     direction = np.unique(np.sign(speed))
@@ -492,10 +340,11 @@ def motion_of(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> 
             limit="z_ring |carrier_speed| / (2 pi)",
             remedy="use a set whose ring or carrier is fixed",
         )
-    return Motion(int(direction[0]), given / z_ring)
+    return int(direction[0]), given / z_ring
 
 
-def top_order(field: np.ndarray, z_ring: int, max_order: int | None) -> int:
+def _top_order(field: np.ndarray, z_ring: int, max_order: int | None) -> int:
+    """Highest carrier order of the lines: as asked for, or that of the highest component."""
     harmonics, n_max = field.shape[-2] - 1, field.shape[-1] // 2
     top = max((harmonics + 1) * z_ring, harmonics * z_ring + n_max) if max_order is None else max_order
     if top != int(top) or top < 1:
@@ -510,7 +359,7 @@ def top_order(field: np.ndarray, z_ring: int, max_order: int | None) -> int:
     return int(top)
 
 
-def checked_field(field) -> tuple[np.ndarray, np.ndarray]:
+def _checked_field(field) -> tuple[np.ndarray, np.ndarray]:
     """The field as a complex array and its circumferential orders n = -n_max..n_max."""
     field = np.asarray(field, dtype=complex)
     if field.ndim < 2 or field.size == 0 or field.shape[-1] % 2 == 0 or not np.all(np.isfinite(field)):
@@ -524,7 +373,8 @@ def checked_field(field) -> tuple[np.ndarray, np.ndarray]:
     return field, np.arange(-n_max, n_max + 1)
 
 
-def checked_angle(angle: float) -> float:
+def _checked_angle(angle: float) -> float:
+    """A finite angle [rad]."""
     if not np.isfinite(angle):
         raise CaseError(
             f"the angle {angle} is not a number of radians",
@@ -537,7 +387,8 @@ def checked_angle(angle: float) -> float:
     return float(angle)
 
 
-def check_points(points: int) -> None:
+def _check_points(points: int) -> None:
+    """Refuse a number of points that cannot describe a ring."""
     if points != int(points) or points < 3:
         raise CaseError(
             f"{points} points do not describe a ring",
@@ -550,6 +401,7 @@ def check_points(points: int) -> None:
 
 
 def check_teeth(z_ring: int) -> None:
+    """Refuse a number of ring teeth that gives no mesh order (E-TEETH)."""
     if z_ring != int(z_ring) or z_ring < 1:
         raise CaseError(
             f"{z_ring} ring teeth do not give a mesh order",
@@ -589,7 +441,7 @@ def _folded(two_sided: np.ndarray) -> np.ndarray:
     """Single-sided amplitudes of Re sum_k c_k exp(i k x): c_k + conj(c_-k), real at order 0."""
     top = two_sided.shape[-1] // 2
     lines = two_sided[..., top:] + np.conj(two_sided[..., top::-1])
-    lines[..., 0] = two_sided[..., top].real
+    lines[..., 0] = np.real(two_sided[..., top])
     return lines
 
 

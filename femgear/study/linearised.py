@@ -8,36 +8,34 @@ stands.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations
 from femgear.case.sections import Case
 from femgear.contact.assembly import (
+    ROUGH_STIFFNESS,
     assemble_contact,
+    cell_centres,
     cycle_positions,
-    mesh_pairs,
+    in_windows,
     mesh_windows,
     rotation_approach,
 )
-from femgear.contact.candidates import cell_centres, separation
-from femgear.contact.cycle import ROUGH_STIFFNESS
+from femgear.contact.flank_pairs import loaded_image, mesh_pairs, separation
 from femgear.contact.pivoting import factor
-from femgear.contact.sides import mirrored_set
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import RIGID, Supports, moving_members
-from femgear.errors import CaseError, ContactError
-from femgear.gears.deviations import mirrored_deviations
+from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 from femgear.study.relief import relief_starts
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from femgear.contact.assembly import Bodies
+    from femgear.contact.bodies import Bodies
     from femgear.gears.deviations import SetDeviations
     from femgear.gears.planetary import PlanetarySet
 
@@ -223,20 +221,16 @@ def linear_positions(original, bodies, sun_torque, chosen, record, deviations, s
     ContactError
         As `contact.cycle.walk_mesh_cycle`.
     """
-    solved, order = original, np.arange(original.n_planets)
+    solved, order, deviations = loaded_image(original, sun_torque, deviations)
     position = cycle_positions(record["positions"], periods=record["periods"])
     numbers = chosen
     if sun_torque < 0:
         # the mirror image turns the other way and ends at position zero
-        solved, order = mirrored_set(original)
         position, numbers = -position[::-1], len(position) - 1 - chosen
-        if deviations is not None:
-            deviations = mirrored_deviations(deviations, original, solved, order)
     load = abs(sun_torque) / solved.sun.base_radius
     members = moving_members(solved, supports)
-    setup, answers = _solve(
-        solved, bodies, load, numbers, members, record | {"positions": position, "deviations": deviations}
-    )
+    options = {"contact": record["contact"], "cells": record["cells"], "deviations": deviations}
+    setup, answers = _solve(solved, bodies, load, numbers, members, options | {"positions": position})
     rows = original_rows(order)
     stacked = {name: np.stack([answer[name] for answer in answers]) for name in answers[0] if name != "cells"}
     return LinearContact(
@@ -275,38 +269,9 @@ def _solve(solved, bodies, load, numbers, members, options):
             overflow |= problem.touches_window_end(state.active, setup)
             penetrates = ~setup.near[:, p] & (setup.smallest_gap[:, p] < answers[-1]["deflection"][:, None])
             outside |= options["contact"] == "profile" and bool(penetrates.any())
-        return (setup, answers), overflow, outside
+        return (setup, answers), share * (4.0 if overflow else 1.0), nearest * (2.0 if outside else 1.0)
 
     return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * solved.sun.face_width))
-
-
-def in_windows(attempt: Callable[[float, float], tuple], share: float, nearest: float) -> Any:
-    """What is found in windows that contain the contact; they are enlarged until they do.
-
-    Parameters
-    ----------
-    attempt : callable
-        ``(share, nearest) -> found, overflow, outside``: what is found in these windows, whether the contact
-        reaches the end of one, and whether teeth without a window overlap.
-    share, nearest : float
-        Of the first windows, as `mesh_windows` takes them [N], [m].
-
-    Raises
-    ------
-    ContactError
-        E-CONTACT-WINDOW
-    """
-    for _ in range(8):
-        found, overflow, outside = attempt(share, nearest)
-        if not overflow and not outside:
-            return found
-        share *= 4.0 if overflow else 1.0
-        nearest *= 2.0 if outside else 1.0
-    raise ContactError(
-        "the contact windows do not contain the contact after seven enlargements",
-        code="E-CONTACT-WINDOW",
-        remedy="reduce operation.torque or the errors",
-    )
 
 
 def _answer(problem, state, members) -> dict:

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from femgear.contact.assembly import mesh_pairs
-from femgear.contact.cycle import walk_either_flank
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
@@ -26,7 +26,7 @@ from femgear.gears.modifications import FlankForm, TipRelief
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from femgear.contact.assembly import Bodies
+    from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
 
 LARGEST_LENGTH = 1.3
@@ -270,7 +270,7 @@ def harris_map(
     for v, variant in enumerate(deviations):
         periods = 1 if variant is None else common_period(variant, planetary_set)[0]
         for t, torque in enumerate(torques):
-            cycle = walk_either_flank(
+            cycle = walk_mesh_cycle(
                 planetary_set,
                 bodies,
                 sun_torque=float(torque),

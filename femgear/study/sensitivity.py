@@ -46,7 +46,7 @@ from femgear.study.relief import pin_error
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from femgear.contact.assembly import Bodies
+    from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
     from femgear.study.problem import Evaluations
     from femgear.study.variables import Variable

@@ -19,19 +19,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.assembly import assemble_contact, mesh_windows
-from femgear.contact.cycle import ROUGH_STIFFNESS, walk_either_flank
-from femgear.contact.sides import mirrored_set
+from femgear.contact.assembly import ROUGH_STIFFNESS, assemble_contact, in_windows, mesh_windows
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.flank_pairs import loaded_image
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import RIGID, Supports, moving_members
 from femgear.errors import CaseError, ContactError
-from femgear.gears.deviations import SetDeviations, mirrored_deviations, no_deviations
+from femgear.gears.deviations import SetDeviations, no_deviations
 from femgear.gears.kinematics import mesh_normals
-from femgear.study.linearised import in_windows
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from femgear.contact.assembly import Bodies
+    from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
 
 SOFTEST = 1e-10
@@ -127,12 +126,8 @@ def sharing_model(
             limit="0 um",
             remedy='set it to zero, or solve single cases with static.members = "elastic"',
         )
-    solved, order = planetary_set, np.arange(planetary_set.n_planets)
-    if sun_torque < 0:
-        solved, order = mirrored_set(planetary_set)
-        if deviations is not None:
-            deviations = mirrored_deviations(deviations, planetary_set, solved, order)
-        position = -position
+    solved, order, deviations = loaded_image(planetary_set, sun_torque, deviations)
+    position = -position if sun_torque < 0 else position
     N = solved.n_planets
     load = abs(sun_torque) / solved.sun.base_radius
     # planets open and close at small loads, where a line contact changes most
@@ -165,7 +160,9 @@ def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
         overflow = problem.touches_window_end(state.active, setup)
         gap = setup.smallest_gap[:, 0]
         outside = ~setup.near[:, 0] & (gap < state.motions[:, None])
-        return (problem, mesh, state), overflow, outside.any() and place["contact"] == "profile"
+        missed = place["contact"] == "profile" and outside.any()
+        wider = share * (4.0 if overflow else 1.0), nearest * (2.0 if missed else 1.0)
+        return (problem, mesh, state), *wider
 
     first = 3.0 * force / (ROUGH_STIFFNESS * bodies.face_width)
     problem, mesh, state = in_windows(attempt, force, first)
@@ -429,7 +426,7 @@ def walked_shares(
     base = no_deviations(planetary_set) if deviations is None else deviations
     shares = []
     for errors in np.asarray(pins, float):
-        cycle = walk_either_flank(
+        cycle = walk_mesh_cycle(
             planetary_set,
             bodies,
             sun_torque=sun_torque,

@@ -139,7 +139,7 @@ def need_elastic_ring(case: Case, subject: str) -> None:
 @one_blas_thread()
 def _static(case: Case, shared: Shared) -> StaticResult:
     """As `solve_static`, with the compliances of an earlier variant where they are the same."""
-    from femgear.contact.cycle import walk_either_flank
+    from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
     from femgear.gears.deviations import common_period
     from femgear.gears.kinematics import torques
 
@@ -150,7 +150,7 @@ def _static(case: Case, shared: Shared) -> StaticResult:
     gears, deviations = planetary_set(case), set_deviations(case)
     sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
     periods, message = common_period(deviations, gears, limit=case.static.longest_record)
-    cycle = walk_either_flank(
+    cycle = walk_mesh_cycle(
         gears,
         first.bodies,
         sun_torque=sun_torque,
@@ -159,7 +159,7 @@ def _static(case: Case, shared: Shared) -> StaticResult:
         deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
         supports=static_supports(case),
         periods=periods,
-        both_flanks=case.static.back_flanks,
+        options=CycleOptions(both_flanks=case.static.back_flanks),
     )
     check_motions(cycle, gears.sun.module)
     return replace(

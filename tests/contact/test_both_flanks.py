@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 from validation.planetary import reference_set
 
-from femgear.contact.assembly import mesh_pairs, mesh_windows
+from femgear.contact.assembly import mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.candidates import tooth_zero_angles
-from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.sides import BACK, DRIVE, flank_side, side_teeth
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.flank_pairs import BACK_SIDE, DRIVE_SIDE, flank_side, mesh_pairs, side_teeth
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import half_thickness_angle
+from femgear.gears.kinematics import orientations
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
+BOTH = CycleOptions(both_flanks=True)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def test_clearance_of_the_back_flanks_is_the_backlash(gears, bodies):
     assert nearest[6:] == pytest.approx(80e-6 * np.cos(np.deg2rad(20)), abs=2e-7)
 
 
-@pytest.mark.parametrize("direction", [DRIVE, BACK])
+@pytest.mark.parametrize("direction", [DRIVE_SIDE, BACK_SIDE])
 @pytest.mark.parametrize("angles", [None, (0.0, 34, 67, 101)])
 def test_teeth_stand_where_their_flanks_touch(gears, direction, angles):
     """Number, zero angle and rotation give the tooth's centre; its flank must pass the point of contact."""
@@ -63,7 +64,7 @@ def test_teeth_stand_where_their_flanks_touch(gears, direction, angles):
     teeth = side_teeth(gears, index, direction)
     tau = 0.3
     zeta = gears.base_pitch * (direction * tau + side.phase[:, None] + index)
-    sun_zero, planet_zero, ring_zero = tooth_zero_angles(gears, tau)
+    zero = orientations(gears, tau)
     for j in range(2 * N):
         kind, n = divmod(j, N)
         pair = mesh_pairs(gears)[kind]
@@ -83,20 +84,20 @@ def test_teeth_stand_where_their_flanks_touch(gears, direction, angles):
         flank_2 = half_thickness_angle(second, np.hypot(pair.base_radius_2, roll_2))
         # external gear 2 carries on the flank of the same hand; a ring's flank faces the planet
         centre_2 = towards_2 + turn * (place_2 - flank_2 if kind == 0 else place_2 + flank_2)
-        zero_1 = sun_zero if kind == 0 else planet_zero[n]
-        zero_2 = planet_zero[n] if kind == 0 else ring_zero
+        zero_1 = zero.sun if kind == 0 else zero.planets[n]
+        zero_2 = zero.planets[n] if kind == 0 else zero.ring
         slack = 40e-6 * 2 / first.reference_radius
-        for zero, teeth_of, centre, gear in (
+        for zero_of, teeth_of, centre, gear in (
             (zero_1, teeth[0][j], centre_1, first),
             (zero_2, teeth[1][j], centre_2, second),
         ):
-            off = np.mod(zero + teeth_of * gear.pitch_angle - centre + np.pi, 2 * np.pi) - np.pi
+            off = np.mod(zero_of + teeth_of * gear.pitch_angle - centre + np.pi, 2 * np.pi) - np.pi
             assert np.abs(off).max() < (1e-9 if direction > 0 else slack)
 
 
 def test_backlash_keeps_the_back_flanks_out(gears, bodies):
     one = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8)
-    two = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, both_flanks=True)
+    two = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, options=BOTH)
     assert not two.back_force.any() and not two.wedged.any()
     assert two.deflection == pytest.approx(one.deflection, rel=1e-9)
     assert two.stiffness == pytest.approx(one.stiffness, rel=1e-9)
@@ -108,7 +109,7 @@ def test_a_floating_sun_pushed_into_the_teeth_is_wedged(gears, bodies):
 
     pushed = no_deviations(gears)
     pushed = replace(pushed, pin_errors=np.array([[-105e-6, 0.0], [-105e-6, 0.0], [-105e-6, 0.0]]))
-    cycle = walk_mesh_cycle(gears, bodies, sun_torque=5.0, positions=4, both_flanks=True, deviations=pushed)
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=5.0, positions=4, options=BOTH, deviations=pushed)
     assert cycle.wedged[:3].all()
     assert "wedged" in cycle.message
     net = cycle.force - cycle.back_force
@@ -119,7 +120,7 @@ def test_a_floating_sun_pushed_into_the_teeth_is_wedged(gears, bodies):
 
 def test_floating_sun_rests_on_both_flanks_where_it_must(gears, bodies):
     cycle = walk_mesh_cycle(
-        gears, bodies, sun_torque=TORQUE, positions=4, both_flanks=True, supports=Supports(sun=0.0)
+        gears, bodies, sun_torque=TORQUE, positions=4, options=BOTH, supports=Supports(sun=0.0)
     )
     assert cycle.load_share == pytest.approx(1 / 3, abs=1e-9)
     assert not cycle.wedged.any()

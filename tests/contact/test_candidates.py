@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from femgear.contact.candidates import admissible_arcs, flank_pair, separation, windows
+from femgear.contact.assembly import windows
+from femgear.contact.flank_pairs import admissible_arcs, flank_pair, separation
 from femgear.gears.gear import Gear
 
 ALPHA = np.deg2rad(20)
@@ -106,5 +107,5 @@ def test_windows_on_the_line_of_action_are_those_of_rigid_gears(pair):
     contact = (pair.pitch_roll_1 + zeta) ** 2 / (2 * pair.base_radius_1)
     inside = (contact > low + 1.6e-4) & (contact < high - 1.6e-4)
     assert inside.sum() > 50
-    assert not (profile.at_low_edge | profile.at_high_edge)[inside].any()
-    assert (profile.at_low_edge | profile.at_high_edge)[~inside].all()
+    assert not (profile.at_edge.any(axis=0))[inside].any()
+    assert (profile.at_edge.any(axis=0))[~inside].all()

@@ -8,7 +8,7 @@ from published.iso6336_stiffness import mesh_stiffness_method_b
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.solve import mesh_tangent_matrix, solve_contact, tangent_stiffness
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear
@@ -86,8 +86,7 @@ def solved(gears, bodies, position, *, torque=TORQUE, gaps=(0.0, 0.0, 0.0), coup
         cells=36,
         nearest=20e-6,
         contact="profile",
-        planet_gaps=gaps,
-    )
+    ).with_planet_gaps(gaps)
     problem = assemble_contact(setup, bodies, position)
     if not coupled:
         problem = replace(problem, H=problem.H * (problem.mesh[:, None] == problem.mesh))
@@ -127,7 +126,7 @@ def test_no_torque_is_a_defined_empty_contact(gears, bodies):
 
 def test_other_flanks_are_the_mirror_image(gears, bodies, cycle):
     """With equal planets in phase the back flanks give the same cycle run backwards."""
-    back = walk_either_flank(gears, bodies, sun_torque=-TORQUE, positions=32)
+    back = walk_mesh_cycle(gears, bodies, sun_torque=-TORQUE, positions=32)
     turned = -np.arange(32) % 32
     assert np.abs(back.deflection - cycle.deflection[:, turned]).max() < 1e-12
     assert np.abs(back.tooth_load.sum(axis=1) - back.force).max() < 1e-6
@@ -135,7 +134,9 @@ def test_other_flanks_are_the_mirror_image(gears, bodies, cycle):
 
 def test_gap_stays_with_its_planet_on_the_other_flanks(gears, bodies):
     gaps = [0.0, 3e-6, 0.0]
-    back = walk_either_flank(gears, bodies, sun_torque=-TORQUE, positions=8, planet_gaps=gaps)
+    back = walk_mesh_cycle(
+        gears, bodies, sun_torque=-TORQUE, positions=8, options=CycleOptions(planet_gaps=gaps)
+    )
     assert (back.load_share[1] < 0.3).all() and (back.load_share[[0, 2]] > 0.35).all()
 
 
@@ -182,7 +183,9 @@ def test_body_coupling_moves_little_load(gears, bodies):
 
 
 def test_planet_far_away_carries_nothing(gears, bodies):
-    cycle = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, planet_gaps=[100e-6, 0.0, 0.0])
+    cycle = walk_mesh_cycle(
+        gears, bodies, sun_torque=TORQUE, positions=8, options=CycleOptions(planet_gaps=[100e-6, 0.0, 0.0])
+    )
     assert cycle.open_planets[0].all() and not cycle.open_planets[1:].any()
     assert not cycle.force[[0, 3]].any() and not cycle.stiffness[[0, 3]].any()
     # through the sun's body a load acts on its neighbours, not alike in both directions of rotation

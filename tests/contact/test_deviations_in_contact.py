@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from validation.planetary import reference_set
 
-from femgear.contact.assembly import mesh_pairs
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import Runout, common_period, no_deviations
@@ -113,8 +113,8 @@ def test_reversal_is_the_mirror_image_with_mirrored_errors(gears, bodies):
     errors = replace(no_deviations(gears), pin_errors=pins)
     # the mirror image swaps planets 2 and 3 and turns tangential errors round
     mirrored = replace(no_deviations(gears), pin_errors=pins[[0, 2, 1]] * np.array([1.0, -1.0]))
-    one = walk_either_flank(gears, bodies, sun_torque=TORQUE, positions=8, deviations=errors)
-    two = walk_either_flank(gears, bodies, sun_torque=-TORQUE, positions=8, deviations=mirrored)
+    one = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, deviations=errors)
+    two = walk_mesh_cycle(gears, bodies, sun_torque=-TORQUE, positions=8, deviations=mirrored)
     order, back = [0, 2, 1, 3, 5, 4], -np.arange(8) % 8
     assert two.force[order][:, back] == pytest.approx(one.force, rel=1e-9)
     assert two.deflection[order][:, back] == pytest.approx(one.deflection, rel=1e-9)

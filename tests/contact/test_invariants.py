@@ -9,11 +9,10 @@ from hypothesis import strategies as st
 from validation.planetary import reference_set
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
-from femgear.contact.bearings import bearing_springs, solve_position
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
-from femgear.contact.sides import mirrored_set
-from femgear.contact.supports import Supports, moving_members
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.flank_pairs import mirrored_set
+from femgear.contact.supports import Supports, bearing_springs, moving_members, solve_position
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import mirrored_deviations, no_deviations
 
@@ -155,12 +154,11 @@ def solved(gears, bodies, values, held, position, torque, gaps):
         nearest=40e-6,
         contact="profile",
         deviations=errors_of(gears, values),
-        planet_gaps=gaps,
-    )
+    ).with_planet_gaps(gaps)
     problem = assemble_contact(setup, bodies, position, members)
-    load = np.zeros(problem.G.shape[1])
+    springs, load = bearing_springs(gears, held, members), np.zeros(problem.G.shape[1])
     load[3] = torque / gears.sun.base_radius
-    state, active = solve_position(problem, bearing_springs(gears, held, members), load)
+    state, active = solve_position(problem.compliance, problem.gap, problem.G, load, springs)
     return np.concatenate([state.loads, 1e9 * state.motions]), active
 
 
@@ -195,7 +193,7 @@ def test_the_mirror_image_under_the_reversed_torque_is_the_mirrored_result(gears
     mirrored, order = mirrored_set(gears)
     errors = errors_of(gears, values)
     one = walk(gears, bodies, values, held)
-    two = walk_either_flank(
+    two = walk_mesh_cycle(
         mirrored,
         bodies,
         sun_torque=-TORQUE,

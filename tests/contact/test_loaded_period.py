@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_either_flank
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.loaded_period import SHORTEST, loaded_period, planet_symmetry
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
@@ -67,7 +67,7 @@ def test_record_is_the_walk_at_its_positions(solved, bodies):
     """Positions all over the period, of which only the first part was solved."""
     gears, found = solved
     some = np.arange(len(found.position))[3::17]
-    walk = walk_either_flank(
+    walk = walk_mesh_cycle(
         gears, bodies, sun_torque=TORQUE, positions=found.position[some], supports=SUPPORTS
     )
     for name in ("force", "deflection", "stiffness"):
@@ -121,9 +121,9 @@ def test_an_error_of_one_planet_breaks_the_symmetry():
 def test_coupling_through_the_sun_is_what_a_changed_load_shows(bodies):
     """Diagonal and rest of the compliance against central differences of the loaded state."""
     gears = small_set(equal_planet_angles(4))
-    options = dict(positions=np.array([0.1]), held_bodies=bodies)
+    options = dict(positions=np.array([0.1]), options=CycleOptions(held_bodies=bodies))
     found, less, more = (
-        walk_either_flank(gears, bodies, sun_torque=TORQUE * f, **options) for f in (1.0, 0.98, 1.02)
+        walk_mesh_cycle(gears, bodies, sun_torque=TORQUE * f, **options) for f in (1.0, 0.98, 1.02)
     )
     change = (more.deflection - less.deflection)[:, 0]
     force = (more.force - less.force)[:, 0]

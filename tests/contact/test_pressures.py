@@ -7,7 +7,7 @@ import pytest
 from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
 from femgear.gears.gear import Gear
@@ -47,7 +47,9 @@ def test_pressure_at_the_pitch_point_is_that_of_hertz(standard):
     """p0 = 888.848552 MPa, b = 71.62297 um under 100 N/mm (closed form, E = 206 GPa, nu = 0.3)."""
     gears, bodies = standard
     torque = LINE_LOAD * WIDTH * gears.sun.base_radius
-    cycle = walk_mesh_cycle(gears, bodies, sun_torque=torque, positions=4, cells=72, pressures=True)
+    cycle = walk_mesh_cycle(
+        gears, bodies, sun_torque=torque, positions=4, options=CycleOptions(cells=72, pressures=True)
+    )
     (pair,) = np.flatnonzero(cycle.tooth_load[0, :, 0])
     assert cycle.path[0, pair, 0] == pytest.approx(0.0, abs=1e-12)
     assert cycle.tooth_load[0, pair, 0] == pytest.approx(LINE_LOAD * WIDTH, rel=1e-9)
@@ -65,7 +67,9 @@ def test_pressure_at_the_pitch_point_is_that_of_hertz(standard):
 @pytest.mark.parametrize("both", [False, True])
 def test_pressures_carry_the_tooth_loads(reference, torque, both):
     gears, bodies = reference
-    cycle = walk_either_flank(gears, bodies, sun_torque=torque, positions=8, pressures=True, both_flanks=both)
+    cycle = walk_mesh_cycle(
+        gears, bodies, sun_torque=torque, positions=8, options=CycleOptions(pressures=True, both_flanks=both)
+    )
     carried = cycle.pressure.sum(axis=2) * areas(cycle, gears.sun.face_width)
     assert np.abs(carried - cycle.tooth_load).max() < 1e-12 * cycle.tooth_load.max()
     assert cycle.pressure.shape == (*cycle.tooth_load.shape[:2], 36, 8)
@@ -79,14 +83,16 @@ def test_pressures_are_kept_only_when_asked_for(reference):
     gears, bodies = reference
     plain = walk_mesh_cycle(gears, bodies, sun_torque=100.0, positions=2)
     assert plain.pressure is None and plain.pressure_offset is None and plain.pressure_centre is None
-    empty = walk_mesh_cycle(gears, bodies, sun_torque=0.0, positions=2, pressures=True)
+    empty = walk_mesh_cycle(gears, bodies, sun_torque=0.0, positions=2, options=CycleOptions(pressures=True))
     assert empty.pressure.shape == (6, 1, 36, 2) and not empty.pressure.any()
 
 
 def test_windows_at_the_ends_of_flanks_say_where_they_are(reference):
     """Every window lies on the flank of the sun: centre and offset give its arc length there."""
     gears, bodies = reference
-    cycle = walk_mesh_cycle(gears, bodies, sun_torque=100.0, positions=16, pressures=True)
+    cycle = walk_mesh_cycle(
+        gears, bodies, sun_torque=100.0, positions=16, options=CycleOptions(pressures=True)
+    )
     sun, alpha = gears.sun, gears.working_pressure_angle_sun_planet
     roll = sun.base_radius * np.tan(alpha) + cycle.path[:3]
     arc = roll**2 / (2 * sun.base_radius) + cycle.pressure_centre[:3]
@@ -105,9 +111,9 @@ def test_reversed_pressures_are_mirrored(reference):
     pins = np.array([[2e-6, 5e-6], [-1e-6, 0.0], [3e-6, -2e-6]])
     errors = replace(no_deviations(gears), pin_errors=pins)
     mirrored = replace(no_deviations(gears), pin_errors=pins[[0, 2, 1]] * np.array([1.0, -1.0]))
-    options = {"positions": 4, "pressures": True}
-    one = walk_either_flank(gears, bodies, sun_torque=100.0, deviations=errors, **options)
-    two = walk_either_flank(gears, bodies, sun_torque=-100.0, deviations=mirrored, **options)
+    options = {"positions": 4, "options": CycleOptions(pressures=True)}
+    one = walk_mesh_cycle(gears, bodies, sun_torque=100.0, deviations=errors, **options)
+    two = walk_mesh_cycle(gears, bodies, sun_torque=-100.0, deviations=mirrored, **options)
     pitch, largest = gears.sun.base_pitch, one.pressure.max()
     for mesh, other in enumerate([0, 2, 1, 3, 5, 4]):
         for p, q in enumerate(-np.arange(4) % 4):

@@ -7,8 +7,8 @@ import pytest
 from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
-from femgear.contact.sides import mirrored_set
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.flank_pairs import mirrored_set
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import Runout, common_period, mirrored_deviations, no_deviations
@@ -57,7 +57,7 @@ def closed(gears, bodies, errors):
 
 def reversed_walk(bodies, mirrored, periods, **options):
     image, errors = mirrored
-    return walk_either_flank(
+    return walk_mesh_cycle(
         image,
         bodies,
         sun_torque=-TORQUE,
@@ -133,12 +133,13 @@ def test_teeth_are_followed_through_reversed_records(gears, bodies, periods):
     """
     P, pitch = 4, gears.sun.base_pitch
     image, order = mirrored_set(gears)
-    options = {"positions": P, "periods": periods, "both_flanks": True, "pressures": True}
+    options = {"positions": P, "periods": periods}
+    options["options"] = CycleOptions(both_flanks=True, pressures=True)
     # pins pushed inwards wedge the teeth of all planets
     pins = np.array([[-5e-6, 0.0], [-4e-6, 2e-6], [-6e-6, 1e-6]])
     errors = replace(no_deviations(gears), pin_errors=pins)
     seen = mirrored_deviations(errors, gears, image, order)
-    found = walk_either_flank(gears, bodies, sun_torque=-TORQUE, deviations=errors, **options)
+    found = walk_mesh_cycle(gears, bodies, sun_torque=-TORQUE, deviations=errors, **options)
     behind = walk_mesh_cycle(image, bodies, sun_torque=TORQUE, deviations=seen, **options)
     assert found.wedged.any()
     count = periods * P

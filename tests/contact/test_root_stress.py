@@ -8,20 +8,18 @@ import numpy as np
 import pytest
 from validation.planetary import reference_set
 from validation.reference.plane_elasticity import stress
+from validation.reference.root_stress import set_root_stress
 
-from femgear.contact.bodies import deformed_set, make_bodies, make_sectors
-from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
-from femgear.contact.flanks import flank_compliance, flank_stations
+from femgear.contact.bodies import flank_compliance, flank_stations, make_bodies, make_sectors
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.root_stress import (
     BACK,
     LOADED,
     observed_root_stress,
     root_stress,
     root_stress_cycle,
-    set_root_stress,
-    tooth_history,
-    worst_history,
 )
+from femgear.contact.tooth_loads import deformed_set
 from femgear.fe.compliance import symmetric_factor
 from femgear.fe.elasticity import Material, foundation, stiffness, tangential_stress
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
@@ -32,6 +30,7 @@ from femgear.gears.iso6336 import nominal_root_stress
 from femgear.gears.tooth import half_sector
 
 STEEL = Material(206e9, 0.3, 7850.0)
+BOTH = CycleOptions(both_flanks=True)
 ALPHA = math.radians(20)
 LOAD = 1000.0
 EXTERNAL = Gear(14, 3e-3, ALPHA, 0.3, 0.02, 0.009)
@@ -253,7 +252,7 @@ def wedged():
 def test_back_flanks_add_their_loads(wedged):
     """Also against the field of whole bodies; both flanks of the sun's teeth carry kilonewtons."""
     gears, sectors, bodies, pushed, roots = wedged
-    cycle = walk_mesh_cycle(gears, bodies, sun_torque=20.0, positions=4, both_flanks=True, deviations=pushed)
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=20.0, positions=4, options=BOTH, deviations=pushed)
     assert cycle.wedged[:3].all() and cycle.back_force[:3].min() > 1000.0
     assert cycle.back_tooth_load.sum(axis=1) == pytest.approx(cycle.back_force, rel=1e-12)
     stresses = root_stress_cycle(gears, roots, cycle)
@@ -270,7 +269,7 @@ def test_back_flanks_add_their_loads(wedged):
 def test_back_teeth_are_loaded_where_both_flanks_touch(wedged):
     """Back pairs roll through the mesh the other way and name teeth beside those of the drive pairs."""
     gears, _, bodies, pushed, _ = wedged
-    cycle = walk_mesh_cycle(gears, bodies, sun_torque=20.0, positions=4, both_flanks=True, deviations=pushed)
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=20.0, positions=4, options=BOTH, deviations=pushed)
     assert np.diff(cycle.back_path, axis=2) == pytest.approx(-np.diff(cycle.path, axis=2))
     for mesh in range(3):
         front, rear = (cycle.tooth_load, cycle.tooth), (cycle.back_tooth_load, cycle.back_tooth)
@@ -298,7 +297,7 @@ def test_loads_on_the_back_flanks_are_mirrored_loads(loaded):
 def test_reversed_wedging_is_mirrored_wedging(wedged):
     gears, _, bodies, pushed, roots = wedged
     one, two = (
-        walk_either_flank(gears, bodies, sun_torque=t, positions=4, both_flanks=True, deviations=pushed)
+        walk_mesh_cycle(gears, bodies, sun_torque=t, positions=4, options=BOTH, deviations=pushed)
         for t in (20.0, -20.0)
     )
     assert two.back_force[[0, 2, 1, 3, 5, 4]][:, -np.arange(4) % 4] == pytest.approx(one.back_force, rel=1e-9)
@@ -341,7 +340,7 @@ def test_equal_planets_give_equal_stresses(loaded):
 def test_history_of_a_tooth(loaded):
     gears, _, _, cycle, _, stresses = loaded
     for root in stresses[:2] + stresses[6:8]:
-        history = worst_history(root)
+        history = root.history()
         assert np.diff(history.path) == pytest.approx(1 / len(cycle.position), rel=1e-9)
         assert history.load.max() == pytest.approx(cycle.tooth_load[root.mesh].max())
         # it begins and ends without load of its own; what is left comes from the neighbours
@@ -371,18 +370,18 @@ def test_order_of_magnitude_is_that_of_the_standard(loaded):
 @pytest.mark.parametrize("periods", [1, 3])
 def test_reversed_torque_is_the_mirror_image(loaded, periods):
     gears, _, bodies, _, roots, stresses = loaded
-    cycle = walk_either_flank(gears, bodies, sun_torque=-100.0, positions=16, periods=periods)
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=-100.0, positions=16, periods=periods)
     back = root_stress_cycle(gears, roots, cycle, reverse=True)
     for one, other in zip(stresses, back, strict=True):
         assert one.kind == other.kind
         assert other.stress.max() == pytest.approx(one.stress.max(), rel=1e-3)
         assert (np.diff(other.path, axis=0) > 0).all()
-        history = worst_history(other)
+        history = other.history()
         # one tooth on its way, as under the positive torque: no step is longer than the others
         assert np.diff(history.path) == pytest.approx(1 / 16, rel=1e-9)
         assert history.stress.max() == other.stress.max()
         assert history.load[0] == history.load[-1] == 0.0
-        tension, forward = (h.stress[:, LOADED].max(axis=-1) for h in (history, worst_history(one)))
+        tension, forward = (h.stress[:, LOADED].max(axis=-1) for h in (history, one.history()))
         assert np.abs(np.diff(tension)).max() <= 1.01 * np.abs(np.diff(forward)).max()
 
 
@@ -403,6 +402,6 @@ def test_records_of_several_periods_repeat(loaded):
     )
     for a, b in zip(one, three, strict=True):
         for start in range(3):
-            short, long = tooth_history(a), tooth_history(b, start=start)
+            short, long = a.history(0), b.history(start)
             assert long.path == pytest.approx(short.path)
             assert long.stress == pytest.approx(short.stress, rel=1e-6, abs=1.0)

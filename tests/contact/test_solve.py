@@ -6,8 +6,8 @@ import daqp
 import numpy as np
 import pytest
 from validation.reference.closed_form import share_load
+from validation.reference.hertz import surface_relative_to_depth
 
-from femgear.contact.halfplane import surface_relative_to_depth
 from femgear.contact.solve import mesh_tangent_matrix, solve_contact, tangent_stiffness
 from femgear.errors import ContactError
 
@@ -273,7 +273,7 @@ def hertz(load, cells, width):
     """Parabolic gap over the cells of one window of a half plane, and its solution under a load."""
     from scipy.linalg import toeplitz
 
-    from femgear.contact.halfplane import surface_displacement
+    from femgear.contact.local_compliance import surface_displacement
 
     cell = width / cells
     x = (np.arange(cells) + 0.5 - 0.5 * cells) * cell

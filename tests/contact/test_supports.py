@@ -7,10 +7,11 @@ import pytest
 from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.supports import Supports, force_directions, moving_members
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.supports import RIGID, Supports, moving_members
 from femgear.errors import ContactError
 from femgear.fe.elasticity import Material
+from femgear.gears.kinematics import mesh_normals
 from femgear.gears.planetary import equal_planet_angles
 
 STEEL = Material(206e9, 0.3, 7850.0)
@@ -28,8 +29,9 @@ def bodies(gears):
     return make_bodies(make_sectors(gears, STEEL, flank_elements=12), STEEL)
 
 
-def walk(gears, bodies, **options):
-    return walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, **options)
+def walk(gears, bodies, *, planet_gaps=None, supports=RIGID):
+    options = CycleOptions(planet_gaps=planet_gaps)
+    return walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=8, supports=supports, options=options)
 
 
 def test_a_floating_sun_shares_equally_among_three_planets_whatever_the_gaps(gears, bodies):
@@ -59,7 +61,7 @@ def test_springs_carry_what_the_meshes_leave(gears, bodies):
     """Force of every spring against the vector sum of the mesh forces on its member."""
     stiffness = {"sun": 5e7, "carrier": 2e8, "ring": 1e9, "planet": 3e8}
     cycle = walk(gears, bodies, planet_gaps=GAPS, supports=Supports(**stiffness))
-    on_planet, on_ring = force_directions(gears)
+    on_planet, on_ring = np.split(mesh_normals(gears), 2)
     sun_planet, planet_ring = cycle.force[:3], cycle.force[3:]
     expected = {
         "sun": -(on_planet.T @ sun_planet),
@@ -81,7 +83,7 @@ def test_bearings_lengthen_the_path_by_their_own_deflection(gears, bodies):
     stiff = walk(gears, bodies)
     k = 3e8
     soft = walk(gears, bodies, supports=Supports(planet=k))
-    on_planet, on_ring = force_directions(gears)
+    on_planet, on_ring = np.split(mesh_normals(gears), 2)
     # work of both mesh forces on the pin: (n1 - n2) F / k, projected on n1 - n2
     extra = stiff.force[0] * ((on_planet[0] - on_ring[0]) ** 2).sum() / k
     flanks = soft.deflection - stiff.deflection
@@ -109,7 +111,7 @@ def test_four_planets_on_a_floating_sun_share_in_opposite_pairs(gears, bodies):
     four = replace(gears, planet_angles=angles)
     cycle = walk(four, bodies, planet_gaps=[4e-6, 0.0, 0.0, 0.0], supports=Supports(sun=0.0))
     assert cycle.residual.max() < 1e-9
-    on_planet, _ = force_directions(four)
+    on_planet, _ = np.split(mesh_normals(four), 2)
     assert np.abs(on_planet.T @ cycle.force[:4]).max() < 1e-9 * cycle.force.max()
     assert np.abs(cycle.load_share - 0.25).max() > 0.005
 

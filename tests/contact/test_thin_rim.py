@@ -8,7 +8,7 @@ from validation import rims
 from validation.cases import reference_case
 from validation.whole_gear import Held, by_sector, loads_of
 
-from femgear.contact.flanks import LEFT
+from femgear.contact.flank_pairs import LEFT
 from femgear.fe.grid import ordered_nodes
 
 # of the whole gears in cubic elements; the rows of validation and the slow test take finer ones

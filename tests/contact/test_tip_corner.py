@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from validation.planetary import reference_set
 from validation.reference.graded_teeth import graded_sector
+from validation.reference.held_sector import held_sector_compliance
 from validation.torque_rotation import (
     PLANET_RING,
     corner_bodies,
@@ -15,10 +16,9 @@ from validation.torque_rotation import (
     mesh_alone,
 )
 
-from femgear.contact.candidates import cell_centres, cell_edges, equal_cells
-from femgear.contact.flanks import held_sector_compliance, station_weights
-from femgear.contact.halfplane import surface_displacement
-from femgear.contact.tip_corner import TipCorner, _excess, apex_excess, tip_corner
+from femgear.contact.assembly import cell_centres, cell_edges, equal_cells
+from femgear.contact.bodies import station_weights
+from femgear.contact.local_compliance import TipCorner, _excess, apex_excess, surface_displacement, tip_corner
 from femgear.fe.compliance import symmetric_factor
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import mirror, ordered_nodes

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.contact.flanks import flank_load_columns, flank_stations
+from femgear.contact.bodies import flank_load_columns, flank_stations
 from femgear.errors import GridError
 from femgear.fe.compliance import (
     condense_sector,

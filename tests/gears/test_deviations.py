@@ -9,7 +9,7 @@ from deviation_sets import ALPHA, PLAY, SET, UM, make_set
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from femgear.contact.candidates import tooth_numbers
+from femgear.contact.flank_pairs import tooth_numbers
 from femgear.errors import GeometryError
 from femgear.gears.deviations import (
     Ovality,

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from deviation_sets import ALPHA, UM, make_set
 
-from femgear.contact.candidates import tooth_numbers
-from femgear.contact.sides import mirrored_set
+from femgear.contact.flank_pairs import mirrored_set, tooth_numbers
 from femgear.gears.deviations import (
     Ovality,
     Runout,

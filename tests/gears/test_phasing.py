@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from phase_patterns import cyclic_shares
 
-from femgear.contact.sides import flank_side
+from femgear.contact.flank_pairs import flank_side
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations

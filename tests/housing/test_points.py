@@ -2,16 +2,10 @@
 
 import numpy as np
 import pytest
+from validation.reference.sensor_in_time import heaviside_linear, passages, point_signals
 
 from femgear.errors import CaseError
-from femgear.housing.sensor import (
-    fixed_sensor_lines,
-    heaviside_linear,
-    heaviside_linear_lines,
-    passages,
-    point_signals,
-    unresolved_share,
-)
+from femgear.housing.sensor import fixed_sensor_lines, heaviside_linear_lines
 
 
 def random_field(harmonics, n_max, seed=7):
@@ -127,24 +121,8 @@ def test_linear_form_tends_to_the_exact_one_with_the_square_of_the_spacing():
     assert np.allclose(np.array(errors[:-1]) / errors[1:], 4, atol=0.15)
 
 
-def test_share_that_the_points_cannot_resolve():
-    field = np.zeros((2, 21), dtype=complex)
-    field[0, 0] = 100.0  # static: does not vibrate
-    field[1, 10 + 3], field[1, 10 - 9] = 4.0, 3.0
-    assert unresolved_share(field, 20) == pytest.approx(0.0, abs=1e-15)
-    assert unresolved_share(field, 18) == pytest.approx(0.6, rel=1e-14)
-    assert unresolved_share(np.zeros((2, 3)), 18) == 0
-
-
 @pytest.mark.parametrize("points", [2, 54.5, -1])
 def test_unusable_points_are_refused(points):
     with pytest.raises(CaseError) as caught:
         heaviside_linear_lines(random_field(2, 3), 108, 5.0, 0.0, points=points)
-    assert caught.value.code == "E-POINTS"
-
-
-@pytest.mark.parametrize("passed", [[0.1, 0.2], [0.1, 0.1, 0.4], [0.1, 0.2, 1.0], [0.1, 0.2, np.nan]])
-def test_unusable_passages_are_refused(passed):
-    with pytest.raises(CaseError) as caught:
-        heaviside_linear(np.ones((3, 10)), passed)
     assert caught.value.code == "E-POINTS"

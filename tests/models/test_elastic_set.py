@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
-from femgear.contact.assembly import mesh_pairs
 from femgear.contact.bodies import active_flank_load, make_sectors
-from femgear.contact.candidates import separation
+from femgear.contact.flank_pairs import mesh_pairs, separation
 from femgear.errors import CaseError, ContactError
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import copy_nodes, rotated_copies

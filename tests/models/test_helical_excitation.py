@@ -125,6 +125,6 @@ def test_what_cannot_be_is_refused():
     for options in ({"slices": 0}, {"slices": 1.5}, {"hand": 0}):
         with pytest.raises(CaseError, match="E-HELICAL"):
             helical_excitation(record(), 1.0, **{"slices": 2} | options)
-    empty = cycle_without_load(1, TAU, periods=1, contact="profile", cells=9)
+    empty = cycle_without_load(1, TAU, periods=1, contact="profile")
     with pytest.raises(CaseError, match="E-MESH-STIFFNESS"):
         helical_excitation(empty, 1.0)

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from femgear.contact.halfplane import (
+from femgear.contact.solve import solve_contact
+from validation.reference.hertz import (
     HertzLine,
     cell_influence,
     contact_modulus,
@@ -15,7 +16,6 @@ from femgear.contact.halfplane import (
     surface_relative_to_depth,
     weber_banaschek,
 )
-from femgear.contact.solve import solve_contact
 from validation.rows import REPEATED, Row, at_most, printed, within
 
 HERTZ = "Hertz (Johnson, Contact Mechanics, 4.2)"

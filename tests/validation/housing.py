@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band, symmetry_leakage
-from femgear.housing.sensor import (
-    fixed_sensor_lines,
-    hanning_model,
-    heaviside_linear,
-    heaviside_linear_lines,
-    passages,
-    point_signals,
-)
+from femgear.housing.orders import BandAnalysis, OrderSpectrum, analyse_band
+from femgear.housing.sensor import fixed_sensor_lines, hanning_model, heaviside_linear_lines
 from validation.cases import PAPER, reference_case, reference_dynamics, reference_housing, reference_modes
+from validation.reference.sensor_in_time import heaviside_linear, passages, point_signals, symmetry_leakage
 from validation.rows import Row, at_most, counted, information, within
 
 SLOW, FAST = 0, 1

@@ -7,12 +7,13 @@ from functools import cache
 
 import numpy as np
 
-from femgear.contact.assembly import mesh_pairs
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_either_flank, walk_mesh_cycle
-from femgear.contact.supports import Supports, force_directions
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.flank_pairs import mesh_pairs
+from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
+from femgear.gears.kinematics import mesh_normals
 from femgear.gears.modifications import FlankForm, TipRelief
 from validation.cases import reference_static
 from validation.rows import Row, at_most, within
@@ -27,7 +28,7 @@ def _walk(*, torque=TORQUE, positions=16, pins=None, forms=None, supports=None):
     deviations = forms or no_deviations(static.planetary_set)
     if pins is not None:
         deviations = replace(deviations, pin_errors=np.asarray(pins, float))
-    return walk_either_flank(
+    return walk_mesh_cycle(
         static.planetary_set,
         static.bodies,
         sun_torque=torque,
@@ -51,7 +52,7 @@ def sharing() -> tuple[Row, ...]:
     alpha = gears.working_pressure_angle_sun_planet, gears.working_pressure_angle_planet_ring
     bearing = 3e8
     soft = _walk(supports=Supports(planet=bearing))
-    on_planet, on_ring = force_directions(gears)
+    on_planet, on_ring = np.split(mesh_normals(gears), 2)
     given_way = _plain().force[0].mean() * ((on_planet[0] - on_ring[0]) ** 2).sum() / bearing
     name = "floating sun, three planets, unequal pin errors: largest departure from 1/3"
     return (

@@ -5,15 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_spectrum
-from femgear.housing.sensor import (
-    fixed_sensor_lines,
-    hanning_model,
-    heaviside_linear,
-    heaviside_linear_lines,
-    passages,
-    phased_harmonics,
-    point_signals,
-)
+from femgear.housing.sensor import fixed_sensor_lines, hanning_model, heaviside_linear_lines
+from validation.reference.sensor_in_time import heaviside_linear, passages, phased_harmonics, point_signals
 from validation.rows import Row, at_most, counted, printed, within
 
 Z_RING, POINTS = 108, 54

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from femgear.contact.halfplane import contact_modulus, hertz_line, relative_radius
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import speeds, torques
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles, feasible_angles
 from femgear.gears.profile import BasicRack
 from validation.reference.gear_limits import neighbour_limit
+from validation.reference.hertz import contact_modulus, hertz_line, relative_radius
 from validation.rows import REPEATED, Row, at_most, counted, printed, within
 
 ALPHA = math.radians(20.0)

@@ -12,9 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.bodies import RING_STATE, TEETH_STATE, Sector, make_sectors
-from femgear.contact.flanks import LEFT, RIGHT, FlankCompliance, flank_stations, station_weights
-from femgear.contact.halfplane import surface_displacement
+from femgear.contact.bodies import (
+    RING_STATE,
+    TEETH_STATE,
+    FlankCompliance,
+    Sector,
+    flank_stations,
+    make_sectors,
+    station_weights,
+)
+from femgear.contact.flank_pairs import LEFT, RIGHT
+from femgear.contact.local_compliance import surface_displacement
 from femgear.fe.compliance import mirror_nodes
 from validation.cases import reference_case
 from validation.rows import Row, at_most, information

@@ -10,7 +10,7 @@ from published.iso6336_stiffness import mesh_stiffness_method_b
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.solve import mesh_tangent_matrix, solve_contact
 from validation.cases import reference_static
 from validation.reference.closed_form import share_load
@@ -134,7 +134,7 @@ def numerical_parameters() -> tuple[Row, ...]:
         bodies = make_bodies(static.sectors, material, depth=factor * 0.25 * module)
         rows.extend(_changes(f"half-plane depth times {factor:.2g}", _walk(bodies)))
     rows.extend(_changes("positions doubled", _walk(static.bodies, positions=2 * POSITIONS)))
-    rows.extend(_changes("pressure cells doubled", _walk(static.bodies, cells=72)))
+    rows.extend(_changes("pressure cells doubled", _walk(static.bodies, options=CycleOptions(cells=72))))
     return tuple(rows)
 
 

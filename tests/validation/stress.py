@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.bodies import flank_stations, make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.flanks import flank_stations
 from femgear.contact.root_stress import root_stress
 from femgear.fe.compliance import dof_pairs, symmetric_factor
 from femgear.fe.elasticity import Material, stiffness

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from femgear.contact.halfplane import cell_influence, contact_modulus, hertz_line, relative_radius
 from femgear.contact.solve import solve_contact
+from validation.reference.hertz import cell_influence, contact_modulus, hertz_line, relative_radius
 
 STEEL = contact_modulus(206e9, 0.3, 206e9, 0.3)
 

@@ -5,7 +5,8 @@ import pytest
 from scipy.special import jv
 
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_spectrum
-from femgear.housing.sensor import fixed_sensor_lines, hanning_model, heaviside_linear_lines, phased_harmonics
+from femgear.housing.sensor import fixed_sensor_lines, hanning_model, heaviside_linear_lines
+from validation.reference.sensor_in_time import phased_harmonics
 
 THETA = 2 * np.pi * np.arange(4096) / 4096
 

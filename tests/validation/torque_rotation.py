@@ -13,9 +13,16 @@ from functools import cache
 
 import numpy as np
 
-from femgear.contact.assembly import Bodies, assemble_contact, mesh_windows
-from femgear.contact.bodies import RING_STATE, make_bodies, make_sectors
-from femgear.contact.flanks import flank_load_columns, flank_stations, joining_depth
+from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.bodies import (
+    RING_STATE,
+    Bodies,
+    flank_load_columns,
+    flank_stations,
+    joining_depth,
+    make_bodies,
+    make_sectors,
+)
 from femgear.contact.solve import solve_contact, tangent_stiffness
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.contact.assembly import Bodies, assemble_contact, mesh_pairs, mesh_windows
-from femgear.contact.flanks import held_sector_compliance
-from femgear.contact.halfplane import HertzLine, contact_modulus, hertz_line, relative_radius
+from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.bodies import Bodies
+from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.solve import solve_contact
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import mirror
@@ -25,6 +25,8 @@ from femgear.gears.gear import Gear, flank_points, half_thickness_angle
 from femgear.gears.tooth import half_sector
 from validation.mortar import boundary_dofs, make_surface, mortar_contact
 from validation.planetary import reference_set
+from validation.reference.held_sector import held_sector_compliance
+from validation.reference.hertz import HertzLine, contact_modulus, hertz_line, relative_radius
 from validation.rows import Row, at_most, information, within
 
 STEEL = Material(206e9, 0.3, 7850.0)

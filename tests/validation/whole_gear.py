@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.assembly import mesh_pairs
-from femgear.contact.flanks import LEFT, RIGHT
+from femgear.contact.flank_pairs import LEFT, RIGHT, mesh_pairs
 from femgear.fe.compliance import cyclic_displacement, symmetric_factor
 from femgear.fe.grid import copy_nodes, rotated_copies
 from validation.reference.plane_elasticity import edge_load, to_skfem

@@ -18,7 +18,7 @@ from femgear.storage.dataset import FOURIER, RPM, _mesh_names, complex_entries, 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.contact.assembly import Bodies
+    from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
     from femgear.housing.sensor import HousingSignal, SensorLines

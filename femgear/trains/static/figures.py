@@ -769,9 +769,10 @@ def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
 
 def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     """The whole set deformed by the static loads of position zero, as VTU and picture."""
-    from femgear.contact.bodies import deformed_set, make_sectors
+    from femgear.contact.bodies import make_sectors
     from femgear.contact.cycle import walk_mesh_cycle
-    from femgear.contact.sides import mirrored_set
+    from femgear.contact.flank_pairs import mirrored_set
+    from femgear.contact.tooth_loads import deformed_set
     from femgear.fe.elasticity import Material
     from femgear.fe.grid import copy_nodes, rotated_copies
     from femgear.report.scene import assemble_set, deformed_picture, placed, write_vtu

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.dependencies import Entries
-from femgear.contact.root_stress import BACK, LOADED, RootCycle, worst_history
+from femgear.contact.root_stress import BACK, LOADED, RootCycle
 from femgear.report.tables import Block
 from femgear.storage.dataset import dataset
 from femgear.trains.static.checks import static_warnings
@@ -20,11 +20,10 @@ from femgear.trains.static.checks import static_warnings
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.contact.assembly import Bodies
-    from femgear.contact.bodies import Sectors
+    from femgear.contact.bodies import Bodies, Sectors
     from femgear.contact.cycle import MeshCycle
-    from femgear.contact.load_spectrum import LoadSpectrum, RootRange
-    from femgear.contact.root_stress import RootStresses
+    from femgear.contact.root_stress import RootRange, RootStresses
+    from femgear.contact.tooth_loads import LoadSpectrum
     from femgear.gears.planetary import PlanetarySet
 
 COUNTING = (
@@ -414,7 +413,7 @@ def _pressure_entries(cycle) -> dict:
 def _row(root: RootCycle, points: int) -> dict[str, np.ndarray]:
     """Variables of one gear of one mesh, points padded with NaN."""
     slot, position, _ = root.worst
-    history = worst_history(root)
+    history = root.history()
 
     def padded(values):
         missing = [(0, 0)] * (values.ndim - 1) + [(0, points - values.shape[-1])]

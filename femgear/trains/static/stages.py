@@ -17,7 +17,8 @@ import numpy as np
 from femgear.case.case import planetary_set, set_deviations
 from femgear.case.dependencies import check_entries, static_entries
 from femgear.case.sections import Case
-from femgear.contact.load_spectrum import load_spectrum, loaded_teeth, root_ranges
+from femgear.contact.root_stress import root_ranges
+from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
 from femgear.errors import GeometryError
 from femgear.threads import one_blas_thread
 from femgear.trains.protocol import Progress, Stage
@@ -59,7 +60,7 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
     GeometryError, GridError, ContactError
     """
     from femgear.contact.bodies import make_bodies, make_sectors
-    from femgear.contact.cycle import walk_either_flank
+    from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
     from femgear.fe.elasticity import Material
     from femgear.gears.deviations import common_period
     from femgear.gears.kinematics import torques
@@ -71,7 +72,7 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
     bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
     sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
-    cycle = walk_either_flank(
+    cycle = walk_mesh_cycle(
         gears,
         bodies,
         sun_torque=sun_torque,
@@ -81,9 +82,11 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
         deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
         supports=_supports(case),
         periods=periods,
-        both_flanks=case.static.back_flanks,
-        pressures=case.static.stresses and periods == 1,
-        progress=None if progress is None else lambda done, total: progress("contact", done, total),
+        options=CycleOptions(
+            both_flanks=case.static.back_flanks,
+            pressures=case.static.stresses and periods == 1,
+            progress=None if progress is None else lambda done, total: progress("contact", done, total),
+        ),
     )
     check_motions(cycle, gears.sun.module)
     return StaticResult(gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message)

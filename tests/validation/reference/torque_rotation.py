@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from validation.reference.flank_mortar import PlacedFlank, flank_contact, smallest_separation
 from validation.reference.graded_teeth import Side, flank_curve, graded_sector
+from validation.reference.hertz import contact_modulus, hertz_line, relative_radius
 from validation.reference.torque_balance import balanced_loads
 
-from femgear.contact.halfplane import contact_modulus, hertz_line, relative_radius
 from femgear.errors import ContactError
 from femgear.gears.gear import half_thickness_angle
 from femgear.threads import one_blas_thread

@@ -3,18 +3,17 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
-
-from femgear.contact.halfplane import (
+from validation.reference.hertz import (
     cell_influence,
     contact_modulus,
-    depth_displacement,
     hertz_line,
     point_surface_relative_to_depth,
     relative_radius,
-    surface_displacement,
     surface_relative_to_depth,
     weber_banaschek,
 )
+
+from femgear.contact.local_compliance import depth_displacement, hertz_half_width, surface_displacement
 from femgear.errors import ContactError
 
 E, NU = 206e9, 0.3
@@ -140,9 +139,6 @@ def test_no_load_no_contact():
 def test_relative_radius_of_a_hollow_surface():
     assert relative_radius(0.05, -0.075) == pytest.approx(0.15)
     assert relative_radius(0.05, np.float64(1e9)) == pytest.approx(0.05)
-    for radii in ((0.05, -0.05), (0.05, -0.04), (0.0, 1.0), (np.nan, 1.0)):
-        with pytest.raises(ContactError, match="E-HALFPLANE"):
-            relative_radius(*radii)
 
 
 @pytest.mark.parametrize(
@@ -151,16 +147,14 @@ def test_relative_radius_of_a_hollow_surface():
         lambda: surface_displacement(0.0, 0.0, MU, NU),
         lambda: surface_displacement(0.0, 1e-5, -MU, NU),
         lambda: depth_displacement(0.0, 0.0, MU, NU),
-        lambda: point_surface_relative_to_depth(1.0, np.nan, MU, NU),
-        lambda: surface_relative_to_depth(0.0, 1e-5, -1e-4, MU, NU),
-        lambda: surface_relative_to_depth(0.0, 1e-5, 1e-4, MU, 0.5),
-        lambda: surface_relative_to_depth(0.0, 1e-5, 1e-4, MU, np.nan),
-        lambda: cell_influence(0.0, 1e-5, np.inf, 1e11),
-        lambda: contact_modulus(E, 0.6, E, 0.3),
-        lambda: hertz_line(-1.0, 0.01, 1e11),
-        lambda: hertz_line(np.nan, 0.01, 1e11),
-        lambda: hertz_line(1.0, -0.01, 1e11),
-        lambda: weber_banaschek(1.0, 0.0, 1e-3, E, NU),
+        lambda: depth_displacement(1.0, np.nan, MU, NU),
+        lambda: surface_displacement(0.0, -1e-5, MU, NU),
+        lambda: surface_displacement(0.0, 1e-5, MU, 0.5),
+        lambda: depth_displacement(0.0, 1e-4, MU, np.nan),
+        lambda: hertz_half_width(-1.0, 0.01, 1e11),
+        lambda: hertz_half_width(np.nan, 0.01, 1e11),
+        lambda: hertz_half_width(1.0, -0.01, 1e11),
+        lambda: hertz_half_width(1.0, 0.01, np.inf),
     ],
 )
 def test_impossible_values_are_refused(call):

@@ -1,12 +1,7 @@
-"""Local line contact on a plane-strain half plane: influence functions and Hertz's closed forms.
+"""Hertz's line contact in closed form, and influence functions of plane-strain half planes.
 
-Flamant's solution (K. L. Johnson, Contact Mechanics, 1985, section 2.2): a line load ``P`` [N/m] at the
-origin of the surface moves a point at distance ``x`` along the surface and depth ``z`` into the body by
-
-    w(x, z) = P / (4 pi mu) [-4 (1 - nu) ln r + 2 z^2 / r^2],    r^2 = x^2 + z^2
-
-up to a rigid motion; here the constant is the one of this formula with ``r`` in metres. Only differences
-of two displacements mean anything, and in these the constant drops out.
+Flamant's solution with the datum of `femgear.contact.local_compliance`; Johnson is K. L. Johnson, Contact
+Mechanics, 1985.
 """
 
 from __future__ import annotations
@@ -14,70 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import xlogy
 
-from femgear.errors import ContactError
-
-
-def surface_displacement(x, half_width, shear_modulus, poisson_ratio):
-    """Displacement of the surface into the body under a cell of uniform pressure.
-
-    Mean of Flamant's ``w(x - s, 0)`` over ``|s| <= half_width`` (Johnson, section 2.5, uniform pressure).
-
-    Parameters
-    ----------
-    x : array of any shape
-        Distance from the middle of the cell [m].
-    half_width : float
-        Half width of the cell [m].
-    shear_modulus : float
-        [Pa].
-    poisson_ratio : float
-
-    Returns
-    -------
-    array, shape of `x`
-        Displacement [m] per unit line load [N/m] on the cell, with the datum of this module.
-
-    Raises
-    ------
-    ContactError
-        For a half width or shear modulus that is not positive, or Poisson's ratio outside (-1, 1/2).
-    """
-    x = np.asarray(x, float)
-    _check(half_width, None, shear_modulus, poisson_ratio)
-    ends = (x + half_width, x - half_width)
-    mean_log = (_x_log(ends[0]) - _x_log(ends[1])) / (2 * half_width) - 1.0
-    return -(1 - poisson_ratio) / (np.pi * shear_modulus) * mean_log
-
-
-def depth_displacement(x, depth, shear_modulus, poisson_ratio):
-    """Displacement, in the direction of the load, of a point at `depth` under the surface.
-
-    Flamant's ``w(x, depth)`` for a line load on the surface, with the datum of `surface_displacement`.
-
-    Parameters
-    ----------
-    x : array of any shape
-        Distance along the surface between the load and the foot of the point [m].
-    depth : float
-        [m].
-    shear_modulus : float
-        [Pa].
-    poisson_ratio : float
-
-    Returns
-    -------
-    array, shape of `x`
-        Displacement [m] per unit line load [N/m].
-
-    Raises
-    ------
-    ContactError
-        As `surface_displacement`, and for a depth that is not positive.
-    """
-    _check(None, depth, shear_modulus, poisson_ratio)
-    r2 = np.square(np.asarray(x, float)) + depth**2
-    return (-2 * (1 - poisson_ratio) * np.log(r2) + 2 * depth**2 / r2) / (4 * np.pi * shear_modulus)
+from femgear.contact.local_compliance import hertz_half_width
 
 
 def point_surface_relative_to_depth(x, depth, shear_modulus, poisson_ratio):
@@ -99,13 +33,7 @@ def point_surface_relative_to_depth(x, depth, shear_modulus, poisson_ratio):
     -------
     array, shape of `x`
         Approach [m] per unit line load [N/m].
-
-    Raises
-    ------
-    ContactError
-        As `depth_displacement`.
     """
-    _check(None, depth, shear_modulus, poisson_ratio)
     x2 = np.square(np.asarray(x, float))
     with np.errstate(divide="ignore"):
         logarithm = np.log1p(depth**2 / x2)
@@ -138,14 +66,8 @@ def surface_relative_to_depth(x, half_width, depth, shear_modulus, poisson_ratio
     -------
     array, shape of `x`
         Approach [m] per unit line load [N/m] on the cell.
-
-    Raises
-    ------
-    ContactError
-        For a half width, depth or shear modulus that is not positive, or Poisson's ratio outside (-1, 1/2).
     """
     x = np.asarray(x, float)
-    _check(half_width, depth, shear_modulus, poisson_ratio)
     logarithms = _t_log1p(x + half_width, depth) - _t_log1p(x - half_width, depth)
     # difference of two arctangents in one step: no cancellation far from the cell
     angle = np.arctan2(2 * half_width * depth, depth**2 + x**2 - half_width**2)
@@ -174,18 +96,10 @@ def cell_influence(x, half_width, datum, contact_modulus):
     -------
     array, shape of `x`
         Approach [m] per unit line load [N/m] on the cell.
-
-    Raises
-    ------
-    ContactError
-        When an argument is not positive.
     """
-    _positive(half_width, "half width")
-    _positive(datum, "datum")
-    _positive(contact_modulus, "contact modulus")
     x = np.asarray(x, float) / datum
     h = half_width / datum
-    mean_log = (_x_log(x + h) - _x_log(x - h)) / (2 * h) - 1.0
+    mean_log = (xlogy(x + h, np.abs(x + h)) - xlogy(x - h, np.abs(x - h))) / (2 * h) - 1.0
     return -2.0 / (np.pi * contact_modulus) * mean_log
 
 
@@ -193,36 +107,13 @@ def contact_modulus(youngs_modulus_1, poisson_ratio_1, youngs_modulus_2, poisson
     """``E*`` of two bodies in plane strain, ``1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2`` [Pa].
 
     Johnson, Contact Mechanics, eq. 4.1 and appendix 3.
-
-    Raises
-    ------
-    ContactError
-        For a modulus that is not positive or Poisson's ratio outside (-1, 1/2).
     """
-    for modulus, ratio in ((youngs_modulus_1, poisson_ratio_1), (youngs_modulus_2, poisson_ratio_2)):
-        _check(None, None, modulus, ratio)
     return 1.0 / ((1 - poisson_ratio_1**2) / youngs_modulus_1 + (1 - poisson_ratio_2**2) / youngs_modulus_2)
 
 
 def relative_radius(radius_1, radius_2):
-    """Relative radius of curvature [m], ``1/R = 1/R_1 + 1/R_2``; a hollow surface has a negative radius.
-
-    Raises
-    ------
-    ContactError
-        When the surfaces are conformal or the hollow one is the more curved: no line contact.
-    """
-    for radius in (radius_1, radius_2):
-        _positive(abs(radius), "magnitude of a radius")
-    curvature = 1.0 / radius_1 + 1.0 / radius_2
-    if curvature <= 0:
-        raise ContactError(
-            f"surfaces of radii {radius_1} and {radius_2} m do not make a line contact",
-            code="E-HALFPLANE",
-            value=curvature,
-            limit="1/R1 + 1/R2 > 0; a hollow surface has a negative radius",
-        )
-    return 1.0 / curvature
+    """Relative radius of curvature [m], ``1/R = 1/R_1 + 1/R_2``; a hollow surface has a negative radius."""
+    return 1.0 / (1.0 / radius_1 + 1.0 / radius_2)
 
 
 @dataclass(frozen=True)
@@ -292,17 +183,8 @@ def hertz_line(line_load, radius, modulus):
     Returns
     -------
     HertzLine
-
-    Raises
-    ------
-    ContactError
-        For a negative load, or a radius or modulus that is not positive.
     """
-    _positive(radius, "relative radius")
-    _positive(modulus, "contact modulus")
-    if not 0 <= line_load < np.inf:
-        _refuse("the line load [N/m]", line_load, "zero or above, finite")
-    half_width = float(np.sqrt(4 * line_load * radius / (np.pi * modulus)))
+    half_width = hertz_half_width(line_load, radius, modulus) if line_load else 0.0
     peak = float(2 * line_load / (np.pi * half_width)) if half_width else 0.0
     return HertzLine(float(line_load), float(radius), float(modulus), half_width, peak)
 
@@ -330,40 +212,12 @@ def weber_banaschek(line_load, half_width, depth, youngs_modulus, poisson_ratio)
     -------
     float
         Approach [m].
-
-    Raises
-    ------
-    ContactError
-        For a half width, depth or modulus that is not positive, or Poisson's ratio outside (-1, 1/2).
     """
-    _check(half_width, depth, youngs_modulus, poisson_ratio)
     factor = 2 * line_load * (1 - poisson_ratio**2) / (np.pi * youngs_modulus)
     return float(factor * (np.log(2 * depth / half_width) - poisson_ratio / (2 * (1 - poisson_ratio))))
-
-
-def _x_log(t):
-    """``t ln|t|``, continued by zero."""
-    return t * np.log(np.where(t == 0, 1.0, np.abs(t)))
 
 
 def _t_log1p(t, depth):
     """``t ln(1 + depth^2 / t^2)``, continued by zero."""
     safe = np.where(t == 0, 1.0, t)
     return np.where(t == 0, 0.0, t * np.log1p((depth / safe) ** 2))
-
-
-def _check(half_width, depth, modulus, poisson_ratio):
-    for value, name in ((half_width, "half width"), (depth, "depth"), (modulus, "elastic modulus")):
-        if value is not None:
-            _positive(value, name)
-    if not -1 < poisson_ratio < 0.5:
-        _refuse("Poisson's ratio", poisson_ratio, "-1 < nu < 0.5")
-
-
-def _positive(value, name):
-    if not np.all((np.asarray(value) > 0) & np.isfinite(value)):
-        _refuse(f"the {name}", value, "positive and finite")
-
-
-def _refuse(what, value, limit):
-    raise ContactError(f"{what} is {value}", code="E-HALFPLANE", value=value, limit=limit)

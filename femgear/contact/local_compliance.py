@@ -1,4 +1,12 @@
-"""What the corner at the tip of a tooth yields more than the half plane of its flank.
+"""What flanks yield beside the load: half plane, Hertz's half width, and the wedge at the tip of a tooth.
+
+Flamant's solution (K. L. Johnson, Contact Mechanics, 1985, section 2.2): a line load ``P`` [N/m] at the
+origin of the surface moves a point at distance ``x`` along the surface and depth ``z`` into the body by
+
+    w(x, z) = P / (4 pi mu) [-4 (1 - nu) ln r + 2 z^2 / r^2],    r^2 = x^2 + z^2
+
+up to a rigid motion; here the constant is the one of this formula with ``r`` in metres. Only differences
+of two displacements mean anything, and in these the constant drops out.
 
 Near a tip corner the tooth is a wedge between flank and tip land, not a half plane: the nearer the corner,
 the more it yields, by a logarithm that neither elements nor interpolation between stations can follow. The
@@ -16,14 +24,100 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.errors import ContactError
+
 if TYPE_CHECKING:
     from femgear.fe.elasticity import Material
     from femgear.gears.gear import Gear
 
-LINE = 0.5
+_REAL_PART = 0.5
 """Real part of the powers: between the resultant force (0) and the rotation (1)."""
-STEP, LAST = 0.1, 10.0
+_STEP, _LAST = 0.1, 10.0
 """Of the trapezoidal rule along the line, whose integrand decays faster than ``exp(-2 omega)``."""
+
+
+def surface_displacement(x, half_width, shear_modulus, poisson_ratio):
+    """Compute the displacement of the surface into the body under a cell of uniform pressure.
+
+    Mean of Flamant's ``w(x - s, 0)`` over ``|s| <= half_width`` (Johnson, section 2.5, uniform pressure).
+
+    Parameters
+    ----------
+    x : array of any shape
+        Distance from the middle of the cell [m].
+    half_width : float
+        Half width of the cell [m].
+    shear_modulus : float
+        [Pa].
+    poisson_ratio : float
+
+    Returns
+    -------
+    array, shape of `x`
+        Displacement [m] per unit line load [N/m] on the cell, with the datum of this module.
+
+    Raises
+    ------
+    ContactError
+        For a half width or shear modulus that is not positive, or Poisson's ratio outside (-1, 1/2).
+    """
+    x = np.asarray(x, float)
+    _check(half_width, "half width", shear_modulus, poisson_ratio)
+    ends = (x + half_width, x - half_width)
+    mean_log = (_x_log(ends[0]) - _x_log(ends[1])) / (2 * half_width) - 1.0
+    return -(1 - poisson_ratio) / (np.pi * shear_modulus) * mean_log
+
+
+def depth_displacement(x, depth, shear_modulus, poisson_ratio):
+    """Compute the displacement, in the direction of the load, of a point at `depth` under the surface.
+
+    Flamant's ``w(x, depth)`` for a line load on the surface, with the datum of `surface_displacement`.
+
+    Parameters
+    ----------
+    x : array of any shape
+        Distance along the surface between the load and the foot of the point [m].
+    depth : float
+        [m].
+    shear_modulus : float
+        [Pa].
+    poisson_ratio : float
+
+    Returns
+    -------
+    array, shape of `x`
+        Displacement [m] per unit line load [N/m].
+
+    Raises
+    ------
+    ContactError
+        As `surface_displacement`, and for a depth that is not positive.
+    """
+    _check(depth, "depth", shear_modulus, poisson_ratio)
+    r2 = np.square(np.asarray(x, float)) + depth**2
+    return (-2 * (1 - poisson_ratio) * np.log(r2) + 2 * depth**2 / r2) / (4 * np.pi * shear_modulus)
+
+
+def hertz_half_width(line_load: float, radius: float, modulus: float) -> float:
+    """Compute the half width [m] of Hertz's line contact, ``sqrt(4 P R / (pi E*))`` (Johnson, eq. 4.43).
+
+    Parameters
+    ----------
+    line_load : float
+        ``P`` [N/m].
+    radius : float
+        Relative radius of curvature ``R`` [m].
+    modulus : float
+        Contact modulus ``E*``, ``1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2`` [Pa].
+
+    Raises
+    ------
+    ContactError
+        When an argument is not positive.
+    """
+    for value, name in ((line_load, "line load"), (radius, "relative radius"), (modulus, "contact modulus")):
+        _positive(value, name)
+    return float(np.sqrt(4 * line_load * radius / (np.pi * modulus)))
 
 
 @dataclass(frozen=True)
@@ -104,9 +198,9 @@ def _excess(angle, r, theta, poisson_ratio):
 
     Wedge less half plane, at polar coordinates (r, theta) from the apex, theta from the loaded face.
     """
-    omega = np.arange(0.0, LAST + 0.5 * STEP, STEP)
-    power = LINE + 1j * omega
-    weight = np.where(omega == 0, 0.5, 1.0) * STEP / math.pi
+    omega = np.arange(0.0, _LAST + 0.5 * _STEP, _STEP)
+    power = _REAL_PART + 1j * omega
+    weight = np.where(omega == 0, 0.5, 1.0) * _STEP / math.pi
     kappa = 3 - 4 * poisson_ratio
     A, B, C, D = (_stress_function(angle, power) - _stress_function(math.pi, power)) * weight
     sine, cosine = (power + 1) * A + kappa * C, (power + 1) * B + kappa * D
@@ -138,3 +232,25 @@ def _stress_function(angle, power):
     matrix[:, 2:] /= np.exp(power.imag * angle)[:, None, None]
     right[:, 0, 0] = -1.0 / (power * up)
     return np.linalg.solve(matrix, right)[..., 0].T
+
+
+def _x_log(t):
+    """``t ln|t|``, continued by zero."""
+    return t * np.log(np.where(t == 0, 1.0, np.abs(t)))
+
+
+def _check(length, name: str, modulus, poisson_ratio):
+    """Refuse a length, shear modulus or Poisson's ratio that no half plane has."""
+    _positive(length, name)
+    _positive(modulus, "elastic modulus")
+    if not -1 < poisson_ratio < 0.5:
+        _refuse("Poisson's ratio", poisson_ratio, "-1 < nu < 0.5")
+
+
+def _positive(value, name):
+    if not np.all((np.asarray(value) > 0) & np.isfinite(value)):
+        _refuse(f"the {name}", value, "positive and finite")
+
+
+def _refuse(what, value, limit):
+    raise ContactError(f"{what} is {value}", code="E-HALFPLANE", value=value, limit=limit)

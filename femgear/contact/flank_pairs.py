@@ -1,0 +1,396 @@
+"""Mating flanks: their separation, which teeth meet, and the drive and the back side of all meshes.
+
+Both flanks are exact involutes. The separation of a point ``P`` of flank 1 from flank 2 is measured along
+the normal of flank 2 through ``P``, which is tangent to the base circle of gear 2: involutes of one base
+circle are parallel curves, so the distance is the base radius times the angle between their origins. The
+formula holds off the line of action and at tip corners as well. Deviations add separations of profiles along
+the flanks (`profile_form`) and of whole tooth pairs (`pair_separations`).
+
+Gear 1 drives. Its flank is drawn as a left flank; roll lengths on gear 1 grow with the path coordinate. Which
+teeth a pair consists of is told by `tooth_numbers`; tooth number zero of every gear stands where
+`femgear.gears.kinematics.orientations` has its centreline.
+
+The back flanks of a set are the drive flanks of its mirror image (`mirrored_set`), and so are the flanks that
+a negative torque loads (`loaded_image`). Mesh ``2N + j`` is the back side of mesh ``j``: its path coordinate
+runs backwards, and its flanks approach when those of mesh ``j`` part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.errors import ContactError
+from femgear.gears.deviations import (
+    body_separation,
+    mirrored_deviations,
+    profile_separation,
+    tooth_separation,
+)
+from femgear.gears.gear import working_half_angles
+from femgear.gears.kinematics import orientations
+
+if TYPE_CHECKING:
+    from femgear.gears.deviations import SetDeviations
+    from femgear.gears.gear import Gear
+    from femgear.gears.planetary import PlanetarySet
+
+LEFT, RIGHT = 0, 1
+"""Flanks of a tooth."""
+DRIVE_SIDE, BACK_SIDE = 1.0, -1.0
+"""Sides of a mesh: whether the path coordinate grows or falls with the position."""
+
+
+@dataclass(frozen=True)
+class FlankPair:
+    """Geometry of two mating flanks at a fixed centre distance.
+
+    Parameters
+    ----------
+    base_radius_1, base_radius_2 : float
+        [m].
+    centre_distance, pressure_angle : float
+        Working values [m], [rad].
+    sign : float
+        +1 for two external gears, -1 when gear 2 is internal.
+    limits_1, limits_2 : tuple of float
+        Smallest and largest roll length of the two flanks [m].
+    """
+
+    base_radius_1: float
+    base_radius_2: float
+    centre_distance: float
+    pressure_angle: float
+    sign: float
+    limits_1: tuple[float, float]
+    limits_2: tuple[float, float]
+
+    @property
+    def pitch_roll_1(self) -> float:
+        """Roll length of flank 1 at the pitch point [m]."""
+        return self.base_radius_1 * np.tan(self.pressure_angle)
+
+    @property
+    def pitch_roll_2(self) -> float:
+        """Roll length of flank 2 at the pitch point [m]."""
+        return self.base_radius_2 * np.tan(self.pressure_angle)
+
+    @property
+    def path(self) -> tuple[float, float]:
+        """Ends of the path of contact, measured from the pitch point in the direction of motion [m]."""
+        roll_2 = sorted(self.sign * (self.pitch_roll_2 - r) for r in self.limits_2)
+        start = max(self.limits_1[0] - self.pitch_roll_1, roll_2[0])
+        return start, min(self.limits_1[1] - self.pitch_roll_1, roll_2[1])
+
+    def roll_on(self, gear: int, zeta):
+        """Roll length [m] on gear 1 (0) or gear 2 (1) at path coordinates, kept on the path of contact."""
+        zeta = np.clip(zeta, *self.path)
+        return self.pitch_roll_1 + zeta if gear == 0 else self.pitch_roll_2 - self.sign * zeta
+
+
+def flank_pair(gear_1: Gear, gear_2: Gear, centre_distance: float, pressure_angle: float) -> FlankPair:
+    """Pair the flanks of two gears at a centre distance [m] and working pressure angle [rad].
+
+    Gear 2 may be internal.
+    """
+    ends_1 = sorted((_roll(gear_1, gear_1.form_radius), _roll(gear_1, gear_1.tip_radius)))
+    ends_2 = sorted((_roll(gear_2, gear_2.form_radius), _roll(gear_2, gear_2.tip_radius)))
+    return FlankPair(
+        base_radius_1=gear_1.base_radius,
+        base_radius_2=gear_2.base_radius,
+        centre_distance=centre_distance,
+        pressure_angle=pressure_angle,
+        sign=-1.0 if gear_2.internal else 1.0,
+        limits_1=(ends_1[0], ends_1[1]),
+        limits_2=(ends_2[0], ends_2[1]),
+    )
+
+
+def separation(pair: FlankPair, zeta, roll_1):
+    """Compute the separation of flank 1 from flank 2 and the roll length of the foot point on flank 2.
+
+    Parameters
+    ----------
+    pair : FlankPair
+    zeta : array
+        Path coordinate of the tooth pair [m].
+    roll_1 : array, broadcast with `zeta`
+        Roll length of the point on flank 1 [m].
+
+    Returns
+    -------
+    gap, roll_2 : arrays
+        Separation along the normal of flank 2 [m] and roll length of the foot point [m].
+    """
+    rb1, rb2, sign = pair.base_radius_1, pair.base_radius_2, pair.sign
+    # polar angle of an involute point: origin angle less the involute function of its pressure angle
+    origin = (pair.pitch_roll_1 + zeta) / rb1 - pair.pressure_angle
+    angle = origin - (roll_1 / rb1 - np.arctan2(roll_1, rb1))
+    radius = np.hypot(rb1, roll_1)
+    x = sign * (sign * pair.centre_distance - radius * np.cos(angle))
+    y = -sign * radius * np.sin(angle)
+    length = np.sqrt(np.maximum(x**2 + y**2 - rb2**2, 0.0))
+    involute = length / rb2 - np.arctan2(length, rb2)
+    origin_2 = (pair.pitch_roll_2 - sign * zeta) / rb2 - pair.pressure_angle
+    gap = sign * rb2 * (np.arctan2(y, x) + involute - origin_2)
+    return gap, length - sign * gap
+
+
+def admissible_arcs(pair: FlankPair, zeta):
+    """Find the range of arc length on flank 1 whose points and foot points both lie on the flanks.
+
+    Parameters
+    ----------
+    pair : FlankPair
+    zeta : array
+
+    Returns
+    -------
+    low, high : arrays of the shape of `zeta`
+        Arc lengths measured from the base circle along flank 1 [m].
+    """
+    zeta = np.asarray(zeta, float)
+    rb1 = pair.base_radius_1
+    low = np.full(zeta.shape, pair.limits_1[0] ** 2 / (2 * rb1))
+    high = np.full(zeta.shape, pair.limits_1[1] ** 2 / (2 * rb1))
+    for bound in range(2):
+        arc = _arc_of_foot(pair, zeta, pair.limits_2[bound])
+        # along flank 1 the foot point moves down an external flank 2 and up an internal one
+        if (bound == 0) == (pair.sign > 0):
+            high = np.minimum(high, arc)
+        else:
+            low = np.maximum(low, arc)
+    return low, high
+
+
+def mesh_pairs(planetary_set: PlanetarySet) -> tuple[FlankPair, FlankPair]:
+    """Flank pairs sun-planet and planet-ring of a set."""
+    s = planetary_set
+    return (
+        flank_pair(s.sun, s.planet, s.centre_distance, s.working_pressure_angle_sun_planet),
+        flank_pair(s.planet, s.ring, s.centre_distance, s.working_pressure_angle_planet_ring),
+    )
+
+
+def acting_flanks(n_planets: int) -> tuple[list, list, list]:
+    """Drive flanks (mesh, gear of the pair, side) of the sun, of every planet and of the ring."""
+    N = n_planets
+    # gear 2 of the sun mesh and gear 1 of the ring mesh are the same planet, on its two flanks
+    planets = [[(n, 1, LEFT), (N + n, 0, RIGHT)] for n in range(N)]
+    return [(j, 0, LEFT) for j in range(N)], planets, [(N + j, 1, LEFT) for j in range(N)]
+
+
+def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the teeth of gear 1 and gear 2, (2N, pairs) each, of the tooth pairs `index` (2N, pairs).
+
+    They are counted in each body's frame.
+
+    A pair of mesh j with index i touches at the pitch point when the position is ``-(phase_j + i)``; the
+    tooth is then at the planet's angle, less its half thickness, which fixes its place on the body.
+    """
+    s, N = planetary_set, planetary_set.n_planets
+    psi = np.asarray(s.planet_angles) - s.planet_angles[0]
+    turns = np.asarray(s.mesh_phases)[:, None] + index
+    sun = psi[:, None] / s.sun.pitch_angle + turns[:N] - s.mesh_phases[0]
+    ring = psi[:, None] / s.ring.pitch_angle - (turns[N:] - s.mesh_phases[N])
+    sun_side = working_half_angles(s.sun, s.planet, s.working_pressure_angle_sun_planet)[1]
+    ring_side = working_half_angles(s.planet, s.ring, s.working_pressure_angle_planet_ring)[0]
+    first = np.asarray(s.mesh_phases)[:N, None]
+    planet_sun = -(turns[:N] - first)
+    planet_ring = (sun_side + ring_side - np.pi) / s.planet.pitch_angle - (turns[N:] - first)
+    exact = np.concatenate([sun, planet_ring]), np.concatenate([planet_sun, ring])
+    first_gear, second_gear = (np.rint(e).astype(int) for e in exact)
+    if max(np.abs(exact[0] - first_gear).max(), np.abs(exact[1] - second_gear).max()) > 1e-3:
+        raise ContactError(
+            "the phases of the meshes and the positions of the teeth contradict one another",
+            code="E-CONTACT-PHASE",
+            remedy="planet angles must be whole multiples of 360/(z_sun + z_ring) degrees from one another",
+        )
+    return first_gear, second_gear
+
+
+@dataclass(frozen=True)
+class FlankSide:
+    """One side of all 2N meshes.
+
+    Parameters
+    ----------
+    direction : float
+        +1 where the path coordinate grows with the position, -1 on the back side.
+    phase : (2N,) array
+        Mesh phases of this side.
+    clearance : (2N,) array
+        Separation of this side when the drive flanks just touch: zero, or the backlash [m].
+    """
+
+    direction: float
+    phase: np.ndarray
+    clearance: np.ndarray
+
+
+def flank_side(planetary_set: PlanetarySet, direction: float) -> FlankSide:
+    """Phases and clearances of all meshes on the drive (+1) or back (-1) side."""
+    s, N = planetary_set, planetary_set.n_planets
+    if direction > 0:
+        return FlankSide(direction, np.asarray(s.mesh_phases), np.zeros(2 * N))
+    mirrored, order = mirrored_set(s)
+    phase = np.empty(2 * N)
+    phase[np.concatenate([order, order + N])] = mirrored.mesh_phases
+    phase += _mirrored_position(s, mirrored)
+    return FlankSide(direction, phase, np.repeat([s.backlash_sun_planet, s.backlash_planet_ring], N))
+
+
+def side_teeth(planetary_set: PlanetarySet, index: np.ndarray, direction: float):
+    """Find the teeth (2, 2N, pairs) of the pairs `index` (2N, pairs) of a side, in the drive side's count."""
+    if direction > 0:
+        return np.stack(tooth_numbers(planetary_set, index))
+    s, N = planetary_set, planetary_set.n_planets
+    mirrored, order = mirrored_set(s)
+    rows = np.concatenate([order, order + N])
+    teeth = np.empty((2, *index.shape), int)
+    teeth[:, rows] = -np.stack(tooth_numbers(mirrored, index[rows]))
+    # the tooth that the mirror image counts as zero stands here, counted in the original
+    here, image = orientations(s), orientations(mirrored, _mirrored_position(s, mirrored))
+    opposite = np.empty(N)
+    opposite[order] = image.planets
+
+    def offset(reflected, original, gear):
+        return np.rint((2 * s.planet_angles[0] - reflected - original) / gear.pitch_angle).astype(int)
+
+    of_planets = offset(opposite, np.array(here.planets), s.planet)[:, None]
+    teeth[0, :N] += offset(image.sun, here.sun, s.sun)
+    teeth[1, :N] += of_planets
+    teeth[0, N:] += of_planets
+    teeth[1, N:] += offset(image.ring, here.ring, s.ring)
+    return teeth
+
+
+def mirrored_set(planetary_set: PlanetarySet) -> tuple[PlanetarySet, np.ndarray]:
+    """Mirror a set: as it is seen from behind, and the place of each of its planets in the original one.
+
+    Returns
+    -------
+    PlanetarySet
+        Planet angles counted the other way round, ascending from the first planet.
+    order : (N,) int array
+        Mirrored planet ``i`` is original planet ``order[i]``.
+    """
+    angles = np.asarray(planetary_set.planet_angles)
+    turned = np.mod(angles[0] - angles, 2 * np.pi)
+    order = np.argsort(turned, kind="stable")
+    return replace(planetary_set, planet_angles=tuple(angles[0] + turned[order])), order
+
+
+def loaded_image(
+    planetary_set: PlanetarySet, sun_torque: float, deviations: SetDeviations | None = None
+) -> tuple[PlanetarySet, np.ndarray, SetDeviations | None]:
+    """Find the set whose drive flanks a torque loads: the set itself, or its mirror image.
+
+    The mirror image turns the other way: position ``tau`` of the set is position ``-tau`` of the image.
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    sun_torque : float
+        [N m]; a negative one loads the right flanks of the sun.
+    deviations : SetDeviations, optional
+
+    Returns
+    -------
+    PlanetarySet
+    order : (N,) int array
+        Its planet ``i`` is planet ``order[i]`` of the given set.
+    deviations : SetDeviations or None
+        As the returned set has them.
+    """
+    if sun_torque >= 0:
+        return planetary_set, np.arange(planetary_set.n_planets), deviations
+    mirrored, order = mirrored_set(planetary_set)
+    if deviations is not None:
+        deviations = mirrored_deviations(deviations, planetary_set, mirrored, order)
+    return mirrored, order, deviations
+
+
+def profile_form(
+    planetary_set: PlanetarySet, deviations: SetDeviations | None, kind: int, back: bool
+) -> Callable | None:
+    """Separation [m] by deviations of the profiles as a function of both roll lengths [m], or None.
+
+    `kind` is 0 for the sun-planet and 1 for the planet-ring meshes.
+    """
+    # on the back side a planet meets sun and ring with its other flanks
+    planet = "planet_sun_side" if (kind == 0) != back else "planet_ring_side"
+    forms = (planet, "ring" if kind else "sun")
+    if deviations is None or not any(getattr(deviations, name).modifications for name in forms):
+        return None
+    return lambda roll_1, roll_2: profile_separation(
+        deviations, planetary_set, kind, roll_1, roll_2, back=back
+    )
+
+
+def pair_separations(
+    planetary_set: PlanetarySet, deviations: SetDeviations | None, tooth, turns, tau, *, back: bool
+) -> np.ndarray:
+    """Separations of whole tooth pairs by errors of pitch and position [m], shape (2N, P, pairs).
+
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+    deviations : SetDeviations, optional
+    tooth : (2, 2N, pairs) int array
+        Tooth numbers during the first mesh period.
+    turns : (P,) int array
+        Mesh periods passed.
+    tau : (P,) array
+        Positions [mesh periods].
+    back : bool
+        Whether it is the back side.
+    """
+    N = planetary_set.n_planets
+    shift = np.zeros((2 * N, len(tau), tooth.shape[2]))
+    if deviations is None:
+        return shift
+    shift += body_separation(deviations, planetary_set, tau, back=back)[:, :, None]
+    for mesh in range(2 * N):
+        first, second = (tooth[gear, mesh] + tooth_steps(mesh, gear, N) * turns[:, None] for gear in (0, 1))
+        shift[mesh] += tooth_separation(deviations, mesh, first, second, back=back)
+    return shift
+
+
+def tooth_steps(mesh, gear, n_planets: int):
+    """Change of the tooth numbers of a mesh from one mesh period to the next (arrays or numbers).
+
+    The sun's teeth move on by one, -1 in its count; those of planets and ring back, +1.
+    """
+    return np.where((np.asarray(mesh) < n_planets) & (np.asarray(gear) == 0), -1, 1)
+
+
+def _roll(gear: Gear, radius: float) -> float:
+    return float(np.sqrt(max(radius**2 - gear.base_radius**2, 0.0)))
+
+
+def _arc_of_foot(pair: FlankPair, zeta, roll_2):
+    """Arc length on flank 1 of the point whose foot on flank 2 has the roll length `roll_2` (secant)."""
+    rb1, rb2 = pair.base_radius_1, pair.base_radius_2
+    target = roll_2**2 / (2 * rb2)
+    contact_1 = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * rb1)
+    contact_2 = np.maximum(pair.pitch_roll_2 - pair.sign * zeta, 0.0) ** 2 / (2 * rb2)
+    arc = contact_1 + pair.sign * (contact_2 - target)
+    for _ in range(12):
+        roll_1 = np.sqrt(2 * rb1 * np.maximum(arc, 0.0))
+        foot = separation(pair, zeta, roll_1)[1]
+        error = foot * np.abs(foot) / (2 * rb2) - target
+        arc = arc + pair.sign * error
+        if np.abs(error).max(initial=0.0) < 1e-15:
+            break
+    return arc
+
+
+def _mirrored_position(planetary_set, mirrored) -> float:
+    """Position of the mirror image, in [0, 1), at which its sun stands like the original at zero."""
+    image, original = orientations(mirrored).sun, orientations(planetary_set).sun
+    turns = (2 * planetary_set.planet_angles[0] - image - original) / planetary_set.sun.pitch_angle
+    return float(turns - np.floor(turns))

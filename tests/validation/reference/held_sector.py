@@ -1,0 +1,17 @@
+"""Flank compliance of a body that is one sector of a gear."""
+
+from femgear.contact.bodies import FlankCompliance, _condensed, _without_half_plane
+from femgear.fe.elasticity import Material
+from femgear.fe.grid import Grid
+from femgear.gears.gear import Gear
+
+
+def held_sector_compliance(
+    grid: Grid, gear: Gear, material: Material, stiffness, *, held: str, depth: float | None = None
+) -> FlankCompliance:
+    """Regular flank compliance of a body that is one sector, held at both cuts as well as at `held`.
+
+    Parameters and errors are those of `femgear.contact.bodies.flank_compliance`; the result counts one tooth.
+    """
+    stations, depths, schur = _condensed(grid, gear, stiffness, held, depth)
+    return _without_half_plane(gear, material, stations, depths, schur.C[None], len(grid.points))
