@@ -6,7 +6,7 @@ import re
 import pytest
 from page_examples import ROOT, read_page, run_examples
 
-from femgear.solvers.chaos.lyapunov import LyapunovExponents
+from femgear.solvers.stability.lyapunov import LyapunovExponents
 
 PAGE, EXAMPLES, PRINTED = read_page("impacts.md")
 MODULES = (

@@ -8,7 +8,7 @@ from published.multistage_example import DESIGNS, SPEED, TORQUE, example_gears, 
 from trains import two_stages
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.frequency_response import mesh_error_response
+from femgear.solvers.linear.receptance import mesh_error_response
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import planar_meshes

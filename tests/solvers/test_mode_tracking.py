@@ -7,16 +7,14 @@ import pytest
 from published.planetary_sets import lin_parker_set
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
+from validation.reference.mode_approaches import approaches, coupling_factor, mac
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.campbell import campbell_data
 from femgear.solvers.linear.modal import complex_modes
 from femgear.solvers.linear.tracking import (
-    approaches,
     body_groups,
-    coupling_factor,
+    campbell_data,
     kinetic_shares,
-    mac,
     oscillating,
     stiffness_of,
     strain_shares,

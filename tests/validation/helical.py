@@ -10,7 +10,7 @@ import numpy as np
 from published.planetary_sets import TABLE_2, cases, kahraman_set
 
 from femgear.gears.phasing import phase_factors
-from femgear.solvers.linear.frequency_response import mesh_error_response
+from femgear.solvers.linear.receptance import mesh_error_response
 from femgear.system.mode_kinds import phasing
 from femgear.trains.helical.model import (
     HelicalSet,

@@ -15,14 +15,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.continuation.bifurcation import Segment, branch_point, crossing_tangent, folds
 from femgear.solvers.continuation.corrector import (
     CurvePoint,
     LostError,
     ScaledCurve,
+    Segment,
+    bracketed_root,
+    branch_point,
     check_step,
     correct,
-    strain,
+    crossing_tangent,
+    folds,
+    step_effort,
     told_value,
 )
 
@@ -139,7 +143,7 @@ def continue_curve(
     parameter: float,
     *,
     limits: tuple[float, float],
-    scale=1.0,
+    scale: float | np.ndarray = 1.0,
     unit: float | None = None,
     direction: int = 1,
     options: StepOptions | None = None,
@@ -233,12 +237,23 @@ def switch_branch(
             f"no other curve found at {told(float(known.parameter[index]))}: {error}", code="E-BRANCH",
             remedy="disturb the symmetry of the system a little",
         ) from error  # fmt: skip
-    sides = (replace(point, tangent=sign * tangent) for sign in (1.0, -1.0))
-    return tuple(collect(curve, side, limits=limits, options=options) for side in sides)
+    along, back = (
+        collect(curve, replace(point, tangent=sign * tangent), limits=limits, options=options)
+        for sign in (1.0, -1.0)
+    )
+    return along, back
 
 
 def scaled_curve(
-    evaluate, start, parameter: float, *, limits, scale=1.0, unit=None, options=None, told=told_value
+    evaluate: Callable,
+    start,
+    parameter: float,
+    *,
+    limits,
+    scale: float | np.ndarray = 1.0,
+    unit: float | None = None,
+    options: StepOptions | None = None,
+    told: Callable[[float], str] = told_value,
 ) -> ScaledCurve:
     """The equations with their scales, checked; arguments as for :func:`continue_curve`."""
     options = options or StepOptions()
@@ -388,7 +403,7 @@ def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: Step
             corner = shortness <= 1.0
             aims = {"angle": options.angle, "contraction": options.contraction, "corner": corner}
             aims["sharp"] = shortness <= _SHARP
-            effort = strain(point, new, **aims)
+            effort = step_effort(point, new, **aims)
             if not corner:
                 check_step(curve, point, new)
             segment = Segment(curve, point, new)
@@ -444,8 +459,6 @@ def _until_end(segment: Segment, events, bounds):
 
 def _at_bound(segment: Segment, low, high, bound: float):
     """Point exactly at the bound, between two points with a monotonous parameter between them."""
-    from scipy.optimize import brentq
-
     if low[1].z[-1] == bound:
         # the curve starts at the bound and leaves at once
         return low[0] + np.finfo(float).tiny, replace(low[1], kind="end")
@@ -454,7 +467,7 @@ def _at_bound(segment: Segment, low, high, bound: float):
     def gap(h: float) -> float:
         return known[h] if h in known else segment.at(h).z[-1] - bound
 
-    h = brentq(gap, low[0], high[0], xtol=1e-13 * segment.length, rtol=1e-14)
+    h = bracketed_root(gap, low[0], high[0], xtol=1e-13 * segment.length)
     near = segment.at(h) if h not in known else (low if h == low[0] else high)[1]
     try:
         exact = _at_parameter(segment.curve, near.z, bound, near.tangent)

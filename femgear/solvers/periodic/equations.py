@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.linear.receptance import Reduction, reduce_problem, source_columns
 from femgear.solvers.periodic.aft import (
     PhaseGrid,
     coupled_pairs,
@@ -31,7 +32,6 @@ from femgear.solvers.periodic.aft import (
     phase_grid,
     sample_counts,
 )
-from femgear.solvers.periodic.receptance import Reduction, reduce_problem, source_columns
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.system.elements import Element
 from femgear.system.entries import checked_count

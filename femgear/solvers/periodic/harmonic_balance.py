@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.solvers.linear.receptance import Reduction, respond, source_columns
 from femgear.solvers.periodic.equations import (
     MANY,
     HarmonicBalance,
@@ -20,7 +21,6 @@ from femgear.solvers.periodic.equations import (
     reduced,
     relative_residual,
 )
-from femgear.solvers.periodic.receptance import Reduction, respond, source_columns
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import judged, require_period
 from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
@@ -38,22 +38,18 @@ def solve_harmonic_balance(
     problem: NonlinearSystem,
     frequency,
     *,
-    harmonics: int | None = None,
-    orders=None,
     start=None,
-    samples=None,
-    reduction: Reduction | None = None,
     tolerance: float = 1e-10,
     max_iterations: int = 50,
     stability: bool = True,
     radius: bool | None = None,
+    **equations,
 ) -> PeriodicSolution:
-    """Periodic or quasi-periodic solution at given base frequencies, by Newton's method with line search.
+    """Find a periodic or quasi-periodic motion at given base frequencies by Newton's method with line search.
 
     Parameters
     ----------
-    problem, harmonics, orders, samples, reduction
-        See `harmonic_balance`.
+    problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s], not negative.
     start : PeriodicSolution or (n_columns, L) complex array, optional
@@ -69,6 +65,8 @@ def solve_harmonic_balance(
     radius : bool, optional
         The radius alone, with or without the verdict; it takes all eigenvalues of one matrix of the size of
         the unknowns.
+    equations
+        ``harmonics`` or ``orders``, ``samples``, ``reduction`` of `harmonic_balance`.
 
     Returns
     -------
@@ -83,9 +81,7 @@ def solve_harmonic_balance(
     ConvergenceError
         An undamped resonance of the system with reference springs at a line.
     """
-    balance = harmonic_balance(
-        problem, harmonics=harmonics, orders=orders, samples=samples, reduction=reduction
-    )
+    balance = harmonic_balance(problem, **equations)
     frequency = _checked_frequency(balance, frequency)
     tolerance = checked_tolerance(tolerance)
     max_iterations = checked_count(max_iterations, "max_iterations", code="E-TOLERANCE")

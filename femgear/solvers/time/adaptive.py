@@ -207,6 +207,25 @@ def trajectory(
         t, y = stop, dense(stop)
 
 
+def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
+    """States (n_times, size) of an adaptive integration at ascending instants, and the number of its steps.
+
+    ``pieces`` comes from `trajectory`; instants before its first step have the state ``start``.
+    """
+    found, filled, steps = np.empty((len(times), len(start))), 0, 0
+    for begin, end, dense in pieces:
+        early = int(np.searchsorted(times, begin, side="right")) if not steps else filled
+        found[filled:early] = start
+        last = int(np.searchsorted(times, end, side="right"))
+        if last > early:
+            found[early:last] = dense(times[early:last]).T
+        filled, steps = max(last, early), steps + 1
+    if filled < len(times):
+        # the end of the last step, but for rounding
+        found[filled:] = dense(times[filled:]).T if steps else start
+    return found, steps
+
+
 def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and velocity (n,) of a start; rest without deflection when none is given.
 

@@ -1,0 +1,602 @@
+"""Receptances: by direct solution, as sums over modes, and reduced to the deflections of the elements.
+
+Forces or transmission errors of the meshes excite a linear system (`direct_response`, `modal_response`,
+`mesh_error_response`). Of a problem with nonlinear elements one reduction to modes serves any number of
+frequencies (`reduce_problem`): ``T(omega) = W^T Z^-1 [W, loads]`` with
+``Z = K' + i omega (C + speed G) - omega^2 M`` and ``K' = K + W diag(reference) W^T``, as a sum over poles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.linear.modal import (
+    damping_matrix,
+    modal_damping,
+    pseudo_solve,
+    residual_output,
+    rigid_basis,
+    solve_modes,
+    total_stiffness,
+)
+from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.system import MechanicalSystem, Modes
+
+# Bytes of dynamic stiffness that are solved in one batch.
+_BATCH = 2**26
+# Distance to an undamped pole, relative to it, below which the response is infinite.
+_RESONANT = 1e-12
+# Modal damping off the diagonal, relative to the largest entry, above which the modes are coupled.
+_COUPLED = 1e-9
+# Error of the sum over complex modes, relative, that is accepted.
+_POLES = 1e-8
+
+
+@dataclass(frozen=True)
+class MeshErrorResponse:
+    """Response to transmission errors on harmonics of the mesh frequency.
+
+    Parameters
+    ----------
+    mesh_frequency : (F,) array
+        [Hz]
+    harmonics : (H,) int array
+    deflection : (F, H, n_meshes) complex array
+        ``W^T q`` [m]: the dynamic transmission error of every mesh.
+    force : (F, H, n_meshes) complex array
+        Dynamic mesh force ``k (W^T q - e)`` [N].
+    output : (F, H, n_outputs) complex array
+    """
+
+    mesh_frequency: np.ndarray
+    harmonics: np.ndarray
+    deflection: np.ndarray
+    force: np.ndarray
+    output: np.ndarray
+
+
+def direct_response(
+    system: MechanicalSystem,
+    frequency,
+    inputs,
+    outputs,
+    *,
+    mesh_stiffness,
+    speed: float = 0.0,
+    damping_ratio=None,
+) -> np.ndarray:
+    """``L (K' + i omega D - omega^2 M)^-1 B`` by one dense solution a frequency, many in a batch.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    frequency : (F,) array
+        [Hz], positive or zero.
+    inputs : (n, n_inputs) array
+        ``B``, one column a force; `unit_force` makes them from names.
+    outputs : (n_outputs, n) array
+        ``L``.
+    mesh_stiffness : (n_meshes,) array
+        [N/m]
+    speed : float
+        That multiplies the gyroscopic matrix [rad/s].
+    damping_ratio : float or (n,) array, optional
+        Modal damping that is added to ``C``; see `modal.modal_damping`.
+
+    Returns
+    -------
+    (F, n_outputs, n_inputs) complex array
+        Receptances [m/N and the like].
+
+    Raises
+    ------
+    CaseError
+        Arrays that do not fit (E-SHAPE), frequencies that are none (E-FREQUENCY).
+    ConvergenceError
+        An undamped resonance, or rigid motions at frequency zero (E-RESONANCE).
+    """
+    omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
+    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
+    damping = damping_matrix(system, speed)
+    if damping_ratio is not None:
+        bare = replace(system, gyroscopic=None, C=np.zeros_like(system.C))
+        damping = damping + modal_damping(bare, mesh_stiffness, damping_ratio)
+    result = np.empty((len(omega), len(outputs), inputs.shape[1]), complex)
+    step = max(1, _BATCH // (16 * len(stiffness) ** 2))
+    for start in range(0, len(omega), step):
+        w = omega[start : start + step, None, None]
+        dynamic = stiffness - w**2 * system.M + 1j * w * damping
+        try:
+            result[start : start + step] = outputs @ np.linalg.solve(dynamic, inputs.astype(complex))
+        except np.linalg.LinAlgError as error:
+            f = w.ravel() / (2.0 * np.pi)
+            raise _resonance(f"between {f[0]:.6g} and {f[-1]:.6g} Hz") from error
+    if not np.all(np.isfinite(result)):
+        bad = np.flatnonzero(~np.isfinite(result).all(axis=(1, 2)))[0]
+        raise _resonance(f"at {omega[bad] / (2.0 * np.pi):.6g} Hz")
+    return result
+
+
+def modal_response(
+    system: MechanicalSystem, modes: Modes, frequency, inputs, outputs, *, residual: bool = True
+) -> np.ndarray:
+    """The same as a sum over real modes, with the static flexibility of those left out.
+
+    ``sum (L phi) (phi^T B) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega) + R``, R = ``L K^+ B`` less the
+    static part of the sum (D. J. Ewins, Modal Testing, 2nd ed., 2000, section 2.4; Geradin and Rixen,
+    Mechanical Vibrations, 3rd ed., 2.9). Exact with all modes; without some, good below their frequencies.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    modes : Modes
+        Of that system.
+    frequency, inputs, outputs
+        See `direct_response`.
+    residual : bool
+        False leaves R out.
+
+    Returns
+    -------
+    (F, n_outputs, n_inputs) complex array
+    """
+    omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
+    natural = 2.0 * np.pi * modes.frequency
+    w = omega[:, None]
+    gain = _gain(
+        natural**2 - w**2 + 2j * modes.damping_ratio * natural * w, np.maximum(natural**2, w**2), modes
+    )
+    left, right = outputs @ modes.shape, modes.shape.T @ inputs
+    result = _superposed(gain, left, right)
+    if residual and len(natural) < len(system.M):
+        elastic = natural > 0.0
+        static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
+        result += static - (left[:, elastic] / natural[elastic] ** 2) @ right[elastic]
+    return result
+
+
+def mesh_error_response(
+    system: MechanicalSystem,
+    mesh_frequency,
+    error,
+    *,
+    mesh_stiffness,
+    harmonics=None,
+    outputs=None,
+    speed: float = 0.0,
+    damping_ratio=None,
+) -> MeshErrorResponse:
+    """Response to transmission errors ``e_j(t) = Re sum_h error_jh exp(i h omega_m t)`` of the meshes.
+
+    A mesh transmits ``k_j (W_j^T q - e_j)``, so that its error drives the set by ``W_j k_j e_j``
+    (A. Kahraman, J. Mech. Des. 116, 1994, 713-720).
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    mesh_frequency : (F,) array
+        [Hz]
+    error : (n_meshes, H) complex array
+        Amplitude of every harmonic at every mesh [m], with its phase: for equal meshes
+        ``e(tau + phi_j)`` of the phases ``phi_j`` (fractions of the mesh period) ``e_h exp(2 pi i h phi_j)``.
+    mesh_stiffness : (n_meshes,) array
+        [N/m]
+    harmonics : (H,) int array, optional
+        1 to H when not given.
+    outputs : (n_outputs, n) array, optional
+        ``L``; none when not given.
+    speed, damping_ratio
+        See `direct_response`.
+
+    Raises
+    ------
+    CaseError
+        As `direct_response`, and errors or harmonics that do not fit (E-SHAPE).
+    """
+    error, k = np.asarray(error, complex), np.asarray(mesh_stiffness, float)
+    harmonics = np.arange(1, error.shape[-1] + 1) if harmonics is None else np.asarray(harmonics)
+    if error.shape != (len(k), len(harmonics)) or not np.all(np.isfinite(error)):
+        raise CaseError(
+            f"transmission errors of shape {error.shape}", code="E-SHAPE",
+            limit=f"({len(k)} meshes, {len(harmonics)} harmonics), finite",
+        )  # fmt: skip
+    mesh_frequency = np.atleast_1d(np.asarray(mesh_frequency, float))
+    rows = np.empty((0, len(system.M))) if outputs is None else np.atleast_2d(np.asarray(outputs, float))
+    # one receptance from every mesh serves all phases
+    transfer = direct_response(
+        system, np.outer(mesh_frequency, harmonics).ravel(), system.W * k, np.vstack([system.W.T, rows]),
+        mesh_stiffness=k, speed=speed, damping_ratio=damping_ratio,
+    )  # fmt: skip
+    transfer = transfer.reshape(len(mesh_frequency), len(harmonics), -1, len(k))
+    answer = np.einsum("fhoj,jh->fho", transfer, error)
+    deflection = answer[..., : len(k)]
+    return MeshErrorResponse(
+        mesh_frequency, harmonics, deflection, k * (deflection - error.T), answer[..., len(k) :]
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RealPoles:
+    """Real modes, ``h = 1 / (omega_k^2 - omega^2 + i omega d_k)``.
+
+    Parameters
+    ----------
+    squared, damping : (m,) arrays
+        ``omega_k^2`` [1/s^2] and ``d_k`` [1/s].
+    """
+
+    squared: np.ndarray
+    damping: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """What the denominator is small against (m,) [1/s^2]."""
+        return self.squared
+
+    @property
+    def still(self) -> np.ndarray:
+        """Motions without stiffness (m,) bool."""
+        return self.squared <= 0.0
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """(m,) [Hz]."""
+        return np.sqrt(self.squared) / (2.0 * np.pi)
+
+    def denominator(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``1 / h`` (..., m) and its derivative by omega, with the opposite sign."""
+        below = self.squared - omega * omega + 1j * omega * self.damping
+        return below, 2.0 * omega - 1j * self.damping
+
+
+@dataclass(frozen=True)
+class ComplexPoles:
+    """Complex modes of the state form, ``h = 1 / (i omega - lambda_k)``.
+
+    Parameters
+    ----------
+    value : (p,) complex array
+        ``lambda_k`` [1/s].
+    """
+
+    value: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """What the denominator is small against (p,) [1/s]."""
+        return np.abs(self.value)
+
+    @property
+    def still(self) -> np.ndarray:
+        """Motions without stiffness (p,) bool."""
+        return self.size <= 1e-9 * self.size.max()
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """(p,) [Hz]."""
+        return self.size / (2.0 * np.pi)
+
+    def denominator(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``1 / h`` (..., p) and its derivative by omega, with the opposite sign."""
+        return 1j * omega - self.value, np.array(-1j)
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """``[W^T; L] Z^-1 [W, loads]`` as ``sum_k left_k right_k h_k(omega) + residual``.
+
+    Parameters
+    ----------
+    reference : (n_columns,) array
+        Stiffness of the columns that Z contains [N/m].
+    poles : RealPoles or ComplexPoles
+    inputs : (m or p, n_columns + n_loads) array
+        ``right_k``.
+    pairs : (m or p, n_columns (n_columns + n_loads)) array
+        ``left_k right_k`` of the columns.
+    static, residual : (n_columns, n_columns + n_loads) arrays
+        Flexibility of all modes and of those left out [m/N].
+    system : MechanicalSystem
+        Its ``W`` holds columns and loads.
+    modes : Modes
+        Undamped modes of that system.
+    shape : (n, m or p) array
+        Displacements of the poles; rigid motions of complex modes are in `drift`.
+    drift : (n, p) array or None
+        Velocities of rigid motions.
+    """
+
+    reference: np.ndarray
+    poles: RealPoles | ComplexPoles
+    inputs: np.ndarray
+    pairs: np.ndarray
+    static: np.ndarray
+    residual: np.ndarray
+    system: MechanicalSystem
+    modes: Modes
+    shape: np.ndarray
+    drift: np.ndarray | None = None
+
+    def gain(self, omega) -> tuple[np.ndarray, np.ndarray]:
+        """``h`` and ``dh/domega`` (..., m) at the angular frequencies omega (...) [rad/s].
+
+        Motions without stiffness do not answer at frequency zero: their mean position is free.
+
+        Raises
+        ------
+        ConvergenceError
+            At the undamped resonance of a mode.
+        """
+        omega = np.asarray(omega, float)[..., None]
+        size, (below, change) = self.poles.size, self.poles.denominator(omega)
+        still = (omega == 0.0) & self.poles.still
+        if np.any(bad := (np.abs(below) <= _RESONANT * size) & ~still):
+            mode = int(np.argwhere(bad)[0][-1])
+            raise _resonance(
+                f"of mode {mode + 1} at {self.poles.frequency[mode]:.6g} Hz",
+                "give the mode some damping, or move the frequency or the reference",
+            )
+        gain = np.where(still, 0.0, 1.0 / np.where(still, 1.0, below))
+        return gain, change * gain * gain
+
+    def at(self, omega) -> tuple[np.ndarray, np.ndarray]:
+        """``W^T Z^-1 [W, loads]`` (..., n_columns, n_columns + n_loads) [m/N] and its derivative."""
+        omega = np.asarray(omega, float)
+        gain, change = self.gain(omega)
+        shape = (*omega.shape, *self.static.shape)
+        value = _times(gain, self.pairs).reshape(shape) + self.residual
+        slope = _times(change, self.pairs).reshape(shape)
+        return np.where((omega == 0.0)[..., None, None], self.static, value), slope
+
+
+def reduce_problem(
+    problem: NonlinearSystem,
+    *,
+    reference=None,
+    count: int | None = None,
+    max_frequency: float | None = None,
+) -> Reduction:
+    """Modes of the linear part, with the elements replaced by springs.
+
+    Damping that the real modes make diagonal keeps them; any other damping and gyroscopic terms give complex
+    modes of the state form of the kept real modes (Ewins, Modal Testing, 2nd ed., sections 2.7 and 2.8). The
+    modes left out keep their static flexibility (Geradin and Rixen, Mechanical Vibrations, 3rd ed., 2.9).
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+        Symmetric M and K. Rigid motions that strain no column and on which the constant load does no work
+        are allowed.
+    reference : (n_columns,) array, optional
+        Spring of every column [N/m], any that are not negative; the size of the elements' own reference
+        when not given. It moves nothing but the convergence of iterations.
+    count, max_frequency : int, float, optional
+        Real modes to keep, see `solve_modes`; all when neither is given.
+
+    Raises
+    ------
+    CaseError
+        Matrices that do not fit, a constant load that no support takes up.
+    ConvergenceError
+        A rigid motion that strains a column, negative stiffness, a defective state matrix.
+    """
+    reference = np.abs(problem.reference) if reference is None else np.asarray(reference, float)
+    system, modes = _modes_with_loads(problem, reference, count, max_frequency)
+    columns, rows = len(reference), modes.mesh_deflection
+    residual = _residual(system, modes, problem.system.W.T)
+    static = _static(modes, problem.system.W.T) + residual
+    common = {
+        "reference": reference, "static": static, "residual": residual, "system": system, "modes": modes,
+    }  # fmt: skip
+    modal = modes.shape.T @ problem.damping @ modes.shape
+    off = np.abs(modal - np.diag(np.diag(modal))).max(initial=0.0)
+    if off > _COUPLED * np.abs(modal).max(initial=0.0):
+        return _complex_modes(modal, modes, common)
+    return Reduction(
+        **common, poles=RealPoles((2.0 * np.pi * modes.frequency) ** 2, np.diag(modal).copy()),
+        inputs=np.ascontiguousarray(rows.T), pairs=_pairs(rows[:columns], rows.T), shape=modes.shape,
+    )  # fmt: skip
+
+
+def _modes_with_loads(problem, reference, count, max_frequency) -> tuple[MechanicalSystem, Modes]:
+    """The undamped system and its modes, with the loads as further columns of ``W``."""
+    steady = [force.force.real for force in problem.forces if not any(force.orders)]
+    bare = replace(
+        problem.system, C=np.zeros_like(problem.system.C), gyroscopic=None,
+        load=problem.system.load + sum(steady),
+    )  # fmt: skip
+    try:
+        modes = solve_modes(bare, reference, damping_ratio=0.0, count=count, max_frequency=max_frequency)
+    except ConvergenceError as error:
+        _tell_of_the_speed(problem, error)
+        raise
+    loads = [bare.load]
+    for force in problem.forces:
+        loads += [force.force.real, force.force.imag]
+    system = replace(bare, W=np.column_stack([bare.W, *loads]))
+    rows = system.W.T @ modes.shape
+    # columns and constant load leave rigid motions alone, solve_modes has made sure
+    rows[: len(reference) + 1, modes.frequency == 0.0] = 0.0
+    stiffness = np.concatenate([reference, np.zeros(len(loads))])
+    return system, replace(modes, mesh_stiffness=stiffness, mesh_deflection=rows)
+
+
+def _tell_of_the_speed(problem: NonlinearSystem, error: ConvergenceError) -> None:
+    """Raise a negative stiffness again with a remedy for systems that turn: K may hold centripetal terms."""
+    if error.code != "E-STIFFNESS" or problem.system.gyroscopic is None:
+        return
+    raise ConvergenceError(
+        error.message + ", in a system that turns", code=error.code,
+        remedy="where K holds centripetal terms (-speed^2) the speed is above a critical one: lower the "
+        "speed or leave those terms out; else check the signs of supports, couplings and mesh directions",
+    ) from error  # fmt: skip
+
+
+def respond(reduction: Reduction, outputs, omega, inputs) -> np.ndarray:
+    """``L Z^-1 [W, loads] inputs`` at every line.
+
+    Parameters
+    ----------
+    reduction : Reduction
+    outputs : (n_outputs, n) array
+        ``L``.
+    omega : (L,) array
+        [rad/s].
+    inputs : (n_columns + n_loads, L) complex array
+        Forces on the columns [N] and amplitudes of the loads.
+
+    Returns
+    -------
+    (n_outputs, L) complex array
+    """
+    gain, _ = reduction.gain(omega)
+    coordinates = (reduction.inputs @ inputs) * gain.T
+    out = (outputs @ reduction.shape) @ coordinates
+    if reduction.drift is not None:
+        still = omega == 0.0
+        out += (outputs @ reduction.drift) @ (coordinates / np.where(still, np.inf, 1j * omega))
+        out[:, still] = _static(reduction.modes, outputs) @ inputs[:, still]
+    return out + _residual(reduction.system, reduction.modes, outputs) @ inputs
+
+
+def _static(modes: Modes, outputs) -> np.ndarray:
+    """Static flexibility of the modes from columns and loads to the outputs; rigid motions stay out."""
+    square = np.where(modes.frequency > 0.0, 2.0 * np.pi * modes.frequency, np.inf) ** 2
+    return ((outputs @ modes.shape) / square) @ modes.mesh_deflection.T
+
+
+def _residual(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
+    """Static flexibility of the modes left out; zero when all are there."""
+    if len(modes.frequency) == len(system.M):
+        return np.zeros((len(outputs), system.W.shape[1]))
+    return residual_output(system, modes, outputs)
+
+
+def _pairs(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    return (left.T[:, :, None] * right[:, None, :]).reshape(len(right), -1)
+
+
+def _complex_modes(modal, modes: Modes, common) -> Reduction:
+    """Poles and residues of the state ``(eta, eta', v)``: elastic modes and velocities of rigid ones.
+
+    Rigid motions enter by their velocity alone, so that free rotation makes no double pole at zero.
+    """
+    natural = 2.0 * np.pi * modes.frequency
+    elastic, rigid = np.flatnonzero(natural > 0.0), np.flatnonzero(natural == 0.0)
+    m, order = len(elastic), np.concatenate([elastic, rigid])
+    state = np.zeros((2 * m + len(rigid),) * 2)
+    # speeds scaled by a mean frequency keep the state matrix balanced
+    scale = np.exp(np.mean(np.log(natural[elastic])))
+    state[:m, m : 2 * m] = scale * np.eye(m)
+    state[m : 2 * m, :m] = -np.diag(natural[elastic] ** 2) / scale
+    state[m:, m:] = -modal[np.ix_(order, order)]
+    rows = modes.mesh_deflection
+    drive = np.zeros((len(state), len(rows)))
+    drive[m:] = rows[:, order].T / scale
+    poles, vectors = np.linalg.eig(state)
+    inputs = np.linalg.solve(vectors, drive.astype(complex))
+    columns = len(common["reference"])
+    reduction = Reduction(
+        **common, poles=ComplexPoles(poles), inputs=inputs,
+        pairs=_pairs(rows[:columns, elastic] @ vectors[:m], inputs),
+        shape=modes.shape[:, elastic] @ vectors[:m], drift=modes.shape[:, rigid] @ vectors[2 * m :] * scale,
+    )  # fmt: skip
+    _check_poles(reduction, modal, natural, scale)
+    return reduction
+
+
+def _check_poles(reduction: Reduction, modal, natural, omega: float) -> None:
+    """Compare the sum over complex modes with the equations solved directly at one frequency."""
+    rows = reduction.modes.mesh_deflection
+    stiffness = np.diag(natural**2 - omega**2) + 1j * omega * modal
+    direct = rows[: len(reduction.reference)] @ np.linalg.solve(stiffness, rows.T.astype(complex))
+    error = np.abs(reduction.at(omega)[0] - reduction.residual - direct).max()
+    if not error <= _POLES * np.abs(direct).max(initial=np.finfo(float).tiny):
+        raise ConvergenceError(
+            f"the complex modes give a receptance that is wrong by {error:.2e} of {np.abs(direct).max():.2e}",
+            code="E-DEFECTIVE", remedy="modes are critically damped together: change the damping a little",
+        )  # fmt: skip
+
+
+def _times(gain: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """``gain @ pairs``; two real products where the pairs are real."""
+    if np.iscomplexobj(pairs):
+        return gain @ pairs
+    return np.real(gain) @ pairs + 1j * (np.imag(gain) @ pairs)
+
+
+def source_columns(problem: NonlinearSystem, orders: np.ndarray) -> np.ndarray:
+    """Amplitudes (1 + 2 n_forces, L) of the load columns of a reduction on the lines ``orders``.
+
+    The first column holds the constant load with the forces of order zero.
+
+    Raises
+    ------
+    CaseError
+        A harmonic force on a line that is not there.
+    """
+    out = np.zeros((1 + 2 * len(problem.forces), len(orders)), complex)
+    out[0, 0] = 1.0
+    bases = orders.shape[1]
+    for number, force in enumerate(problem.forces):
+        if not any(force.orders):
+            continue
+        given = np.array([*force.orders, *[0] * bases])
+        same, mirror = (np.flatnonzero(np.all(orders == sign * given[:bases], axis=1)) for sign in (1, -1))
+        if np.any(given[bases:]) or not len(same) + len(mirror):
+            raise CaseError(
+                f"harmonic force {number + 1} has the orders {tuple(force.orders)}, which no line has",
+                code="E-LINES", remedy="add that line",
+            )  # fmt: skip
+        line, sign = (same[0], 1.0) if len(same) else (mirror[0], -1.0)
+        out[1 + 2 * number : 3 + 2 * number, line] = 1.0, 1j * sign
+    return out
+
+
+def _checked(frequency, inputs, outputs, n: int):
+    """Angular frequencies, and inputs and outputs as matrices that fit."""
+    frequency = np.atleast_1d(np.asarray(frequency, float))
+    inputs, outputs = np.asarray(inputs), np.atleast_2d(np.asarray(outputs))
+    inputs = inputs[:, None] if inputs.ndim == 1 else inputs
+    if inputs.ndim != 2 or len(inputs) != n or outputs.ndim != 2 or outputs.shape[1] != n:
+        raise CaseError(
+            f"inputs of shape {inputs.shape} and outputs of shape {outputs.shape}", code="E-SHAPE",
+            limit=f"({n}, inputs) and (outputs, {n})",
+        )  # fmt: skip
+    if (
+        frequency.ndim != 1
+        or not len(frequency)
+        or not np.all(np.isfinite(frequency))
+        or np.any(frequency < 0.0)
+    ):
+        raise CaseError(
+            f"frequencies of shape {frequency.shape} must be finite and not negative", code="E-FREQUENCY",
+            key="frequency", limit="a list of one or more numbers >= 0 Hz",
+            remedy="list the frequencies of the response",
+        )  # fmt: skip
+    return 2.0 * np.pi * frequency, inputs, outputs
+
+
+def _gain(below: np.ndarray, size: np.ndarray, modes) -> np.ndarray:
+    bad = np.abs(below) <= _RESONANT * size
+    if np.any(bad):
+        mode = int(np.argwhere(bad)[0, 1]) % len(modes.frequency)
+        raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")
+    return 1.0 / below
+
+
+def _superposed(gain: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """``sum_k left_ok gain_fk right_ki`` as one matrix product."""
+    pairs = left.T[:, :, None] * right[:, None, :]
+    return (gain @ pairs.reshape(len(right), -1)).reshape(len(gain), len(left), right.shape[1])
+
+
+def _resonance(
+    where: str, remedy: str = "give the motion some damping or move the frequency"
+) -> ConvergenceError:
+    return ConvergenceError(
+        f"undamped resonance {where}: infinite response", code="E-RESONANCE", remedy=remedy
+    )

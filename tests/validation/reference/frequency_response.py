@@ -1,0 +1,183 @@
+"""Frequency response by superposition of complex modes; resonances and damping read from a response.
+
+Of one viscously damped mode ``1 / |H|^2`` is a parabola in ``x = f^2`` (D. J. Ewins, Modal Testing, 2nd ed.,
+2000, section 4.2), which makes parabolic interpolation exact; a verdict says whether modes overlap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.solvers.linear.modal import ComplexModes
+from femgear.system.system import MechanicalSystem
+
+# Shift of the half-power band against the peak, relative to the band, of a mode that stands alone.
+_ALONE = 0.05
+# Samples inside the half-power band that its interpolation needs.
+_SAMPLES = 5
+
+
+@dataclass(frozen=True)
+class ResonancePeak:
+    """One peak of a displacement response.
+
+    Parameters
+    ----------
+    frequency : float
+        Interpolated peak [Hz]; ``f_n sqrt(1 - 2 zeta^2)`` of a single mode.
+    natural_frequency : float
+        ``f_n`` [Hz] of the single mode with this peak and band; NaN without a band.
+    amplitude : float
+        Interpolated, in the unit of the response.
+    damping_ratio : float
+        From the half-power band; NaN where the response does not fall to it on both sides.
+    band : (float, float)
+        Half-power frequencies [Hz].
+    asymmetry : float
+        Distance between the peak and the middle of the band, in squares of frequency, over the band's width:
+        zero for a single mode.
+    verdict : str
+        ``"separate"``; ``"overlapping"`` where the response rises again before the end of the band, or the
+        band is not symmetric, so that the damping belongs to no single mode; ``"incomplete"`` where the
+        frequencies end before the band, as under heavy damping; ``"coarse"`` with too few samples in it.
+    """
+
+    frequency: float
+    natural_frequency: float
+    amplitude: float
+    damping_ratio: float
+    band: tuple[float, float]
+    asymmetry: float
+    verdict: str
+
+
+def complex_modal_response(modes: ComplexModes, frequency, inputs, outputs) -> np.ndarray:
+    """Receptance (F, n_outputs, n_inputs) as a sum over complex modes, with any viscous and gyroscopic terms.
+
+    ``sum (L x)(y^H B) / (i omega - lambda)`` over all poles (Ewins, section 2.7), with the displacement of
+    rigid motions as their velocity over ``i omega``.
+
+    Parameters
+    ----------
+    modes : ComplexModes
+    frequency, inputs, outputs
+        See `direct_response`.
+    """
+    omega = 2.0 * np.pi * np.asarray(frequency, float)[:, None]
+    poles = np.concatenate([modes.eigenvalue, modes.eigenvalue[modes.paired].conj()])
+    gain = 1.0 / (1j * omega - poles)
+    shape, drift, left = (
+        np.hstack([array, array[:, modes.paired].conj()]) for array in (modes.shape, modes.drift, modes.left)
+    )
+    force = left.conj().T @ inputs
+    result = np.einsum("ok,fk,ki->foi", outputs @ shape, gain, force)
+    if np.any(drift):
+        result += np.einsum("ok,fk,ki->foi", outputs @ drift, gain / (1j * omega), force)
+    return result
+
+
+def unit_force(system: MechanicalSystem, *names: str) -> np.ndarray:
+    """One column (n, len(names)) a name of a degree of freedom; its transpose reads displacements.
+
+    Raises
+    ------
+    CaseError
+        A name that the system does not have (E-DOF).
+    """
+    columns = np.zeros((len(system.M), len(names)))
+    for column, name in enumerate(names):
+        if name not in system.dofs:
+            raise CaseError(
+                f"no degree of freedom {name!r}", code="E-DOF", limit=", ".join(system.dofs),
+            )  # fmt: skip
+        columns[system.dofs.index(name), column] = 1.0
+    return columns
+
+
+def resonance_peaks(frequency, response, *, prominence: float = 0.05) -> tuple[ResonancePeak, ...]:
+    """Peaks of ``|response|``, lowest frequency first.
+
+    Parameters
+    ----------
+    frequency : (F,) array
+        [Hz], ascending.
+    response : (F,) complex or real array
+        A receptance (displacement over force), or its size.
+    prominence : float
+        Height above the neighbouring valley, relative to the peak, that makes a peak.
+
+    Raises
+    ------
+    CaseError
+        Arrays that are no response (E-RESPONSE).
+
+    Notes
+    -----
+    Of one viscously damped mode ``1 / |H|^2`` is a parabola in ``x = f^2`` (Ewins, Modal Testing, 2nd ed.,
+    section 4.2), which makes parabolic interpolation exact. The half-power points satisfy
+    ``(x_2 - x_1) / x_peak = 2 tan(2 asin zeta)``, of which ``2 zeta = (f_2 - f_1) / f`` is the limit.
+    """
+    from scipy.signal import find_peaks
+
+    f, size = np.asarray(frequency, float), np.abs(np.asarray(response))
+    if f.ndim != 1 or f.shape != size.shape or not np.all(np.isfinite(size)) or np.any(np.diff(f) <= 0.0):
+        raise CaseError(
+            "no response to search for peaks", code="E-RESPONSE",
+            limit="finite values over ascending frequencies, as many of both",
+        )  # fmt: skip
+    places, found = find_peaks(size, prominence=0.0)
+    places = places[found["prominences"] >= prominence * size[places]]
+    return tuple(_peak(f**2, size, int(i)) for i in places)
+
+
+def _peak(x: np.ndarray, size: np.ndarray, i: int) -> ResonancePeak:
+    """The peak at sample ``i`` of the response over ``x = f^2``, from parabolas of ``1 / |H|^2``."""
+    # values relative to the peak keep the parabolas well scaled
+    inverse = (size[i] / np.maximum(size, 1e-9 * size[i])) ** 2
+    c = _parabola(x, inverse, i)
+    shift = -0.5 * c[1] / c[2]
+    top, lowest = x[i] + shift, c[0] + 0.5 * shift * c[1]
+    edges, amplitude = _half_power(x, inverse, i, 2.0 * lowest), size[i] / np.sqrt(lowest)
+    peak = float(np.sqrt(top))
+    if isinstance(edges, str):
+        nan = float("nan")
+        return ResonancePeak(peak, nan, float(amplitude), nan, (nan, nan), nan, edges)
+    low, high = edges
+    ratio = np.sin(0.5 * np.arctan(0.5 * (high - low) / top))
+    asymmetry = abs(0.5 * (high + low) - top) / (high - low)
+    inside = np.count_nonzero((x >= low) & (x <= high))
+    verdict = "coarse" if inside < _SAMPLES else "separate" if asymmetry <= _ALONE else "overlapping"
+    natural = peak / np.sqrt(1.0 - 2.0 * ratio**2)
+    band = (float(np.sqrt(low)), float(np.sqrt(high)))
+    return ResonancePeak(
+        peak, float(natural), float(amplitude), float(ratio), band, float(asymmetry), verdict
+    )
+
+
+def _parabola(x: np.ndarray, y: np.ndarray, i: int) -> np.ndarray:
+    """Coefficients of the parabola in ``x - x_i`` through samples i - 1, i, i + 1."""
+    near = slice(i - 1, i + 2)
+    return np.linalg.solve(np.vander(x[near] - x[i], 3, increasing=True), y[near])
+
+
+def _half_power(x: np.ndarray, inverse: np.ndarray, i: int, level: float) -> tuple[float, ...] | str:
+    """Where ``inverse`` reaches the level on both sides, or why it does not."""
+    edges = []
+    for step in (-1, 1):
+        line = inverse[i::step]
+        above = np.flatnonzero(line >= level)
+        if np.any(np.diff(line[: above[0] + 1] if len(above) else line) < 0.0):
+            return "overlapping"
+        if not len(above):
+            return "incomplete"
+        last = i + step * int(above[0])
+        middle = min(max(last - step if above[0] > 1 else i, 1), len(x) - 2)
+        c = _parabola(x, inverse, middle)
+        roots = np.roots([c[2], c[1], c[0] - level])
+        lo, hi = sorted((x[last] - x[middle], x[last - step] - x[middle]))
+        # the level lies between two samples of the parabola, so that one root does
+        edges.append(x[middle] + min(roots.real, key=lambda r: abs(r - np.clip(r, lo, hi))))
+    return tuple(edges)
