@@ -54,7 +54,8 @@ class StroboscopicMap:
 
     def enter(self, start):
         """State of the scheme and column forces for displacement and velocity (n,); rest for None."""
-        return self.scheme.start(*checked_start(self.problem, start), self.theta[:1], self.law)
+        q, v = checked_start(self.problem, start)
+        return self.scheme.start(q, v, self.theta[:1], self.law)
 
     def run(self, state, g) -> Marched:
         """One period of motion from a state at phase zero."""

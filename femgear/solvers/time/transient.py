@@ -236,7 +236,7 @@ def _stepped(
     """March with a fixed step and interpolate at the instants."""
     begin, step = times[0], scheme.step
     first = begin * frequency[None]
-    state, g = scheme.start(*start, first, tabulated_law(problem, first))
+    state, g = scheme.start(start[0], start[1], first, tabulated_law(problem, first))
     # where each instant lies: in which step, and where in it
     place = np.clip((times - begin) / step, 0.0, number)
     near = np.rint(place)
