@@ -8,18 +8,16 @@ from published.planetary_sets import lin_parker_set
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 from validation.reference.mode_approaches import approaches, coupling_factor, mac
+from validation.reference.mode_energy import (
+    body_groups,
+    kinetic_shares,
+    stiffness_of,
+    strain_shares,
+)
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes
-from femgear.solvers.linear.tracking import (
-    body_groups,
-    campbell_data,
-    kinetic_shares,
-    oscillating,
-    stiffness_of,
-    strain_shares,
-    track_modes,
-)
+from femgear.solvers.linear.tracking import campbell_data, oscillating, track_modes
 from femgear.system.assembler import planar_springs, planar_system
 from femgear.system.mode_kinds import motion_planes
 from femgear.system.system import MechanicalSystem

@@ -1,17 +1,17 @@
-"""Modes followed over a parameter, the Campbell diagram, and where the energy of modes sits.
+"""Modes followed over a parameter, and the Campbell diagram.
 
 Modes are assigned by shape and eigenvalue, and steps are refined where modes veer (`track_modes`). Over the
-speed they make a Campbell diagram, where lines of excitation meet them (`campbell_data`). The kinetic and the
-strain energy of modes is shared by bodies, meshes and supports (`kinetic_shares`, `strain_shares`).
+speed they make a Campbell diagram, where lines of excitation meet them (`campbell_data`).
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import ComplexModes, complex_modes, whirl
@@ -19,12 +19,12 @@ from femgear.system.system import MechanicalSystem, freeze
 
 # Relative distance of eigenvalues that belong to one multiple eigenvalue, whose vectors are free.
 _MULTIPLE = 1e-7
+# Lowest MAC over one step, and how often a step is halved to reach it.
+_AGREEMENT, _MOST_HALVINGS = 0.9, 14
 # Relative distance at which two branches may pass each other: closer ones count as crossing.
 _CROSSING = 1e-6
 # Cost of a relative distance of eigenvalues, and its bound, against 1 - MAC.
 _CONTINUITY, _BOUND = 10.0, 0.5
-# Strain energy relative to the sum of the absolute terms below which a motion has none.
-_UNSTRAINED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class TrackedModes:
 
     value: np.ndarray
     given: np.ndarray
-    eigenvalue: np.ndarray
+    eigenvalue: NDArray[np.complex128]
     shape: np.ndarray
     agreement: np.ndarray
     unresolved: tuple[tuple[float, float], ...]
@@ -133,8 +133,6 @@ def track_modes(
     mass,
     *,
     count: int | None = None,
-    agreement: float = 0.9,
-    max_halvings: int = 14,
 ) -> TrackedModes:
     """Follow modes from one parameter value to the next.
 
@@ -152,10 +150,6 @@ def track_modes(
     mass : (n, n) array
     count : int, optional
         Lowest modes of the first value to follow; all when not given.
-    agreement : float
-        Lowest MAC over one step.
-    max_halvings : int
-        The smallest step is the given one over ``2 ** max_halvings``.
 
     Raises
     ------
@@ -177,16 +171,16 @@ def track_modes(
     points = [_Point(first.value, first.eigenvalue[order], first.vector[:, order])]
     agreements, unresolved = [], []
     for start, end in itertools.pairwise(values):
-        smallest = 1.5 * abs(end - start) / 2.0**max_halvings
+        smallest = 1.5 * abs(end - start) / 2.0**_MOST_HALVINGS
         pending = [_solved(family, float(end), root)]
         while pending:
             old = points[-1]
             new, fits = _assigned(old, pending[-1])
-            between = _refined(old, new, fits, agreement)
+            between = _refined(old, new, fits)
             if between is not None and abs(new.value - old.value) > smallest:
                 pending.append(_solved(family, between, root))
                 continue
-            if fits.min() < agreement:
+            if fits.min() < _AGREEMENT:
                 unresolved.append((old.value, new.value))
             if len(points) == 1:
                 points[0] = _turned(old, new)
@@ -258,81 +252,10 @@ def campbell_data(
     return CampbellData(tracked, senses, orders, _critical(tracked, orders))
 
 
-def kinetic_shares(mass, shape, groups: Mapping[str, Sequence[int]]) -> dict[str, np.ndarray]:
-    """Shares (m,) of groups of coordinates in the kinetic energy of every mode.
-
-    ``Re sum_i conj(x_i) (M x)_i / x^H M x`` over the group (Geradin and Rixen, Mechanical Vibrations, 3rd
-    ed., section 2.3). They add up to one.
-
-    Parameters
-    ----------
-    mass : (n, n) array
-    shape : (n, m) array
-        Real or complex; complex ones by their mean over a period.
-    groups : mapping of str to indices
-        Every coordinate in one group; `body_groups` makes them from names.
-
-    Raises
-    ------
-    CaseError
-        Coordinates that are in no group or in two (E-GROUPS).
-    """
-    shape = np.asarray(shape)
-    places = np.concatenate([np.asarray(rows, int) for rows in groups.values()])
-    if not np.array_equal(np.sort(places), np.arange(len(shape))):
-        raise CaseError(
-            f"{len(places)} coordinates in groups, of {len(shape)}", code="E-GROUPS",
-            limit="every coordinate in one group",
-        )  # fmt: skip
-    energy = (shape.conj() * (np.asarray(mass) @ shape)).real
-    total = energy.sum(axis=0)
-    return {name: energy[np.asarray(rows, int)].sum(axis=0) / total for name, rows in groups.items()}
-
-
-def strain_shares(parts: Mapping[str, tuple[np.ndarray, np.ndarray]], shape) -> dict[str, np.ndarray]:
-    """Shares (m,) of springs in the strain energy of every mode.
-
-    ``sum_c k_c |w_c^T x|^2 / total`` of each part. They add up to one; of a motion that strains nothing all
-    are zero.
-
-    Parameters
-    ----------
-    parts : mapping of str to (columns (n, g), stiffness (g,))
-        Springs ``k`` along the columns ``w``: meshes are columns of W, supports unit columns. Together they
-        must be the whole stiffness, which `stiffness_of` gives for comparison.
-    shape : (n, m) array
-        Real or complex; complex ones by their mean over a period.
-    """
-    shape = np.asarray(shape)
-    energy, bound = {}, np.zeros(shape.shape[1])
-    for name, (columns, stiffness) in parts.items():
-        k = np.asarray(stiffness, float)
-        energy[name] = k @ np.abs(columns.T @ shape) ** 2
-        bound += np.abs(k) @ (np.abs(columns).T @ np.abs(shape)) ** 2
-    total = sum(energy.values())
-    strained = np.abs(total) > _UNSTRAINED * bound
-    return {
-        name: np.where(strained, one / np.where(strained, total, 1.0), 0.0) for name, one in energy.items()
-    }
-
-
-def stiffness_of(parts: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """``sum w k w^T`` (n, n) of all parts."""
-    return sum((columns * stiffness) @ columns.T for columns, stiffness in parts.values())
-
-
-def body_groups(dofs: Sequence[str]) -> dict[str, np.ndarray]:
-    """Coordinates of every body, from names such as ``"planet 2: x"``."""
-    groups: dict[str, list[int]] = {}
-    for place, name in enumerate(dofs):
-        groups.setdefault(name.split(":")[0], []).append(place)
-    return {name: np.array(rows) for name, rows in groups.items()}
-
-
 @dataclass(frozen=True)
 class _Point:
     value: float
-    eigenvalue: np.ndarray
+    eigenvalue: NDArray[np.complex128]
     vector: np.ndarray
     slope: np.ndarray | None = None
 
@@ -417,7 +340,7 @@ def _turned(first: _Point, second: _Point) -> _Point:
     return _Point(first.value, first.eigenvalue, vector, second.slope)
 
 
-def _refined(old: _Point, new: _Point, fits: np.ndarray, limit: float) -> float | None:
+def _refined(old: _Point, new: _Point, fits: np.ndarray) -> float | None:
     """A value between two points at which to look first, or None where the step is good."""
     a, b = old.eigenvalue.imag, new.eigenvalue.imag
     before, after = a[:, None] - a, b[:, None] - b
@@ -429,7 +352,7 @@ def _refined(old: _Point, new: _Point, fits: np.ndarray, limit: float) -> float 
         share = before[i, j] / (before[i, j] - after[i, j])
         # an end that is hit exactly would repeat a point
         return float(old.value + step * min(max(share, 0.02), 0.98))
-    return float(old.value + 0.5 * step) if fits.min() < limit else None
+    return float(old.value + 0.5 * step) if fits.min() < _AGREEMENT else None
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import get_lapack_funcs
 
 from femgear.errors import CaseError, ConvergenceError
@@ -152,7 +153,7 @@ class RuleScheme:
         """Accelerations (n, dofs) that the loads give in n steps."""
         wave = _load_waves(self.problem, theta)
         mixed = (1.0 - self.rule.force) * wave[:, 1:] + self.rule.force * wave[:, :-1]
-        return (mixed.T @ self.forces).real
+        return np.real(mixed.T @ self.forces)
 
     def free(self, state, g, load):
         """(q, v, a) at the end of the step without the column forces there."""
@@ -255,19 +256,19 @@ class ModalScheme:
         """Modal state of the motion; the part of modes that are left out is dropped."""
         carried = self.problem.system.M @ self.modes.shape
         state = np.stack([q @ carried, v @ carried])
-        x = self.rows @ state[0] + (self._waves(theta[:1]) @ self.static_columns).real[0]
+        x = self.rows @ state[0] + np.real(self._waves(theta[:1]) @ self.static_columns)[0]
         g, _ = law(0, x)
         return state, g
 
-    def _waves(self, theta) -> np.ndarray:
+    def _waves(self, theta) -> NDArray[np.complex128]:
         return _load_waves(self.problem, theta).T
 
     def table(self, theta):
         """What the loads add in n steps, (n, 2 m + n_c): to y and v, then to the columns at the ends."""
         wave = self._waves(theta)
-        modal = (wave @ self.loads).real
+        modal = np.real(wave @ self.loads)
         push = modal[:-1, None] * self.first + modal[1:, None] * self.last
-        static = (wave[1:] @ self.static_columns).real
+        static = np.real(wave[1:] @ self.static_columns)
         return np.hstack([push.reshape(len(push), -1), static])
 
     def free(self, state, g, load):
@@ -288,11 +289,11 @@ class ModalScheme:
     def columns(self, states, g, theta):
         """(..., n_c)."""
         own = self.problem.system.W.T @ self.residual
-        return states[..., 0, :] @ self.rows.T - g @ own + (self._waves(theta) @ self.static_columns).real
+        return states[..., 0, :] @ self.rows.T - g @ own + np.real(self._waves(theta) @ self.static_columns)
 
     def motion(self, states, g, theta):
         """Displacements and velocities (n, dofs); modes left out count in the displacements only."""
-        static = (self._waves(theta) @ self.static).real - g @ self.residual.T
+        static = np.real(self._waves(theta) @ self.static) - g @ self.residual.T
         return states[:, 0] @ self.modes.shape.T + static, states[:, 1] @ self.modes.shape.T, None
 
     def local_error(self, states, g):
@@ -333,7 +334,7 @@ def modal_scheme(problem: NonlinearSystem, step: float, *, count: int | None = N
     for force in problem.forces:
         loads.append(modes.shape.T @ force.force)
         real, imaginary = (
-            _static_displacement(system, modes, part) for part in (force.force.real, force.force.imag)
+            _static_displacement(system, modes, part) for part in (np.real(force.force), np.imag(force.force))
         )
         static.append(real + 1j * imaginary)
     elastic = np.where(natural > 0.0, natural, np.inf)
@@ -363,8 +364,8 @@ def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.n
 
     Returns
     -------
-    (m, 2, 2), (m, 2), (m, 2) arrays
-        ``state_1 = P state_0 + start p_0 + end p_1``.
+    transition (m, 2, 2), first (m, 2), last (m, 2) arrays
+        ``state_1 = transition state_0 + first p_0 + last p_1``.
     """
     from scipy.linalg import expm
 
@@ -452,14 +453,12 @@ def march(
 
     Parameters
     ----------
-    scheme : Scheme
     law : callable
         Of the instants 0 .. count, from `tabulated_law`; instant 0 is the start.
     loads : (count, ...) array
         From ``scheme.table``.
     state, g : arrays
         At the start.
-    count : int
     tolerance : float
         Of the column equations, relative to the largest free deflection so far.
     max_iterations : int
@@ -507,10 +506,10 @@ def march_times(
         size = max(size, float(np.square(x).sum(axis=1).max(initial=0.0)))
 
 
-def _load_waves(problem: NonlinearSystem, theta) -> np.ndarray:
+def _load_waves(problem: NonlinearSystem, theta) -> NDArray[np.complex128]:
     """Amplitude one of the constant load and ``exp(i phase)`` of the harmonic forces, (1 + n_forces, n)."""
     wave = np.array([np.exp(1j * phase_of(theta, f.orders)) for f in problem.forces])
-    return np.vstack([np.ones((1, len(theta))), wave.reshape(-1, len(theta))])
+    return np.vstack([np.ones((1, len(theta)), np.complex128), wave.reshape(-1, len(theta))])
 
 
 def _solve_columns(law, i, flexibility, unit, aim, g, size, options):

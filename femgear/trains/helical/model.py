@@ -742,7 +742,7 @@ def helical_motions(data: HelicalSet, shape) -> SetMotions:
 
 
 def helical_springs(data: HelicalSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the set by name, for `femgear.solvers.linear.tracking.strain_shares`.
+    """Springs of the set by name.
 
     Parameters
     ----------
