@@ -15,6 +15,7 @@ from femgear.solvers.linear.receptance import Reduction, respond, source_columns
 from femgear.solvers.periodic.equations import (
     MANY,
     HarmonicBalance,
+    LineForces,
     LineTangent,
     harmonic_balance,
     linearised,
@@ -194,13 +195,12 @@ class PeriodicResponse:
 
     @property
     def verdict(self) -> FloquetVerdict:
-        """Its ``stable`` is None where the solution did not converge, has several base frequencies or too
-        long a period for its fastest mode."""
+        """Its ``stable`` is None where there are several base frequencies or too long a period."""
         return self.solution.verdict
 
     @property
     def tail(self) -> float:
-        """Share of the amplitude in the upper half of the lines: a measure of truncation."""
+        """Share of the amplitude in the upper half of the lines."""
         return self.solution.tail
 
     @property
@@ -351,7 +351,7 @@ class _Embedding:
     def _system(self, point):
         """Residual and its derivative (n_y, n_y + 1) by the scaled unknowns and t."""
         y, t = self.scale * point[:-1], point[-1]
-        forces, full = _residual(self.balance, self.receptance, y)
+        full, forces = _with_matrix(self.balance, self.receptance, y)
         change = full - (y - self.linear)
         jacobian = t * self.balance.jacobian(forces, self.receptance)
         jacobian[np.diag_indices(len(y))] += 1.0 - t
@@ -381,17 +381,11 @@ class _Embedding:
         return None, rounds
 
 
-def _residual(balance: HarmonicBalance, receptance, y):
-    """What the elements do at the unknowns y, and the residual (n_y,)."""
+def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineForces]:
+    """Residual (n_y,) at the unknowns y, and what its derivative is made of."""
     lines = balance.lines(y)
     forces = balance.forces(lines)
-    return forces, balance.unknowns(balance.residual(lines, forces, receptance))
-
-
-def _with_matrix(balance: HarmonicBalance, receptance, y):
-    """Residual (n_y,) at the unknowns y, and what its derivative is made of."""
-    forces, error = _residual(balance, receptance, y)
-    return error, forces
+    return balance.unknowns(balance.residual(lines, forces, receptance)), forces
 
 
 def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.ndarray:
