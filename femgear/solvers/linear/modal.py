@@ -136,17 +136,9 @@ def solve_modes(
     -----
     Residual flexibility ``W^T K^+ W - sum r r^T / omega^2``, ``r = W^T phi`` (Geradin and Rixen, Mechanical
     Vibrations, 3rd ed., section 2.9); ``K^+`` is the inverse on the motions free of rigid modes.
-
-    With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give
-    ``d = S (W^T q - C g)`` and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the
-    directions ``W S^T``, whose total stiffness is ``W (k^-1 + C)^-1 W^T``, and the flexibility ``S C`` beside
-    that of the modes left out.
     """
     stiffness = total_stiffness(system, mesh_stiffness)
-    if count is not None and max_frequency is not None:
-        raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
-    scale, values, shape = _eigen(system.M, stiffness, count, max_frequency)
-    rigid = _rigid(values, scale, len(system.M))
+    values, shape, rigid = _eigen(system.M, stiffness, count, max_frequency)
     if np.any(rigid):
         shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
     springs = spring_directions(system, mesh_stiffness)
@@ -156,8 +148,8 @@ def solve_modes(
     rows[:, rigid] = 0.0
     modal_load[rigid] = 0.0
     omega = np.sqrt(np.where(rigid, 0.0, values))
-    flexible = pseudo_solve(system.M, stiffness, shape[:, rigid], np.column_stack([springs, system.load]))
-    static = springs.T @ flexible
+    loads = np.column_stack([springs, system.load])
+    static = springs.T @ pseudo_solve(system.M, stiffness, shape[:, rigid], loads)
     residual = static[:, :-1] - _modal_flexibility(rows, rows, omega)
     if system.flexibility is not None:
         residual += _spring_share(system, mesh_stiffness) @ system.flexibility
@@ -393,7 +385,13 @@ def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
 
 
 def spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
-    """Directions (n, n_meshes) whose products with the motions are the deflections of the mesh springs."""
+    """Directions (n, n_meshes) whose products with the motions are the deflections of the mesh springs.
+
+    With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give
+    ``d = S (W^T q - C g)`` and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the
+    directions ``W S^T``, whose total stiffness is ``W (k^-1 + C)^-1 W^T``, and the flexibility ``S C`` beside
+    that of the modes left out.
+    """
     return system.W if system.flexibility is None else system.W @ _spring_share(system, mesh_stiffness).T
 
 
@@ -430,9 +428,11 @@ def _spring_share(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
 
 
 def _eigen(mass, stiffness, count, max_frequency):
-    """Largest eigenvalue scale, eigenvalues and mass-normalised shapes that are asked for."""
+    """Eigenvalues and mass-normalised shapes that are asked for, and which of them are rigid."""
     from scipy import linalg
 
+    if count is not None and max_frequency is not None:
+        raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
     n = len(mass)
     try:
         factor = np.linalg.cholesky(0.5 * (mass + mass.T))
@@ -464,7 +464,8 @@ def _eigen(mass, stiffness, count, max_frequency):
         while kept < len(values) and values[kept] - values[kept - 1] < _MULTIPLE * abs(values[kept]):
             kept += 1
         values, vectors = values[:kept], vectors[:, :kept]
-    return scale, values, linalg.solve_triangular(factor, vectors, lower=True, trans=1)
+    shape = linalg.solve_triangular(factor, vectors, lower=True, trans=1)
+    return values, shape, _rigid(values, scale, n)
 
 
 def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
