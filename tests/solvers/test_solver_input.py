@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError
 from femgear.solvers.continuation.arclength import continue_curve
@@ -9,7 +10,7 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.receptance import direct_response, modal_response
 from femgear.solvers.linear.tracking import campbell_data
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.time.stroboscopic import (
     bifurcation_diagram,
     stroboscopic_section,

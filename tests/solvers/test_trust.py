@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from validation.parametric import NATURAL, one_pair, rectangular_monodromy
+from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.branches import branch_maximum, frequency_response_curve, parameter_curve
@@ -17,7 +18,7 @@ from femgear.solvers.periodic.harmonic_balance import (
     periodic_response,
     solve_harmonic_balance,
 )
-from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability import floquet
 from femgear.solvers.stability.floquet import floquet_verdict

@@ -1,8 +1,7 @@
 """Receptances: by direct solution, as sums over modes, and reduced to the deflections of the elements.
 
-Forces or transmission errors of the meshes excite a linear system (`direct_response`, `modal_response`,
-`mesh_error_response`). Of a problem with nonlinear elements one reduction to modes serves any number of
-frequencies (`reduce_problem`): ``T(omega) = W^T Z^-1 [W, loads]`` with
+Forces excite a linear system (`direct_response`, `modal_response`). Of a problem with nonlinear elements one
+reduction to modes serves any number of frequencies (`reduce_problem`): ``T(omega) = W^T Z^-1 [W, loads]`` with
 ``Z = K' + i omega (C + speed G) - omega^2 M`` and ``K' = K + W diag(reference) W^T``, as a sum over poles.
 """
 
@@ -156,66 +155,6 @@ def modal_response(
         static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
         result += static - (left[:, elastic] / natural[elastic] ** 2) @ right[elastic]
     return result
-
-
-def mesh_error_response(
-    system: MechanicalSystem,
-    mesh_frequency,
-    error,
-    *,
-    mesh_stiffness,
-    harmonics=None,
-    outputs=None,
-    speed: float = 0.0,
-    damping_ratio=None,
-) -> MeshErrorResponse:
-    """Response to transmission errors ``e_j(t) = Re sum_h error_jh exp(i h omega_m t)`` of the meshes.
-
-    A mesh transmits ``k_j (W_j^T q - e_j)``, so that its error drives the set by ``W_j k_j e_j``
-    (A. Kahraman, J. Mech. Des. 116, 1994, 713-720).
-
-    Parameters
-    ----------
-    system : MechanicalSystem
-    mesh_frequency : (F,) array
-        [Hz]
-    error : (n_meshes, H) complex array
-        Amplitude of every harmonic at every mesh [m], with its phase: for equal meshes
-        ``e(tau + phi_j)`` of the phases ``phi_j`` (fractions of the mesh period) ``e_h exp(2 pi i h phi_j)``.
-    mesh_stiffness : (n_meshes,) array
-        [N/m]
-    harmonics : (H,) int array, optional
-        1 to H when not given.
-    outputs : (n_outputs, n) array, optional
-        ``L``; none when not given.
-    speed, damping_ratio
-        See `direct_response`.
-
-    Raises
-    ------
-    CaseError
-        As `direct_response`, and errors or harmonics that do not fit (E-SHAPE).
-    """
-    error, k = np.asarray(error, complex), np.asarray(mesh_stiffness, float)
-    harmonics = np.arange(1, error.shape[-1] + 1) if harmonics is None else np.asarray(harmonics)
-    if error.shape != (len(k), len(harmonics)) or not np.all(np.isfinite(error)):
-        raise CaseError(
-            f"transmission errors of shape {error.shape}", code="E-SHAPE",
-            limit=f"({len(k)} meshes, {len(harmonics)} harmonics), finite",
-        )  # fmt: skip
-    mesh_frequency = np.atleast_1d(np.asarray(mesh_frequency, float))
-    rows = np.empty((0, len(system.M))) if outputs is None else np.atleast_2d(np.asarray(outputs, float))
-    # one receptance from every mesh serves all phases
-    transfer = direct_response(
-        system, np.outer(mesh_frequency, harmonics).ravel(), system.W * k, np.vstack([system.W.T, rows]),
-        mesh_stiffness=k, speed=speed, damping_ratio=damping_ratio,
-    )  # fmt: skip
-    transfer = transfer.reshape(len(mesh_frequency), len(harmonics), -1, len(k))
-    answer = np.einsum("fhoj,jh->fho", transfer, error)
-    deflection = answer[..., : len(k)]
-    return MeshErrorResponse(
-        mesh_frequency, harmonics, deflection, k * (deflection - error.T), answer[..., len(k) :]
-    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
         periodic_response,
         solve_harmonic_balance,
     )
-    from femgear.solvers.periodic.shooting import ShootingOptions, solve_free_vibration, solve_shooting
+    from femgear.solvers.periodic.shooting import ShootingOptions, solve_shooting
     from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
     from femgear.solvers.periodic.spectral import solve_spectral
 
@@ -22,7 +22,6 @@ __all__ = [
     "adapt_harmonics",
     "displacements",
     "periodic_response",
-    "solve_free_vibration",
     "solve_harmonic_balance",
     "solve_shooting",
     "solve_spectral",

@@ -394,8 +394,9 @@ def krylov_radius(tangent: LineTangent) -> float | None:
     start = np.random.default_rng(0).standard_normal(size)
     try:
         values = eigs(
-            operator, k=1, ncv=30, v0=start, which="LM", tol=1e-2, maxiter=60, return_eigenvectors=False
-        )  # type: ignore[arg-type]
+            operator, k=1, ncv=30, v0=start, which="LM", tol=1e-2,  # type: ignore[arg-type]
+            maxiter=60, return_eigenvectors=False,
+        )  # fmt: skip
     except ArpackError:
         return None
     return float(np.abs(values).max())

@@ -168,7 +168,7 @@ def modal_receptance(modes: Modes, modal: np.ndarray) -> np.ndarray:
     rows = modes.mesh_deflection
     n, lower = len(rows), np.tril_indices(len(rows))
     pairs = (rows[lower[0]] * rows[lower[1]]).T
-    flat = np.stack([modal.real @ pairs, modal.imag @ pairs], axis=-1).view(complex)[..., 0]
+    flat = np.stack([np.real(modal) @ pairs, np.imag(modal) @ pairs], axis=-1).view(complex)[..., 0]
     flat += modes.residual[lower]
     out = np.empty((n, n, *modal.shape[:-1]), dtype=complex)
     for index, (i, j) in enumerate(zip(*lower)):

@@ -265,7 +265,7 @@ def stability_boundary(
     CaseError
         Not exactly one of frequency and depth, or no change between the two ends.
     """
-    from scipy.optimize import brentq
+    from scipy.optimize import root_scalar
 
     if (frequency is None) == (depth is None):
         raise CaseError("hold the frequency or the depth", code="E-CHART", limit="exactly one of the two")
@@ -284,7 +284,7 @@ def stability_boundary(
             limit="one end stable, the other one not",
         )  # fmt: skip
     if ends.min() < -CIRCLE:
-        return float(brentq(growth, *between, xtol=1e-14, rtol=1e-13))
+        return root_scalar(growth, bracket=between, method="brentq", xtol=1e-14, rtol=1e-13).root
     low, high = between
     unstable_low = ends[0] > CIRCLE
     while abs(high - low) > 1e-13 * abs(high):

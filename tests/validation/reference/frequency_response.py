@@ -1,4 +1,4 @@
-"""Frequency response by superposition of complex modes; resonances and damping read from a response.
+"""Frequency response to mesh errors and by complex modes; resonances and damping read from a response.
 
 Of one viscously damped mode ``1 / |H|^2`` is a parabola in ``x = f^2`` (D. J. Ewins, Modal Testing, 2nd ed.,
 2000, section 4.2), which makes parabolic interpolation exact; a verdict says whether modes overlap.
@@ -12,6 +12,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import ComplexModes
+from femgear.solvers.linear.receptance import MeshErrorResponse, direct_response
 from femgear.system.system import MechanicalSystem
 
 # Shift of the half-power band against the peak, relative to the band, of a mode that stands alone.
@@ -52,6 +53,66 @@ class ResonancePeak:
     band: tuple[float, float]
     asymmetry: float
     verdict: str
+
+
+def mesh_error_response(
+    system: MechanicalSystem,
+    mesh_frequency,
+    error,
+    *,
+    mesh_stiffness,
+    harmonics=None,
+    outputs=None,
+    speed: float = 0.0,
+    damping_ratio=None,
+) -> MeshErrorResponse:
+    """Response to transmission errors ``e_j(t) = Re sum_h error_jh exp(i h omega_m t)`` of the meshes.
+
+    A mesh transmits ``k_j (W_j^T q - e_j)``, so that its error drives the set by ``W_j k_j e_j``
+    (A. Kahraman, J. Mech. Des. 116, 1994, 713-720).
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    mesh_frequency : (F,) array
+        [Hz]
+    error : (n_meshes, H) complex array
+        Amplitude of every harmonic at every mesh [m], with its phase: for equal meshes
+        ``e(tau + phi_j)`` of the phases ``phi_j`` (fractions of the mesh period) ``e_h exp(2 pi i h phi_j)``.
+    mesh_stiffness : (n_meshes,) array
+        [N/m]
+    harmonics : (H,) int array, optional
+        1 to H when not given.
+    outputs : (n_outputs, n) array, optional
+        ``L``; none when not given.
+    speed, damping_ratio
+        See `direct_response`.
+
+    Raises
+    ------
+    CaseError
+        As `direct_response`, and errors or harmonics that do not fit (E-SHAPE).
+    """
+    error, k = np.asarray(error, complex), np.asarray(mesh_stiffness, float)
+    harmonics = np.arange(1, error.shape[-1] + 1) if harmonics is None else np.asarray(harmonics)
+    if error.shape != (len(k), len(harmonics)) or not np.all(np.isfinite(error)):
+        raise CaseError(
+            f"transmission errors of shape {error.shape}", code="E-SHAPE",
+            limit=f"({len(k)} meshes, {len(harmonics)} harmonics), finite",
+        )  # fmt: skip
+    mesh_frequency = np.atleast_1d(np.asarray(mesh_frequency, float))
+    rows = np.empty((0, len(system.M))) if outputs is None else np.atleast_2d(np.asarray(outputs, float))
+    # one receptance from every mesh serves all phases
+    transfer = direct_response(
+        system, np.outer(mesh_frequency, harmonics).ravel(), system.W * k, np.vstack([system.W.T, rows]),
+        mesh_stiffness=k, speed=speed, damping_ratio=damping_ratio,
+    )  # fmt: skip
+    transfer = transfer.reshape(len(mesh_frequency), len(harmonics), -1, len(k))
+    answer = np.einsum("fhoj,jh->fho", transfer, error)
+    deflection = answer[..., : len(k)]
+    return MeshErrorResponse(
+        mesh_frequency, harmonics, deflection, k * (deflection - error.T), answer[..., len(k) :]
+    )  # fmt: skip
 
 
 def complex_modal_response(modes: ComplexModes, frequency, inputs, outputs) -> np.ndarray:
