@@ -351,22 +351,9 @@ def branch_maximum(
 class ContinuationProblem:
     """The harmonic equations along one parameter: a base frequency, or anything that changes the system.
 
-    Parameters
-    ----------
-    balance : HarmonicBalance
-        The equations at the start.
-    frequency : tuple of float
-        Base frequencies [rad/s].
-    limits : (low, high)
-        Of the parameter.
-    base : int, optional
-        Which base frequency is the parameter.
-    family : callable, optional
-        Parameter -> NonlinearSystem, where it is none of them.
-    samples
-        See `harmonic_balance`.
-    radius : bool
-        Whether solutions get the spectral radius of their fixed point.
+    ``balance`` has them at the start. Of the base frequencies ``frequency`` [rad/s] the one numbered ``base``
+    is the parameter, unless there is a ``family``: parameter -> NonlinearSystem, whose harmonic equations
+    take ``samples``.
     """
 
     balance: HarmonicBalance

@@ -56,21 +56,10 @@ def told_value(parameter: float) -> str:
 class ScaledCurve:
     """``F(u, parameter)`` in the unknowns ``z = (u / scale, parameter / unit)``.
 
-    Parameters
-    ----------
-    evaluate : callable
-        ``(u (n,), parameter) -> residual (n,), jacobian (n, n), slope (n,)``.
-    scale : (n,) array
-        Typical sizes of ``u``.
-    unit : float
-        Typical size of a change of the parameter.
-    tolerance : float
-        Length of the last Newton step, relative to ``1 + |z|``.
-    max_iterations : int
-    rows : (n,) array or float
-        Typical sizes of the rows of the scaled derivative, constant so that no singularity is divided away.
-    told : callable
-        Parameter -> text, for messages.
+    ``evaluate(u (n,), parameter)`` gives residual (n,), jacobian (n, n) and slope (n,); ``scale`` (n,) and
+    ``unit`` are typical sizes of u and of a change of the parameter, ``rows`` those of the rows of the scaled
+    derivative, constant so that no singularity is divided away. Newton's method ends with a step of
+    ``tolerance``, relative to ``1 + |z|``. ``told(parameter)`` is text for messages.
     """
 
     evaluate: Callable
@@ -138,14 +127,9 @@ class CurvePoint:
 
 
 def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=None) -> CurvePoint:
-    """Point of the curve in the plane ``normal . (z - guess) = 0``, by Newton's method.
+    """Find the point of the curve in the plane ``normal . (z - guess) = 0`` by Newton's method.
 
-    Parameters
-    ----------
-    curve : ScaledCurve
-    guess, normal : (n + 1,) arrays
-    along : (n + 1,) array, optional
-        The tangent is given the sense of this vector; of ``normal`` when not given.
+    The tangent is given the sense of the vector ``along`` (n + 1,), of ``normal`` when there is none.
 
     Raises
     ------
@@ -212,20 +196,11 @@ def step_effort(
     corner: bool = False,
     sharp: bool = False,
 ) -> float:
-    """How far a step was from what is aimed at: 1 on target.
+    """How far a step was from the ``angle`` [rad] and ``contraction`` that are aimed at: 1 on target.
 
     On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
-    a jump from curve to curve turns the chord but not the tangents.
-
-    Parameters
-    ----------
-    point, new : CurvePoint
-    angle, contraction : float
-        Aimed at; see `StepOptions`.
-    corner : bool
-        The step is so short that the curve may turn in a corner.
-    sharp : bool
-        It is so short that any turn is one of a corner, between whose sides the chord lies.
+    a jump from curve to curve turns the chord but not the tangents. A step may be so short that the curve may
+    turn in a ``corner``, or that any turn is one of a ``sharp`` corner, between whose sides the chord lies.
 
     Raises
     ------

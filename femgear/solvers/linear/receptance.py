@@ -1,7 +1,7 @@
 """Receptances: by direct solution, as sums over modes, and reduced to the deflections of the elements.
 
 Forces excite a linear system (`direct_response`, `modal_response`). Of a problem with nonlinear elements one
-reduction to modes serves any number of frequencies (`reduce_problem`): ``T(omega) = W^T Z^-1 [W, loads]`` with
+reduction to modes serves any number of frequencies (`reduce_problem`), ``T(omega) = W^T Z^-1 [W, loads]`` of
 ``Z = K' + i omega (C + speed G) - omega^2 M`` and ``K' = K + W diag(reference) W^T``, as a sum over poles.
 """
 
@@ -30,6 +30,8 @@ _BATCH = 2**26
 _RESONANT = 1e-12
 # Modal damping off the diagonal, relative to the largest entry, above which the modes are coupled.
 _COUPLED = 1e-9
+# Size of a pole, relative to the largest one, that is none: a motion without stiffness.
+_STILL = 1e-9
 # Error of the sum over complex modes, relative, that is accepted.
 _POLES = 1e-8
 
@@ -158,80 +160,20 @@ def modal_response(
 
 
 @dataclass(frozen=True)
-class RealPoles:
-    """Real modes, ``h = 1 / (omega_k^2 - omega^2 + i omega d_k)``.
-
-    Parameters
-    ----------
-    squared, damping : (m,) arrays
-        ``omega_k^2`` [1/s^2] and ``d_k`` [1/s].
-    """
-
-    squared: np.ndarray
-    damping: np.ndarray
-
-    @property
-    def size(self) -> np.ndarray:
-        """What the denominator is small against (m,) [1/s^2]."""
-        return self.squared
-
-    @property
-    def still(self) -> np.ndarray:
-        """Motions without stiffness (m,) bool."""
-        return self.squared <= 0.0
-
-    @property
-    def frequency(self) -> np.ndarray:
-        """(m,) [Hz]."""
-        return np.sqrt(self.squared) / (2.0 * np.pi)
-
-    def denominator(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``1 / h`` (..., m) and its derivative by omega, with the opposite sign."""
-        below = self.squared - omega * omega + 1j * omega * self.damping
-        return below, 2.0 * omega - 1j * self.damping
-
-
-@dataclass(frozen=True)
-class ComplexPoles:
-    """Complex modes of the state form, ``h = 1 / (i omega - lambda_k)``.
-
-    Parameters
-    ----------
-    value : (p,) complex array
-        ``lambda_k`` [1/s].
-    """
-
-    value: np.ndarray
-
-    @property
-    def size(self) -> np.ndarray:
-        """What the denominator is small against (p,) [1/s]."""
-        return np.abs(self.value)
-
-    @property
-    def still(self) -> np.ndarray:
-        """Motions without stiffness (p,) bool."""
-        return self.size <= 1e-9 * self.size.max()
-
-    @property
-    def frequency(self) -> np.ndarray:
-        """(p,) [Hz]."""
-        return self.size / (2.0 * np.pi)
-
-    def denominator(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``1 / h`` (..., p) and its derivative by omega, with the opposite sign."""
-        return 1j * omega - self.value, np.array(-1j)
-
-
-@dataclass(frozen=True)
 class Reduction:
     """``[W^T; L] Z^-1 [W, loads]`` as ``sum_k left_k right_k h_k(omega) + residual``.
+
+    Real modes have ``h = 1 / (omega_k^2 - omega^2 + i omega d_k)``; complex ones, of the state form,
+    ``h = 1 / (i omega - lambda_k)``. Both are ``1 / (constant + i omega linear - square omega^2)``.
 
     Parameters
     ----------
     reference : (n_columns,) array
         Stiffness of the columns that Z contains [N/m].
-    poles : RealPoles or ComplexPoles
+    constant, linear : (m or p,) arrays
+        ``omega_k^2`` [1/s^2] and ``d_k`` [1/s], or ``-lambda_k`` [1/s] and one.
+    square : float
+        One for real modes, zero for complex ones.
     inputs : (m or p, n_columns + n_loads) array
         ``right_k``.
     pairs : (m or p, n_columns (n_columns + n_loads)) array
@@ -249,7 +191,9 @@ class Reduction:
     """
 
     reference: np.ndarray
-    poles: RealPoles | ComplexPoles
+    constant: np.ndarray
+    linear: np.ndarray
+    square: float
     inputs: np.ndarray
     pairs: np.ndarray
     static: np.ndarray
@@ -270,12 +214,15 @@ class Reduction:
             At the undamped resonance of a mode.
         """
         omega = np.asarray(omega, float)[..., None]
-        size, (below, change) = self.poles.size, self.poles.denominator(omega)
-        still = (omega == 0.0) & self.poles.still
+        size = np.abs(self.constant)
+        below = self.constant - self.square * omega * omega + 1j * omega * self.linear
+        change = 2.0 * self.square * omega - 1j * self.linear
+        still = (omega == 0.0) & (size <= (0.0 if self.square else _STILL * size.max()))
         if np.any(bad := (np.abs(below) <= _RESONANT * size) & ~still):
             mode = int(np.argwhere(bad)[0][-1])
+            natural = np.sqrt(size[mode]) if self.square else size[mode]
             raise _resonance(
-                f"of mode {mode + 1} at {self.poles.frequency[mode]:.6g} Hz",
+                f"of mode {mode + 1} at {natural / (2.0 * np.pi):.6g} Hz",
                 "give the mode some damping, or move the frequency or the reference",
             )
         gain = np.where(still, 0.0, 1.0 / np.where(still, 1.0, below))
@@ -335,7 +282,7 @@ def reduce_problem(
     if off > _COUPLED * np.abs(modal).max(initial=0.0):
         return _complex_modes(modal, modes, common)
     return Reduction(
-        **common, poles=RealPoles((2.0 * np.pi * modes.frequency) ** 2, np.diag(modal).copy()),
+        **common, constant=(2.0 * np.pi * modes.frequency) ** 2, linear=np.diag(modal).copy(), square=1.0,
         inputs=np.ascontiguousarray(rows.T), pairs=_pairs(rows[:columns], rows.T), shape=modes.shape,
     )  # fmt: skip
 
@@ -375,21 +322,11 @@ def _tell_of_the_speed(problem: NonlinearSystem, error: ConvergenceError) -> Non
 
 
 def respond(reduction: Reduction, outputs, omega, inputs) -> np.ndarray:
-    """``L Z^-1 [W, loads] inputs`` at every line.
+    """Outputs ``L Z^-1 [W, loads] inputs`` (n_outputs, L) complex at every line, ``outputs`` (n_outputs, n) =
+    ``L``.
 
-    Parameters
-    ----------
-    reduction : Reduction
-    outputs : (n_outputs, n) array
-        ``L``.
-    omega : (L,) array
-        [rad/s].
-    inputs : (n_columns + n_loads, L) complex array
-        Forces on the columns [N] and amplitudes of the loads.
-
-    Returns
-    -------
-    (n_outputs, L) complex array
+    ``omega`` (L,) [rad/s]; ``inputs`` (n_columns + n_loads, L) are forces on the columns [N] and amplitudes
+    of the loads.
     """
     gain, _ = reduction.gain(omega)
     coordinates = (reduction.inputs @ inputs) * gain.T
@@ -439,7 +376,7 @@ def _complex_modes(modal, modes: Modes, common) -> Reduction:
     inputs = np.linalg.solve(vectors, drive.astype(complex))
     columns = len(common["reference"])
     reduction = Reduction(
-        **common, poles=ComplexPoles(poles), inputs=inputs,
+        **common, constant=-poles, linear=np.ones(len(poles)), square=0.0, inputs=inputs,
         pairs=_pairs(rows[:columns, elastic] @ vectors[:m], inputs),
         shape=modes.shape[:, elastic] @ vectors[:m], drift=modes.shape[:, rigid] @ vectors[2 * m :] * scale,
     )  # fmt: skip
@@ -470,12 +407,8 @@ def _times(gain: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 def source_columns(problem: NonlinearSystem, orders: np.ndarray) -> np.ndarray:
     """Amplitudes (1 + 2 n_forces, L) of the load columns of a reduction on the lines ``orders``.
 
-    The first column holds the constant load with the forces of order zero.
-
-    Raises
-    ------
-    CaseError
-        A harmonic force on a line that is not there.
+    The first column holds the constant load with the forces of order zero. A harmonic force on a line that is
+    not there is refused (E-LINES).
     """
     out = np.zeros((1 + 2 * len(problem.forces), len(orders)), complex)
     out[0, 0] = 1.0

@@ -148,14 +148,8 @@ class HarmonicBalance:
         return out
 
     def evaluate(self, y, frequency) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residual (n_y,) [m], its derivative (n_y, n_y) by y and (n_y, n_bases) by the base frequencies.
-
-        Parameters
-        ----------
-        y : (n_y,) array
-            See `unknowns`.
-        frequency : (n_bases,) array
-            Base frequencies [rad/s].
+        """Residual (n_y,) [m] at the unknowns y, its derivatives (n_y, n_y) by y and (n_y, n_bases) by the
+        base frequencies [rad/s].
         """
         lines = self.lines(y)
         forces = self.forces(lines)
@@ -225,14 +219,10 @@ class HarmonicBalance:
 
 @dataclass(frozen=True)
 class LineForces:
-    """What the elements do beyond their reference springs.
+    """Lines (n_columns, L) [N] of what the elements do beyond their reference springs.
 
-    Parameters
-    ----------
-    lines : (n_columns, L) complex array
-        [N]
-    products : (n_pairs, L, 2 L - 1) complex array
-        Their derivative by the unknowns of one column, for every coupled pair [N/m].
+    ``products`` (n_pairs, L, 2 L - 1) [N/m]: their derivative by the unknowns of one column, for every
+    coupled pair.
     """
 
     lines: np.ndarray
@@ -336,14 +326,9 @@ def element_name(problem: NonlinearSystem, column: int) -> str:
 
 @dataclass(frozen=True)
 class LineTangent:
-    """``dR/dX`` of the harmonic equations at one deflection.
+    """``dR/dX`` of the harmonic equations at one deflection, without a matrix of its size.
 
-    Parameters
-    ----------
-    balance : HarmonicBalance
-    receptance : (L, n_columns, n_columns + n_loads) complex array
-    stiffness : (N, n_pairs) array
-        Tangents of the coupled pairs less the reference springs, on the grid [N/m].
+    ``stiffness`` (N, n_pairs) [N/m]: tangents of the coupled pairs less the reference springs, on the grid.
     """
 
     balance: HarmonicBalance

@@ -202,22 +202,13 @@ def solve_shooting(
 def verdict_of_monodromy(
     problem: NonlinearSystem, monodromy: np.ndarray, period: float, *, error: float, trivial: int = 0
 ) -> FloquetVerdict:
-    """Verdict of a monodromy matrix in (q, v / rate).
+    """Verdict of a monodromy matrix (2n, 2n) in (q, v / rate), of relative error ``error``, over a period
+    [s].
 
     Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
     rounding splits; they are left out (as `floquet.floquet_verdicts` does). Of those that damping feels the
-    position has the multiplier one and is left out, the velocity counts.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    monodromy : (2n, 2n) array
-    period : float
-        [s]
-    error : float
-        Relative error of the matrix.
-    trivial : int
-        Multipliers one of a free vibration, its phase and its amplitude, which are left out too.
+    position has the multiplier one and is left out, the velocity counts. ``trivial`` multipliers one of a
+    free vibration, its phase and its amplitude, are left out too.
     """
     matrix, positions = _without_free_motions(problem, monodromy)
     values = np.linalg.eigvals(matrix)
@@ -231,17 +222,11 @@ def verdict_of_monodromy(
 
 
 def radius_of_lines(problem: NonlinearSystem, turns, omega: float, lines: np.ndarray) -> tuple[float, str]:
-    """Spectral radius of the fixed point at the lines of a periodic motion; nan and the reason without one.
+    """Spectral radius of the fixed point at the lines (n_columns, L) [m] of a periodic motion of ``omega``
+    [rad/s].
 
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    turns : (n_bases,) int array
-        See `on_one_base`.
-    omega : float
-        Angular frequency of the motion [rad/s].
-    lines : (n_columns, L) complex array
-        Mean and harmonics of the deflections [m].
+    The base frequencies are ``turns`` (n_bases,) times that of the motion. Nan and the reason without a
+    radius.
     """
     try:
         balance = harmonic_balance(on_one_base(problem, turns), orders=np.arange(lines.shape[1])[:, None])
@@ -251,14 +236,7 @@ def radius_of_lines(problem: NonlinearSystem, turns, omega: float, lines: np.nda
 
 
 def on_one_base(problem: NonlinearSystem, turns) -> NonlinearSystem:
-    """The problem over one base frequency of which the given ones are multiples.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    turns : (n_bases,) int array
-        The base frequencies over the single one.
-    """
+    """The problem over one base frequency of which the given ones are the multiples ``turns`` (n_bases,)."""
     turns = tuple(int(turn) for turn in turns)
     if turns == (1,):
         return problem

@@ -98,14 +98,8 @@ def solve_spectral(
 class HarmonicProblem:
     """``E_h + T_h (g E)_h = S_h`` for every harmonic h, mesh and speed.
 
-    Parameters
-    ----------
-    receptance : (n, n, n_speeds, H + 1) complex array
-        ``T_h`` [m/N].
-    product : (n, 2 (H + 1), 2 (H + 1)) array
-        Multiplication by the stiffness fluctuation of each mesh, see `series.product_matrix` [N/m].
-    source : (n, n_speeds, H + 1) complex array
-        ``S_h`` [m].
+    Receptance T (n, n, n_speeds, H + 1) [m/N]; product (n, 2 (H + 1), 2 (H + 1)), multiplication by the
+    stiffness fluctuation of each mesh, see `series.product_matrix` [N/m]; source S (n, n_speeds, H + 1) [m].
     """
 
     receptance: np.ndarray
@@ -121,13 +115,8 @@ class HarmonicProblem:
 class Twins:
     """Meshes that repeat others later in time: ``x_j(t) = x_leader(j)(t - phase_j T)``.
 
-    Parameters
-    ----------
-    leaders : (n_groups,) int array
-        First mesh of every group.
-    group : (n_meshes,) int array
-    shift : (n_meshes, H + 1) complex array
-        Factors ``exp(-2 pi i h phase_j)``.
+    First mesh of every group (n_groups,), group of every mesh (n_meshes,), factors ``exp(-2 pi i h phase_j)``
+    (n_meshes, H + 1).
     """
 
     leaders: np.ndarray

@@ -155,16 +155,11 @@ class Frame:
 
 
 def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
-    """Modes of a problem about its reference stiffness, lowest first.
+    """Modes of a problem about its reference stiffness, at most so many, lowest first.
 
     Free motions that no column and no coupling of the damping feels are left out: the multipliers of their
-    positions are one, those of their velocities follow from `Frame.drift`.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    modes : int
-        Largest number of modes kept; the others leave their static flexibility.
+    positions are one, those of their velocities follow from `Frame.drift`. Modes left out leave their static
+    flexibility.
     """
     from scipy import linalg
 
@@ -206,29 +201,10 @@ def frame_of_modes(modes: Modes) -> Frame:
     return Frame(omega**2, damping, modes.mesh_deflection[:, moving], modes.mesh_stiffness, residual)
 
 
-@dataclass(frozen=True)
-class Passage:
-    """Monodromy matrices of several states.
-
-    Parameters
-    ----------
-    matrix : (p, 2 n, 2 n) array
-        In coordinates ``(eta, eta' / s)`` with a scale s of every mode.
-    error : (p,) array
-        Estimated error of the matrix relative to its norm.
-    steps : (p,) int array
-        Steps of the finest sequence; zero for exact exponentials.
-    """
-
-    matrix: np.ndarray
-    error: np.ndarray
-    steps: np.ndarray
-
-
 def passage(
     frame: Frame, period, tangents: Callable, breaks: list[np.ndarray], *, tolerance: float = 1e-7
-) -> Passage:
-    """Monodromy matrices over one period by a splitting of fourth order with Richardson extrapolation.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Integrate small motions over one period, by a splitting of fourth order with Richardson extrapolation.
 
     Algorithm 4B of Chin (Phys. Lett. A 226, 1997; for forces that depend on time Chin and Chen, J. Chem.
     Phys. 117, 2002): damped modes move exactly between kicks of the elements at the Gauss points of every
@@ -237,9 +213,8 @@ def passage(
 
     Parameters
     ----------
-    frame : Frame
     period : (p,) array
-        [s].
+        [s]
     tangents : callable
         ``(fraction (m, s), states (m,)) -> (m, s, n_c, n_c)`` tangents [N/m] at fractions of the period.
     breaks : list of p arrays
@@ -247,23 +222,28 @@ def passage(
     tolerance : float
         Relative error of the matrix at which halving ends, after at most 7 sequences, fewer where a
         period takes thousands of steps.
+
+    Returns
+    -------
+    (p, 2 n, 2 n), (p,) arrays
+        Monodromy matrices in coordinates ``(eta, eta' / s)`` with a scale s of every mode, and their
+        estimated errors relative to their norms.
     """
     period = np.asarray(period, float)
     size, n = len(period), len(frame.square)
-    out = Passage(np.empty((size, 2 * n, 2 * n)), np.full(size, np.inf), np.zeros(size, int))
+    matrix, errors = np.empty((size, 2 * n, 2 * n)), np.full(size, np.inf)
     open_states, table = np.arange(size), None
     base = int(frame.steps(period.max(initial=0.0)))
     for level in range(_LEVELS):
         start, duration = _steps([breaks[i] for i in open_states], base, level)
         found = _through(frame, period[open_states], start, duration, tangents, open_states)
         table, error = _extrapolated(table, found)
-        out.matrix[open_states], out.error[open_states] = table[-1], error
-        out.steps[open_states] = start.shape[1]
+        matrix[open_states], errors[open_states] = table[-1], error
         rest = error > tolerance
         open_states, table = open_states[rest], [entry[rest] for entry in table]
         if not len(open_states) or (level and base << (level + 1) > _MOST_HALVED):
             break
-    return out
+    return matrix, errors
 
 
 def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:
@@ -459,18 +439,7 @@ def judged(
 
 
 def require_period(frequency) -> None:
-    """Refuse the single base frequency zero, which has no period to judge stability over.
-
-    Parameters
-    ----------
-    frequency : float or (n_bases,) array
-        [rad/s]; several ones are let through, their verdict is "not covered".
-
-    Raises
-    ------
-    CaseError
-        The only base frequency is zero (E-FREQUENCY).
-    """
+    """Refuse the single base frequency zero, which has no period to judge stability over (E-FREQUENCY)."""
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
     if frequency.size == 1 and frequency.ravel()[0] == 0.0:
         raise CaseError(
@@ -501,16 +470,8 @@ def hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: 
     ``z = exp(lambda t) sum_h z_h exp(i h omega t)`` in the first-order form gives the eigenvalues of the
     block Toeplitz matrix ``A_(h - m) - i h omega``. Of every exponent it holds copies ``lambda + i k omega``;
     those with the most symmetric eigenvectors are the converged ones (Moore, SIAM J. Numer. Anal. 42, 2005):
-    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each.
-
-    Parameters
-    ----------
-    frame : Frame
-    kappa : (samples, n_c, n_c) array
-        Change of stiffness from the reference over one period [N/m].
-    omega : float
-        Base frequency [rad/s].
-    harmonics : int
+    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each. ``kappa``
+    (samples, n_c, n_c) is the change of stiffness from the reference over one period [N/m].
     """
     n, orders = len(frame.square), np.arange(-harmonics, harmonics + 1)
     lines = np.fft.fft(kappa, axis=0) / len(kappa)
@@ -564,12 +525,12 @@ def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[Fl
     }
     open_states = np.array([i for i, pieces in enumerate(exact) if pieces is None], int)
     for rest in _portions(frame, period, open_states):
-        moved = passage(
+        matrix, errors = passage(
             frame, period[rest], lambda f, states, rest=rest: tangents(f, rest[states]),
             [breaks[i] for i in rest], tolerance=tolerance,
         )  # fmt: skip
-        values = np.linalg.eigvals(moved.matrix)
-        for i, multipliers, error in zip(rest, values, moved.error):
+        values = np.linalg.eigvals(matrix)
+        for i, multipliers, error in zip(rest, values, errors):
             out[i] = verdict_of(
                 multipliers, float(period[i]), "splitting", float(error), tolerance, **_free(frame)
             )

@@ -335,8 +335,7 @@ def _largest_of_cells(
             pieces = tangents(middle, np.arange(len(period)))
             matrix = frame.exact_monodromy(pieces, period[:, None] * np.diff(ends))
         else:
-            found = passage(frame, period, tangents, [breaks] * len(part), tolerance=tolerance)
-            matrix, error[part] = found.matrix, found.error
+            matrix, error[part] = passage(frame, period, tangents, [breaks] * len(part), tolerance=tolerance)
         values = np.linalg.eigvals(matrix)
         multiplier[part] = values[np.arange(len(part)), np.abs(values).argmax(axis=1)]
     if np.any(error > 1e3 * tolerance):

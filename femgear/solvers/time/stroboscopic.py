@@ -28,20 +28,10 @@ _MOST_STEPS = 100_000
 
 @dataclass(frozen=True)
 class StroboscopicMap:
-    """The map of one period of a problem, all tables of its steps made once.
+    """The map of one period [s] of a problem, all tables of its steps made once.
 
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    frequency : (n_bases,) array
-        [rad/s].
-    period : float
-        [s].
-    scheme : Scheme
-    law, loads
-        Of the instants of one period, see `march`.
-    theta : (steps + 1, n_bases) array
-        Phases of those instants.
+    ``law`` and ``loads`` belong to the instants of one period, see `march`, with the phases ``theta`` (steps
+    + 1, n_bases).
     """
 
     problem: NonlinearSystem
