@@ -9,7 +9,7 @@ another curve is refused.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -198,7 +198,7 @@ def switch_branch(
     options: StepOptions | None = None,
     told: Callable[[float], str] = told_value,
 ) -> tuple[Curve, Curve]:
-    """The curve that crosses a known one in a branch point, in both directions from there.
+    """Follow the curve that crosses a known one in a branch point, in both directions from there.
 
     Parameters
     ----------
@@ -284,15 +284,12 @@ def start_point(curve: ScaledCurve, start, parameter: float, *, limits, directio
         ) from error  # fmt: skip
 
 
-def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options=None) -> Curve:
-    """The whole curve from a corrected point in the sense of its tangent."""
-    walk, points = curve_points(curve, first, limits=limits, options=options), []
-    while True:
-        try:
-            points.append(next(walk))
-        except StopIteration as stop:
-            ending = stop.value
-            break
+def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options: StepOptions | None = None) -> Curve:
+    """The whole curve from a corrected point in the sense of its tangent.
+
+    ``first`` has orientation zero where it is a branch point.
+    """
+    points, closed, complete, message = _walk(curve, first, limits, options or StepOptions())
     z = np.array([p.z for p in points])
     parameter = z[:, -1] * curve.unit
     if points[-1].kind == "end":
@@ -303,9 +300,9 @@ def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options=None) -> C
         parameter=parameter,
         folds=np.flatnonzero(kinds == "fold"),
         branch_points=np.flatnonzero(kinds == "branch point"),
-        closed=ending.closed,
-        complete=ending.complete,
-        message=ending.message,
+        closed=closed,
+        complete=complete,
+        message=message,
         tangent=np.array([p.tangent for p in points]),
         iterations=np.array([p.iterations for p in points]),
         error=np.array([p.error for p in points]),
@@ -314,46 +311,29 @@ def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options=None) -> C
     )
 
 
-@dataclass(frozen=True)
-class Ending:
-    """How a curve ended; complete: a closed loop or an end of the range, otherwise the message says why."""
-
-    closed: bool
-    complete: bool
-    message: str
-
-
-def curve_points(
-    curve: ScaledCurve, first: CurvePoint, *, limits, options: StepOptions | None = None
-) -> Iterator[CurvePoint]:
-    """Points of a curve one by one, limit points and branch points among them; returns an `Ending`.
-
-    ``first`` has orientation zero where it is a branch point.
-    """
-    options = options or StepOptions()
+def _walk(
+    curve: ScaledCurve, first: CurvePoint, limits, options: StepOptions
+) -> tuple[list[CurvePoint], bool, bool, str]:
+    """Points, limit points and branch points among them; whether closed, whether complete, how it ended."""
     bounds = np.asarray(limits, float) / curve.unit
-    yield first
-    point, h, count = first, options.first, 1
-    while count < options.max_points:
+    points, point, h = [first], first, options.first
+    while len(points) < options.max_points:
         try:
             h = max(min(h, _longest(point, options)), options.smallest)
             segment, special, h = _step(curve, point, h, bounds, options)
         except LostError as lost:
-            return Ending(False, False, f"lost after {_where(curve, point)}: {lost}")
+            return points, False, False, f"lost after {_where(curve, point)}: {lost}"
         events = [*special, (segment.length, segment.last)]
-        events, closed = _closing(segment, first, events, count)
+        events, closed = _closing(segment, first, events, len(points))
         for _, end in _until_end(segment, events, bounds):
-            yield end
-            count += 1
+            points.append(end)
             if end.kind == "end":
-                return Ending(False, True, f"end of the range at {_where(curve, end)}")
+                return points, False, True, f"end of the range at {_where(curve, end)}"
         if closed:
-            return Ending(True, True, "closed loop")
+            return points, True, True, "closed loop"
         point = segment.last
-    where = _where(curve, point)
-    return Ending(
-        False, False, f"stopped at {where} after {count} points: raise max_points, largest or the scale"
-    )
+    told = f"stopped at {_where(curve, point)} after {len(points)} points"
+    return points, False, False, f"{told}: raise max_points, largest or the scale"
 
 
 def _checked_limits(limits) -> tuple[float, float]:
@@ -401,9 +381,10 @@ def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: Step
                 new = correct(curve, point.z + h * point.tangent, point.tangent)
             shortness = h / (_CORNER * min(options.largest, _CORNER_LARGEST))
             corner = shortness <= 1.0
-            aims = {"angle": options.angle, "contraction": options.contraction, "corner": corner}
-            aims["sharp"] = shortness <= _SHARP
-            effort = step_effort(point, new, **aims)
+            effort = step_effort(
+                point, new, angle=options.angle, contraction=options.contraction, corner=corner,
+                sharp=shortness <= _SHARP,
+            )  # fmt: skip
             if not corner:
                 check_step(curve, point, new)
             segment = Segment(curve, point, new)
