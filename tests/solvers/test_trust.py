@@ -11,13 +11,13 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.branches import branch_maximum, frequency_response_curve, parameter_curve
 from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic import harmonic_balance
-from femgear.solvers.periodic.aft import sample_counts
 from femgear.solvers.periodic.equations import HarmonicBalance
 from femgear.solvers.periodic.harmonic_balance import (
     adapt_harmonics,
     periodic_response,
     solve_harmonic_balance,
 )
+from femgear.solvers.periodic.phase_grid import sample_counts
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability import floquet

@@ -25,9 +25,9 @@ from femgear.solvers.continuation.corrector import (
     check_step,
     correct,
     crossing_tangent,
+    describe_value,
     folds,
     step_effort,
-    told_value,
 )
 
 # A loop is closed when it meets its start within this (scaled) distance.
@@ -147,7 +147,7 @@ def continue_curve(
     unit: float | None = None,
     direction: int = 1,
     options: StepOptions | None = None,
-    told: Callable[[float], str] = told_value,
+    describe: Callable[[float], str] = describe_value,
 ) -> Curve:
     """Follow the curve through a solution until it leaves the range of the parameter or closes.
 
@@ -168,7 +168,7 @@ def continue_curve(
     direction : int
         +1 starts towards larger parameters, -1 towards smaller ones.
     options : StepOptions, optional
-    told : callable
+    describe : callable
         The parameter as text with its name and unit, for messages.
 
     Returns
@@ -183,7 +183,7 @@ def continue_curve(
         No solution near the start.
     """
     curve = scaled_curve(
-        evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, told=told
+        evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, describe=describe
     )
     first = start_point(curve, start, parameter, limits=limits, direction=direction)
     return collect(curve, first, limits=limits, options=options)
@@ -196,7 +196,7 @@ def switch_branch(
     *,
     limits,
     options: StepOptions | None = None,
-    told: Callable[[float], str] = told_value,
+    describe: Callable[[float], str] = describe_value,
 ) -> tuple[Curve, Curve]:
     """Follow the curve that crosses a known one in a branch point, in both directions from there.
 
@@ -207,7 +207,7 @@ def switch_branch(
     known : Curve
     index : int
         Of the branch point among the points of the known curve, one of ``known.branch_points``.
-    limits, options, told
+    limits, options, describe
         As for :func:`continue_curve`.
 
     Raises
@@ -215,7 +215,7 @@ def switch_branch(
     CaseError
         The point is no branch point.
     ConvergenceError
-        The branch point is not simple, so that the other directions cannot be told apart.
+        The branch point is not simple, so that the other directions cannot be describe apart.
     """
     if index not in known.branch_points:
         raise CaseError(
@@ -225,7 +225,7 @@ def switch_branch(
     start = known.points[index]
     curve = scaled_curve(
         evaluate, start, known.parameter[index], limits=limits, scale=known.scale, unit=known.unit,
-        options=options, told=told,
+        options=options, describe=describe,
     )  # fmt: skip
     z = curve.scaled(start, known.parameter[index])
     _, derivative = curve.equations(z)
@@ -234,7 +234,7 @@ def switch_branch(
         tangent = crossing_tangent(curve, point)
     except LostError as error:
         raise ConvergenceError(
-            f"no other curve found at {told(float(known.parameter[index]))}: {error}", code="E-BRANCH",
+            f"no other curve found at {describe(float(known.parameter[index]))}: {error}", code="E-BRANCH",
             remedy="disturb the symmetry of the system a little",
         ) from error  # fmt: skip
     along, back = (
@@ -253,7 +253,7 @@ def scaled_curve(
     scale: float | np.ndarray = 1.0,
     unit: float | None = None,
     options: StepOptions | None = None,
-    told: Callable[[float], str] = told_value,
+    describe: Callable[[float], str] = describe_value,
 ) -> ScaledCurve:
     """The equations with their scales, checked; arguments as for :func:`continue_curve`."""
     options = options or StepOptions()
@@ -262,7 +262,9 @@ def scaled_curve(
     scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
         raise CaseError("the scales of a curve must be positive", code="E-SCALE", limit="> 0")
-    curve = ScaledCurve(evaluate, scale, float(unit), options.tolerance, options.max_iterations, told=told)
+    curve = ScaledCurve(
+        evaluate, scale, float(unit), options.tolerance, options.max_iterations, describe=describe
+    )
     return _with_rows(curve, curve.scaled(start, parameter))
 
 
@@ -270,7 +272,7 @@ def start_point(curve: ScaledCurve, start, parameter: float, *, limits, directio
     """Corrected point at the parameter; the tangent goes with ``direction``."""
     if not limits[0] <= parameter <= limits[1]:
         raise CaseError(
-            f"the start at {curve.told(parameter)} lies outside the range", code="E-RANGE",
+            f"the start at {curve.describe(parameter)} lies outside the range", code="E-RANGE",
             limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
         )  # fmt: skip
     axis = np.zeros(len(curve.scale) + 1)
@@ -279,7 +281,7 @@ def start_point(curve: ScaledCurve, start, parameter: float, *, limits, directio
         return correct(curve, curve.scaled(start, parameter), axis, along=np.sign(direction) * axis)
     except LostError as error:
         raise ConvergenceError(
-            f"no solution found near the start at {curve.told(parameter)}: {error}", code="E-START",
+            f"no solution found near the start at {curve.describe(parameter)}: {error}", code="E-START",
             remedy="give a better start, or start away from a limit point",
         ) from error  # fmt: skip
 
@@ -332,8 +334,8 @@ def _walk(
         if closed:
             return points, True, True, "closed loop"
         point = segment.last
-    told = f"stopped at {_where(curve, point)} after {len(points)} points"
-    return points, False, False, f"{told}: raise max_points, largest or the scale"
+    describe = f"stopped at {_where(curve, point)} after {len(points)} points"
+    return points, False, False, f"{describe}: raise max_points, largest or the scale"
 
 
 def _checked_limits(limits) -> tuple[float, float]:
@@ -368,7 +370,7 @@ def _longest(point: CurvePoint, options: StepOptions) -> float:
 
 def _where(curve: ScaledCurve, point: CurvePoint) -> str:
     """The parameter of a point in words."""
-    return curve.told(float(point.z[-1] * curve.unit))
+    return curve.describe(float(point.z[-1] * curve.unit))
 
 
 def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: StepOptions):

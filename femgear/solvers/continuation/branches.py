@@ -20,7 +20,7 @@ from femgear.solvers.continuation.arclength import (
     scaled_curve,
     switch_branch,
 )
-from femgear.solvers.continuation.corrector import Segment, correct, told_value
+from femgear.solvers.continuation.corrector import Segment, correct, describe_value
 from femgear.solvers.linear.receptance import Reduction
 from femgear.solvers.periodic.equations import HarmonicBalance, harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -299,7 +299,12 @@ def crossing_branches(
     """
     tolerance, equations = checked_tolerance(tolerance), branch.equations
     along, back = switch_branch(
-        equations.evaluate, branch.curve, index, limits=equations.limits, options=options, told=equations.told
+        equations.evaluate,
+        branch.curve,
+        index,
+        limits=equations.limits,
+        options=options,
+        describe=equations.describe,
     )
     return _branch(equations, along, stability, tolerance), _branch(equations, back, stability, tolerance)
 
@@ -369,10 +374,10 @@ class ContinuationProblem:
         """Typical deflection [m], the larger one of both ends."""
         return max(self.balance_at(parameter).scale for parameter in self.limits)
 
-    def told(self, parameter: float) -> str:
+    def describe(self, parameter: float) -> str:
         """The parameter in words."""
         if self.family is not None:
-            return told_value(parameter)
+            return describe_value(parameter)
         return f"frequency {parameter:.6g} rad/s ({parameter / (2.0 * np.pi):.6g} Hz)"
 
     def frequency_at(self, parameter: float) -> np.ndarray:
@@ -445,17 +450,17 @@ class ContinuationProblem:
 
 def _follow(equations: ContinuationProblem, ends: tuple[float, float], chosen: CurveOptions) -> Branch:
     """The branch between two ends of the parameter."""
-    limits, told = equations.limits, equations.told
+    limits, describe = equations.limits, equations.describe
     begin = ends[0] if chosen.start_at is None else float(chosen.start_at)
     if not limits[0] <= begin <= limits[1]:
         raise CaseError(
-            f"the start at {told(begin)} lies outside the range", code="E-RANGE", key="start_at",
+            f"the start at {describe(begin)} lies outside the range", code="E-RANGE", key="start_at",
             limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
         )  # fmt: skip
     first = equations.first(begin, chosen.start)
     if not first.converged:
         raise ConvergenceError(
-            f"no periodic solution found at the start, {told(begin)}: {first.message}", code="E-START",
+            f"no periodic solution found at the start, {describe(begin)}: {first.message}", code="E-START",
             remedy="give a start, or start where the response is nearly linear",
         )  # fmt: skip
     scale = chosen.scale
@@ -463,7 +468,7 @@ def _follow(equations: ContinuationProblem, ends: tuple[float, float], chosen: C
         scale = max(equations.scale, float(np.abs(first.deflection).max()))
     curve = continue_curve(
         equations.evaluate, equations.balance.unknowns(first.deflection), begin, limits=limits, scale=scale,
-        direction=1 if ends[1] > ends[0] else -1, options=chosen.options, told=told,
+        direction=1 if ends[1] > ends[0] else -1, options=chosen.options, describe=describe,
     )  # fmt: skip
     return _branch(equations, curve, chosen.stability, chosen.tolerance)
 

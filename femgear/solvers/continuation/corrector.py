@@ -47,7 +47,7 @@ class RoundingError(LostError):
     """A correction that came near a solution, but whose last steps are rounding: it is nearly singular."""
 
 
-def told_value(parameter: float) -> str:
+def describe_value(parameter: float) -> str:
     """A parameter without a name or a unit of its own, in words."""
     return f"parameter = {parameter:.9g}"
 
@@ -59,7 +59,7 @@ class ScaledCurve:
     ``evaluate(u (n,), parameter)`` gives residual (n,), jacobian (n, n) and slope (n,); ``scale`` (n,) and
     ``unit`` are typical sizes of u and of a change of the parameter, ``rows`` those of the rows of the scaled
     derivative, constant so that no singularity is divided away. Newton's method ends with a step of
-    ``tolerance``, relative to ``1 + |z|``. ``told(parameter)`` is text for messages.
+    ``tolerance``, relative to ``1 + |z|``. ``describe(parameter)`` is text for messages.
     """
 
     evaluate: Callable
@@ -68,7 +68,7 @@ class ScaledCurve:
     tolerance: float
     max_iterations: int
     rows: np.ndarray | float = 1.0
-    told: Callable[[float], str] = told_value
+    describe: Callable[[float], str] = describe_value
 
     def scaled(self, u, parameter: float) -> np.ndarray:
         """``z`` (n + 1,)."""

@@ -25,7 +25,7 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.receptance import Reduction, reduce_problem, source_columns
-from femgear.solvers.periodic.aft import (
+from femgear.solvers.periodic.phase_grid import (
     PhaseGrid,
     coupled_pairs,
     forces_on_grid,
