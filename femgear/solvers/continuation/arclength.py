@@ -215,7 +215,7 @@ def switch_branch(
     CaseError
         The point is no branch point.
     ConvergenceError
-        The branch point is not simple, so that the other directions cannot be describe apart.
+        The branch point is not simple, so that the other directions cannot be told apart.
     """
     if index not in known.branch_points:
         raise CaseError(
@@ -334,8 +334,8 @@ def _walk(
         if closed:
             return points, True, True, "closed loop"
         point = segment.last
-    describe = f"stopped at {_where(curve, point)} after {len(points)} points"
-    return points, False, False, f"{describe}: raise max_points, largest or the scale"
+    stopped = f"stopped at {_where(curve, point)} after {len(points)} points"
+    return points, False, False, f"{stopped}: raise max_points, largest or the scale"
 
 
 def _checked_limits(limits) -> tuple[float, float]:
