@@ -121,9 +121,9 @@ def test_adaptive_integration(benchmark, medians, ratio, tolerance):
 @pytest.mark.benchmark(group=GROWTH, timer=process_time)
 @pytest.mark.parametrize("links", [0, 9, 99])
 def test_growth_over_degrees_of_freedom(benchmark, medians, links):
+    from femgear.solvers.linear.receptance import reduce_problem
     from femgear.solvers.periodic.equations import harmonic_balance
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-    from femgear.solvers.periodic.receptance import reduce_problem
 
     longer = train.with_chains(problem(0.05), links, damping=0.05)
     begin = process_time()
@@ -236,7 +236,7 @@ def test_transient(benchmark):
 
 @question_group
 def test_sweep_with_jumps(benchmark):
-    from femgear.solvers.continuation.sweep import sweep_up_and_down
+    from femgear.solvers.time.stroboscopic import sweep_up_and_down
 
     speeds = 2.0 * np.pi * np.linspace(6200.0, 7000.0, 9)
     options = {"steps": 100, "tolerance": 1e-4, "most": 300}
@@ -252,7 +252,7 @@ def test_sweep_with_jumps(benchmark):
 
 @question_group
 def test_poincare_section(benchmark):
-    from femgear.solvers.chaos.poincare import stroboscopic_section
+    from femgear.solvers.time.stroboscopic import stroboscopic_section
 
     found = ask(
         benchmark, "stroboscopic section: 100 points after 100 periods of 100 steps",
@@ -267,8 +267,8 @@ def test_poincare_section(benchmark):
 @question_group
 @pytest.mark.parametrize("route", ["direct", "modal"])
 def test_frequency_response(benchmark, route):
-    from femgear.solvers.linear.frequency_response import direct_response, modal_response
     from femgear.solvers.linear.modal import solve_modes
+    from femgear.solvers.linear.receptance import direct_response, modal_response
 
     system, k = problem(0.05).system, problem(0.05).reference
     frequency, W = np.linspace(50.0, 12000.0, 2000), system.W
@@ -288,7 +288,7 @@ def test_frequency_response(benchmark, route):
 def test_campbell_diagram(benchmark):
     from published.planetary_sets import lin_parker_set
 
-    from femgear.solvers.linear.campbell import campbell_data
+    from femgear.solvers.linear.tracking import campbell_data
     from femgear.system.assembler import planar_system
 
     data = lin_parker_set(3)
@@ -305,7 +305,7 @@ def test_campbell_diagram(benchmark):
 
 @question_group
 def test_stability_chart(benchmark):
-    from femgear.solvers.stability.chart import stability_chart
+    from femgear.solvers.stability.parametric import stability_chart
 
     frequency = 2.0 * np.pi * np.linspace(6000.0, 16000.0, 100)
     found = ask(

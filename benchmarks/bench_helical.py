@@ -61,7 +61,7 @@ def test_sum_of_modes(benchmark, medians, loads):
 @pytest.mark.benchmark(group=GROUP, timer=process_time)
 def test_direct(benchmark, medians):
     """One receptance from all meshes serves the eight cases."""
-    from femgear.solvers.linear.frequency_response import direct_response
+    from femgear.solvers.linear.receptance import direct_response
     from femgear.trains.helical.model import modal_error_response
 
     system, modes, _, error = inputs()

@@ -142,9 +142,9 @@ def settle_by_steps(problem, target: Target, tolerance: float, *, steps: int, mo
     error : float
     periods : int
     """
-    from femgear.solvers.time.stroboscopic import strobe
+    from femgear.solvers.time.stroboscopic import stroboscopic_map
 
-    period = strobe(problem, OMEGA, steps=steps, method=method)
+    period = stroboscopic_map(problem, OMEGA, steps=steps, method=method)
     state, g = period.enter(static_start(problem))
     count, before, error, periods = min(LINES, (steps - 1) // 2), None, np.inf, 0
     while periods < most:

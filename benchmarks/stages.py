@@ -179,7 +179,7 @@ def sweep(reference: Reference):
 
 def sweep_verdicts(reference: Reference):
     """Periodic responses at 1000 speeds and the Floquet verdict of each."""
-    from femgear.solvers.stability.floquet import stability
+    from femgear.solvers.stability.parametric import stability
 
     result, response = reference.modes, sweep(reference)
     stability(

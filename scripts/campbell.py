@@ -48,7 +48,7 @@ def main(
     from published.wind_turbine import wind_turbine_a, wind_turbine_b
 
     from femgear.report.style import save_figure
-    from femgear.solvers.linear.campbell import campbell_data
+    from femgear.solvers.linear.tracking import campbell_data
     from femgear.system.assembler import planar_system
 
     if not (np.isfinite(highest) and highest > 0.0) or speeds < 5 or modes < 1 or harmonics < 0:

@@ -118,7 +118,7 @@ def _sweeps(result, hertz, steps):
     """Curves of the integration, and rows with the branch's solution nearest to each motion."""
     from published.wind_turbine_response import sweep_rms
 
-    from femgear.solvers.continuation.sweep import sweep_up_and_down
+    from femgear.solvers.time.stroboscopic import sweep_up_and_down
 
     problem = result[1]
     found = sweep_up_and_down(problem, 2.0 * np.pi * hertz, steps=steps, most=100, tolerance=1e-4)

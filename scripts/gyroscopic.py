@@ -109,7 +109,7 @@ class Branches:
 
 def followed(result, centre_distance: float, speeds, below: float) -> Branches:
     """Branches of all elastic modes that are below a frequency [Hz] at rest."""
-    from femgear.solvers.linear.campbell import campbell_data
+    from femgear.solvers.linear.tracking import campbell_data
     from femgear.trains.elastic.model import ring_wave_shares, turning_system
 
     modes, model = result.modes, result.model

@@ -136,7 +136,7 @@ def _drawn(folder: Path, name: str, curves, title: str) -> list[str]:
 def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
     """Contact states by harmonic balance and by sweeps up and down."""
     from femgear.report.style import save_figure
-    from femgear.solvers.continuation.sweep import sweep_up_and_down
+    from femgear.solvers.time.stroboscopic import sweep_up_and_down
     from femgear.trains.gear_pair.figures import state_bands
     from femgear.trains.gear_pair.model import (
         BACK,
@@ -176,7 +176,7 @@ def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
 def chaos_study(folder: Path, ratios: int, points: int) -> list[str]:
     """Bifurcation diagram, exponents and sections of the lightly loaded pair."""
     from femgear.report.style import save_figure
-    from femgear.solvers.chaos.lyapunov import lyapunov_exponents
+    from femgear.solvers.stability.lyapunov import lyapunov_exponents
     from femgear.trains.gear_pair.figures import bifurcation_and_exponent, phase_sections
     from femgear.trains.gear_pair.model import lightly_loaded_pair
 
@@ -285,8 +285,8 @@ def eccentricity_study(folder: Path, frequencies: int) -> list[str]:
 
 def eccentric_response(eccentricity: float, floating: bool, hertz):
     """Force of mesh 1 and convergence (3, F); path of the sun, lines of the force at the first frequency."""
+    from femgear.solvers.linear.receptance import reduce_problem
     from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
-    from femgear.solvers.periodic.receptance import reduce_problem
     from femgear.system.nonlinear import element_forces
 
     errors, build = eccentric_set(eccentricity, floating)

@@ -6,13 +6,13 @@ import re
 import pytest
 from page_examples import ROOT, read_page, run_examples
 
-from femgear.solvers.chaos.lyapunov import LyapunovExponents
+from femgear.solvers.stability.lyapunov import LyapunovExponents
 
 PAGE, EXAMPLES, PRINTED = read_page("impacts.md")
 MODULES = (
     "system.transmission_errors", "system.series", "trains.gear_pair.model",
-    "trains.gear_pair.figures", "solvers.linear.modal", "solvers.chaos.lyapunov", "solvers.chaos.poincare",
-    "solvers.continuation.branches", "solvers.continuation.sweep",
+    "trains.gear_pair.figures", "solvers.linear.modal", "solvers.stability.lyapunov",
+    "solvers.continuation.branches", "solvers.time.stroboscopic",
 )  # fmt: skip
 
 

@@ -1,0 +1,79 @@
+"""Solvers of the dynamic problem ``M q'' + (C + Omega G) q' + K q + W f(W^T q, t) = load``.
+
+`docs/solvers.md` says which one answers which question. Names are imported when they are first asked for.
+"""
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from femgear.solvers.continuation.branches import (
+        branch_maximum,
+        crossing_branches,
+        frequency_response_curve,
+        parameter_curve,
+    )
+    from femgear.solvers.linear.modal import complex_modes, solve_modes
+    from femgear.solvers.linear.receptance import direct_response, modal_response
+    from femgear.solvers.linear.tracking import campbell_data
+    from femgear.solvers.periodic.harmonic_balance import (
+        adapt_harmonics,
+        displacements,
+        periodic_response,
+        solve_harmonic_balance,
+    )
+    from femgear.solvers.periodic.shooting import solve_shooting
+    from femgear.solvers.periodic.spectral import solve_spectral
+    from femgear.solvers.stability.floquet import floquet_verdict
+    from femgear.solvers.stability.lyapunov import lyapunov_exponents
+    from femgear.solvers.stability.parametric import stability_boundary, stability_chart
+    from femgear.solvers.time.stroboscopic import (
+        bifurcation_diagram,
+        stroboscopic_section,
+        sweep_response,
+        sweep_up_and_down,
+    )
+    from femgear.solvers.time.transient import solve_transient
+
+
+def lazy_names(package: str, names: Sequence[str], modules: Sequence[str]) -> Callable[[str], object]:
+    """Make the ``__getattr__`` of a package that finds its public names in its modules, searched in order."""
+
+    def find(name: str) -> object:
+        for module in modules if name in names else ():
+            found = import_module(f"{package}.{module}")
+            if hasattr(found, name):
+                return getattr(found, name)
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    return find
+
+
+__all__ = [
+    "adapt_harmonics",
+    "bifurcation_diagram",
+    "branch_maximum",
+    "campbell_data",
+    "complex_modes",
+    "crossing_branches",
+    "direct_response",
+    "displacements",
+    "floquet_verdict",
+    "frequency_response_curve",
+    "lyapunov_exponents",
+    "modal_response",
+    "parameter_curve",
+    "periodic_response",
+    "solve_harmonic_balance",
+    "solve_modes",
+    "solve_shooting",
+    "solve_spectral",
+    "solve_transient",
+    "stability_boundary",
+    "stability_chart",
+    "stroboscopic_section",
+    "sweep_response",
+    "sweep_up_and_down",
+]
+__getattr__ = lazy_names(__name__, __all__, ("continuation", "linear", "periodic", "stability", "time"))

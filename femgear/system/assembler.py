@@ -275,7 +275,7 @@ def _bearing_columns(data: PlanarSet, name: str) -> np.ndarray:
 
 
 def planar_springs(data: PlanarSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the set by name, for `femgear.solvers.linear.tracking.strain_shares`.
+    """Springs of the set by name.
 
     Parameters
     ----------

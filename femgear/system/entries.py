@@ -7,7 +7,7 @@ import numpy as np
 from femgear.errors import CaseError
 
 
-def checked_numbers(value, key: str, *, code: str, unit: str, kind=float) -> np.ndarray:
+def checked_numbers(value, key: str, *, code: str, unit: str, kind: type = float) -> np.ndarray:
     """The value as an array of numbers.
 
     Parameters

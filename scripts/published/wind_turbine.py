@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.solvers.periodic.receptance import Reduction, reduce_problem
+from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.system.assembler import planar_meshes
 from femgear.system.lumped import PlanarBody, PlanarSet, PlanarTorque, inertia_of_reduced
 from femgear.system.nonlinear import NonlinearSystem

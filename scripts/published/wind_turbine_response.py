@@ -9,10 +9,9 @@ import numpy as np
 from published.wind_turbine import SMOOTHING, bearing_problem_a, drive_reduction, wind_turbine_b
 
 from femgear.solvers.continuation.branches import Branch
-from femgear.solvers.continuation.sweep import SweepResponse
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.solution import PeriodicSolution
-from femgear.solvers.time.stroboscopic import strobe
+from femgear.solvers.time.stroboscopic import SweepResponse, stroboscopic_map
 from femgear.system.assembler import free_motions, pin_directions
 from femgear.system.lumped import CENTRAL
 from femgear.system.nonlinear import NonlinearSystem
@@ -85,7 +84,7 @@ def sweep_rms(problem: NonlinearSystem, sweep: SweepResponse, *, steps: int, mem
     """Root mean square (f,) [m] of x of a member over the last period of every frequency of a sweep."""
     out, row = [], 3 * CENTRAL.index(member)
     for omega, *state in zip(sweep.frequency, sweep.displacement, sweep.velocity):
-        period = strobe(problem, omega, steps=steps)
+        period = stroboscopic_map(problem, omega, steps=steps)
         block = period.run(*period.enter(state))
         out.append(period.motion(block, np.arange(len(block.states) - 1))[0][:, row].std())
     return np.array(out)

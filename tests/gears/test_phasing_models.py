@@ -3,10 +3,17 @@
 import numpy as np
 import pytest
 from phase_patterns import cyclic_shares, mesh_loads
+from validation.reference.frequency_response import mesh_error_response
 
-from femgear.gears.phasing import MEMBERS, mesh_phasing, phase_factors, phasing_table
+from femgear.gears.phasing import (
+    MEMBERS,
+    cyclic_shares,
+    mesh_loads,
+    mesh_phasing,
+    phase_factors,
+    phasing_table,
+)
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
-from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.system.assembler import mesh_directions, pin_directions, planar_system
 from femgear.system.lumped import PlanarBody, PlanarSet
 from femgear.system.mode_kinds import equally_spaced, phase_basis, phase_shares, planar_motions

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import kahraman_set
+from validation.reference.mode_energy import stiffness_of, strain_shares
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.tracking import stiffness_of, strain_shares
 from femgear.system.lumped import HelicalSupport
 from femgear.system.mode_kinds import phase_basis, phasing
 from femgear.trains.helical.model import (

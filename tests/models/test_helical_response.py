@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import TABLE_2, cases, kahraman_set
+from validation.reference.frequency_response import mesh_error_response
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears.phasing import MeshPhasing, mesh_phasing, phase_factors
-from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.system.mode_kinds import phase_shares
 from femgear.trains.helical.model import (
     body_masses,

@@ -8,8 +8,8 @@ from scipy.optimize import fsolve
 
 from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import parameter_curve
-from femgear.solvers.continuation.sweep import sweep_response
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.time.stroboscopic import sweep_response
 from femgear.system.elements import GearMeshes
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.system.series import FourierSeries, SummedSeries, constant, harmonic_lines

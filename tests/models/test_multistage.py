@@ -11,9 +11,9 @@ from published.multistage_example import PUBLISHED, four_stage_train, published_
 from published.planetary_sets import lin_parker_set
 from scipy.linalg import eigh
 from trains import closed_set, stage, two_stages
+from validation.reference.mode_energy import stiffness_of, strain_shares
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.tracking import stiffness_of, strain_shares
 from femgear.system.assembler import planar_meshes, planar_system
 from femgear.system.lumped import CENTRAL
 from femgear.trains.multistage.model import (

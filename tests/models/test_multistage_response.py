@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from published.multistage_example import DESIGNS, SPEED, TORQUE, example_gears, four_stage_train
 from trains import two_stages
+from validation.reference.frequency_response import mesh_error_response
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import planar_meshes

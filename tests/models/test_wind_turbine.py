@@ -24,8 +24,8 @@ from published.wind_turbine_response import (
 from validation import nrel
 
 from femgear.errors import CaseError
-from femgear.solvers.continuation.sweep import sweep_response
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.time.stroboscopic import sweep_response
 from femgear.trains.planar.model import planar_modes
 
 

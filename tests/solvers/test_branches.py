@@ -15,7 +15,7 @@ from femgear.solvers.continuation.branches import (
 )
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.stability.chart import stability_boundary
+from femgear.solvers.stability.parametric import stability_boundary
 from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, gear_meshes
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.system.series import FourierSeries
@@ -274,7 +274,7 @@ def test_two_masses_with_stops_are_followed_over_both_symmetry_losses(stops):
     stable = [set(leg[2:-2].tolist()) for leg in legs]
     assert stable == [{True}, {False}, {True}, {False}, {True}]
     # without contact the response is linear: 40 Hz is below the first resonance at 98.4 Hz
-    system, omega = stops.route.balance.problem.system, TWO_HZ[0]
+    system, omega = stops.equations.balance.problem.system, TWO_HZ[0]
     dynamic = system.K - omega**2 * system.M + 1j * omega * system.C
     linear = np.linalg.solve(dynamic, [30.0, 0.0])[1]
     assert stops.lines[0, 0, 1] == pytest.approx(linear, rel=1e-3)
@@ -283,7 +283,7 @@ def test_two_masses_with_stops_are_followed_over_both_symmetry_losses(stops):
 @pytest.mark.parametrize(("hertz", "leg"), [(105.0, "one"), (200.0, "top")])
 def test_two_masses_with_stops_against_integration_in_time(stops, hertz, leg):
     """SciPy's integrator settles on the motions of the branch from starts that are 1 % off."""
-    problem, (one, other), (top, _) = stops.route.balance.problem, stops.branch_points, stops.folds
+    problem, (one, other), (top, _) = stops.equations.balance.problem, stops.branch_points, stops.folds
     part = {"one": np.arange(one), "top": np.arange(other, top)}[leg]
     i = part[np.argmin(np.abs(stops.parameter[part] - 2 * np.pi * hertz))]
     solution, omega = stops.solutions[i], stops.parameter[i]

@@ -5,9 +5,6 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.arclength import (
     StepOptions,
     continue_curve,
-    curve_points,
-    scaled_curve,
-    start_point,
     switch_branch,
 )
 
@@ -263,14 +260,6 @@ def test_lost_branch_tells_where_and_why():
     assert found.parameter[-1] == pytest.approx(0.5, abs=1e-6) and found.parameter[-1] <= 0.5
     assert "lost after parameter = 0.49999" in found.message or "lost after parameter = 0.5" in found.message
     assert "nothing there" in found.message
-
-
-def test_generator_gives_points_one_by_one():
-    curve = scaled_curve(circle, [1.0], 0.0, limits=(-2.0, 2.0), unit=1.0)
-    first = start_point(curve, [1.0], 0.0, limits=(-2.0, 2.0))
-    walk = curve_points(curve, first, limits=(-2.0, 2.0))
-    taken = [next(walk) for _ in range(5)]
-    assert taken[0] is first and taken[-1].z[-1] > taken[1].z[-1] > 0.0
 
 
 def test_number_of_points_is_limited_and_said():

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from validation.reference.force_history import solve_force_history
+from validation.reference.force_history import modal_history, solve_force_history, state_history
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping, solve_modes
-from femgear.solvers.time.convolution import modal_history, state_history, step_matrices
+from femgear.solvers.time.steps import step_matrices
 from femgear.system.system import MechanicalSystem
 
 NATURAL = np.array([0.0, 0.4, 3.0, 3.0, 3.0, 40.0])

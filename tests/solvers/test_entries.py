@@ -2,21 +2,26 @@
 
 import numpy as np
 import pytest
+from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.chaos.lyapunov import lyapunov_exponents
-from femgear.solvers.chaos.poincare import bifurcation_diagram, stroboscopic_section, surface_section
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
-from femgear.solvers.continuation.sweep import sweep_response, sweep_up_and_down
+from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic.harmonic_balance import (
     adapt_harmonics,
     periodic_response,
     solve_harmonic_balance,
 )
-from femgear.solvers.periodic.receptance import reduce_problem
-from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
-from femgear.solvers.stability.chart import stability_boundary, stability_chart
+from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import floquet_verdict
+from femgear.solvers.stability.lyapunov import lyapunov_exponents
+from femgear.solvers.stability.parametric import stability_boundary, stability_chart
+from femgear.solvers.time.stroboscopic import (
+    bifurcation_diagram,
+    stroboscopic_section,
+    sweep_response,
+    sweep_up_and_down,
+)
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
 from femgear.system.entries import checked_numbers, checked_tolerance
@@ -39,7 +44,6 @@ BY_FREQUENCY = {
     "up and down": lambda w: sweep_up_and_down(PROBLEM, w),
     "transient": lambda w: solve_transient(PROBLEM, w, [0.0, 1e-4]),
     "section": lambda w: stroboscopic_section(PROBLEM, w),
-    "surface": lambda w: surface_section(PROBLEM, w, np.ones(4), end=1e-4),
     "Lyapunov": lambda w: lyapunov_exponents(PROBLEM, w),
     "chart": lambda w: stability_chart(PROBLEM, FourierSeries([[3e8, 6e7]]), w, [0.0, 1.0]),
 }
@@ -58,7 +62,6 @@ BY_TOLERANCE = {
         lambda _: PROBLEM, (0.0, 1.0), OMEGA, harmonics=3, tolerance=e
     ),
     "transient": lambda e: solve_transient(PROBLEM, OMEGA, [0.0, 1e-4], tolerance=e),
-    "surface": lambda e: surface_section(PROBLEM, OMEGA, np.ones(4), end=1e-4, tolerance=e),
     "diagram": lambda e: bifurcation_diagram(lambda _: (PROBLEM, OMEGA), [1.0], tolerance=e),
     "Lyapunov": lambda e: lyapunov_exponents(PROBLEM, OMEGA, tolerance=e),
     "chart": lambda e: stability_chart(PROBLEM, FourierSeries([[3e8]]), [OMEGA], [0.0], tolerance=e),

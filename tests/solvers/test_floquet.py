@@ -6,7 +6,8 @@ from scipy.integrate import solve_ivp
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.solvers.stability.floquet import floquet_multipliers, monodromy, stability
+from femgear.solvers.stability.floquet import monodromy
+from femgear.solvers.stability.parametric import stability
 from femgear.system.series import harmonics_of
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
@@ -34,9 +35,9 @@ def test_multipliers_equal_time_integration(geared_chain, chain_excitation, damp
     top = modes.frequency
     for frequency in (0.05, top[3], 2 * top[3], top[2] + top[3]):
         exact = np.abs(reference_multipliers(modes, excitation, frequency)).max()
-        found = floquet_multipliers(modes, excitation, frequency, frequency_ratio=1e3)[0]
+        found = stability(modes, excitation, frequency, frequency_ratio=1e3).modulus[0]
         assert found == pytest.approx(exact, rel=2e-5)
-        assert floquet_multipliers(modes, excitation, frequency)[0] == pytest.approx(exact, rel=1e-4)
+        assert stability(modes, excitation, frequency).modulus[0] == pytest.approx(exact, rel=1e-4)
 
 
 def test_splitting_is_of_fourth_order(geared_chain, chain_excitation):
@@ -45,7 +46,7 @@ def test_splitting_is_of_fourth_order(geared_chain, chain_excitation):
     frequency = 2 * modes.frequency[3]
     exact = np.abs(reference_multipliers(modes, excitation, frequency)).max()
     error = [
-        abs(floquet_multipliers(modes, excitation, frequency, steps=n, frequency_ratio=1e3)[0] - exact)
+        abs(stability(modes, excitation, frequency, steps=n, frequency_ratio=1e3).modulus[0] - exact)
         for n in (10, 20, 40)
     ]
     assert error[0] / error[1] > 13 and error[1] / error[2] > 13
@@ -56,13 +57,13 @@ def test_speeds_in_one_call_equal_single_calls(planet_set, planet_excitation):
     modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.005)
     frequency = np.linspace(0.02, 1.0, 80)
     together = stability(modes, excitation, frequency)
-    alone = [floquet_multipliers(modes, excitation, f)[0] for f in frequency[::20]]
+    alone = [stability(modes, excitation, f).modulus[0] for f in frequency[::20]]
     np.testing.assert_allclose(np.abs(together.multiplier[::20]), alone, rtol=1e-5)
     assert together.stable.shape == (80,) and np.any(together.stable) and not np.all(together.stable)
     for i in (0, 30, 60):
         exact = np.abs(reference_multipliers(modes, excitation, frequency[i])).max()
         assert abs(together.multiplier[i]) == pytest.approx(exact, rel=1e-3)
-        every_mode = floquet_multipliers(modes, excitation, frequency[i], frequency_ratio=20.0)[0]
+        every_mode = stability(modes, excitation, frequency[i], frequency_ratio=20.0).modulus[0]
         assert every_mode == pytest.approx(exact, rel=1e-6)
 
 
@@ -87,10 +88,10 @@ def test_residual_flexibility_takes_part(geared_chain, chain_excitation):
     few = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.01, count=3)
     frequency = 0.02
     exact = np.abs(reference_multipliers(everything, excitation, frequency)).max()
-    assert floquet_multipliers(few, excitation, frequency)[0] == pytest.approx(exact, rel=1e-4)
+    assert stability(few, excitation, frequency).modulus[0] == pytest.approx(exact, rel=1e-4)
     shift = replace(few, residual=np.zeros((2, 2)))
     tongue = 2 * few.frequency[2]
-    good = [floquet_multipliers(m, excitation, tongue)[0] for m in (few, shift)]
+    good = [stability(m, excitation, tongue).modulus[0] for m in (few, shift)]
     assert abs(good[0] - good[1]) > 1e-4
 
 
@@ -114,20 +115,20 @@ def test_monodromy_multiplies_in_the_order_of_time():
 def test_bad_options_are_refused(geared_chain, chain_excitation, options):
     modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     with pytest.raises(CaseError):
-        floquet_multipliers(modes, chain_excitation(0.2), 0.1, **options)
+        stability(modes, chain_excitation(0.2), 0.1, **options)
 
 
 @pytest.mark.parametrize("frequency", [0.0, -1.0, np.nan])
 def test_bad_frequencies_are_refused(geared_chain, chain_excitation, frequency):
     modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     with pytest.raises(CaseError, match="positive"):
-        floquet_multipliers(modes, chain_excitation(0.2), frequency)
+        stability(modes, chain_excitation(0.2), frequency)
 
 
 def test_unphysical_flexibility_is_refused(geared_chain, chain_excitation):
     modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05, count=1)
     with pytest.raises(ConvergenceError, match="keep more modes"):
-        floquet_multipliers(replace(modes, residual=20 * np.eye(2)), chain_excitation(0.4), 0.1)
+        stability(replace(modes, residual=20 * np.eye(2)), chain_excitation(0.4), 0.1)
 
 
 def test_bad_monodromy_pieces_are_refused():

@@ -6,17 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
-
-from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.frequency_response import (
+from validation.reference.frequency_response import (
     complex_modal_response,
-    direct_response,
     mesh_error_response,
-    modal_response,
     resonance_peaks,
     unit_force,
 )
+
+from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes, solve_modes
+from femgear.solvers.linear.receptance import direct_response, modal_response
 from femgear.system.assembler import planar_system
 from femgear.system.system import MechanicalSystem
 from femgear.trains.planar.model import planar_modes

@@ -9,9 +9,9 @@ from scipy.special import ellipk
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import adapt_harmonics, displacements, solve_harmonic_balance
-from femgear.solvers.periodic.receptance import reduce_problem
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.system.elements import (
     GearMeshes,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
+from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.periodic.receptance import reduce_problem
 from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.system.series import FourierSeries

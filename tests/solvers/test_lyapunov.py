@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.chaos.lyapunov import lyapunov_exponents
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.stability.lyapunov import lyapunov_exponents
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem

@@ -7,21 +7,17 @@ import pytest
 from published.planetary_sets import lin_parker_set
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
-
-from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.campbell import campbell_data
-from femgear.solvers.linear.modal import complex_modes
-from femgear.solvers.linear.tracking import (
-    approaches,
+from validation.reference.mode_approaches import approaches, coupling_factor, mac
+from validation.reference.mode_energy import (
     body_groups,
-    coupling_factor,
     kinetic_shares,
-    mac,
-    oscillating,
     stiffness_of,
     strain_shares,
-    track_modes,
 )
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.linear.modal import complex_modes
+from femgear.solvers.linear.tracking import campbell_data, oscillating, track_modes
 from femgear.system.assembler import planar_springs, planar_system
 from femgear.system.mode_kinds import motion_planes
 from femgear.system.system import MechanicalSystem

@@ -9,7 +9,7 @@ from validation.parametric import NATURAL, one_pair, rectangular_monodromy
 from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
 from femgear.solvers.linear.modal import modal_damping, solve_modes
-from femgear.solvers.periodic.equations import harmonic_balance, largest_modulus
+from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability import floquet
@@ -95,16 +95,6 @@ def test_radius_is_the_rate_of_the_plain_iteration_of_a_nonlinear_system(force, 
     middle = len(distance) // 2
     rate = (distance[middle] / distance[0]) ** (1.0 / middle)
     assert rate == pytest.approx(found.spectral_radius, rel=0.15)
-
-
-def test_radius_of_large_matrices_by_arnoldi():
-    random = np.random.default_rng(3)
-    q, _ = np.linalg.qr(random.standard_normal((700, 700)))
-    values = np.linspace(0.0, 0.9, 698)
-    matrix = np.diag(np.concatenate([[0.0, 0.0], values]))
-    # the largest ones are a complex pair of modulus 1.3
-    matrix[:2, :2] = 1.3 * np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])
-    assert largest_modulus(q @ matrix @ q.T) == pytest.approx(1.3, rel=1e-9)
 
 
 def test_radius_is_nan_only_where_it_is_not_asked_for():

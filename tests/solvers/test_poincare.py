@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.chaos.poincare import bifurcation_diagram, stroboscopic_section, surface_section
-from femgear.system.elements import PiecewiseSprings, PolynomialSprings
+from femgear.solvers.time.stroboscopic import bifurcation_diagram, stroboscopic_section
+from femgear.system.elements import PolynomialSprings
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.system.system import MechanicalSystem
 
@@ -56,37 +56,10 @@ def test_linear_motion_is_one_point_at_every_phase():
     assert section.time[0] == pytest.approx((40.3) * 2 * np.pi / omega)
 
 
-def test_surface_section_of_a_decaying_oscillator():
-    """Upward crossings of zero: T = 2 pi / w_d apart, each slower by exp(- zeta w T)."""
-    ratio = 0.05
-    section = surface_section(oscillator(2 * ratio, 1.0), 0.0, [1.0, 0.0], end=40.0, start=([-0.1], [1.0]))
-    period = 2 * np.pi / np.sqrt(1 - ratio**2)
-    assert len(section.time) == 7
-    np.testing.assert_allclose(np.diff(section.time), period, atol=1e-8)
-    np.testing.assert_allclose(
-        section.velocity[1:, 0] / section.velocity[:-1, 0], np.exp(-ratio * period), atol=1e-8
-    )
-    np.testing.assert_allclose(section.displacement, 0.0, atol=1e-10)
-
-
-def test_surface_section_on_a_contact_corner():
-    """Dead zone of half-width 1: flight from 1 to -1 at constant speed sqrt(A^2 - 2 A + 1)."""
-    problem = oscillator(0.0, 0.0, PiecewiseSprings([0], [-1.0, 1.0], [1.0, 0.0, 1.0]))
-    for value, direction in ((1.0, -1), (-1.0, -1), (0.5, 1)):
-        section = surface_section(
-            problem, 0.0, [1.0, 0.0], end=31.0, value=value, direction=direction, start=([2.0], [0.0])
-        )
-        assert len(section.time) == 3
-        np.testing.assert_allclose(section.velocity[:, 0], direction * 1.0, atol=1e-8)
-        np.testing.assert_allclose(np.diff(section.time), 2 * np.pi + 4.0, atol=1e-8)
-
-
 def test_bad_input_is_refused():
     problem = oscillator(0.4, 2.0, force=1.0)
     for options in ({"points": 0}, {"phase": 1.5}):
         with pytest.raises(CaseError, match="E-SECTION"):
             stroboscopic_section(problem, 1.0, **options)
-    with pytest.raises(CaseError, match="E-SECTION"):
-        surface_section(problem, 1.0, [1.0], end=1.0)
     with pytest.raises(CaseError, match="E-STEP"):
         stroboscopic_section(problem, 1.0, steps=2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError, FemgearError
-from femgear.solvers.periodic.receptance import reduce_problem, respond, source_columns
+from femgear.solvers.linear.receptance import reduce_problem, respond, source_columns
 from femgear.system.elements import PolynomialSprings
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.system.system import MechanicalSystem

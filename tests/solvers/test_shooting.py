@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipk
+from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import monodromy
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import (

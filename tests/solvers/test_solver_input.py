@@ -2,16 +2,20 @@
 
 import numpy as np
 import pytest
+from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError
-from femgear.solvers.chaos.poincare import bifurcation_diagram, stroboscopic_section, surface_section
 from femgear.solvers.continuation.arclength import continue_curve
-from femgear.solvers.continuation.sweep import sweep_response
-from femgear.solvers.linear.campbell import campbell_data
-from femgear.solvers.linear.frequency_response import direct_response, modal_response
 from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.receptance import direct_response, modal_response
+from femgear.solvers.linear.tracking import campbell_data
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.periodic.shooting import solve_shooting
+from femgear.solvers.time.stroboscopic import (
+    bifurcation_diagram,
+    stroboscopic_section,
+    sweep_response,
+)
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import PolynomialSprings
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
@@ -82,7 +86,6 @@ def test_a_start_that_does_not_fit_is_refused(duffing, start):
         lambda: solve_transient(duffing, 1.0, [0.0, 1.0], start=start),
         lambda: sweep_response(duffing, [1.0], start=start),
         lambda: stroboscopic_section(duffing, 1.0, start=start),
-        lambda: surface_section(duffing, 1.0, [1.0, 0.0], end=1.0, start=start),
     ):
         with pytest.raises(CaseError, match="E-START") as error:
             call()

@@ -5,8 +5,7 @@ from validation.parametric import NATURAL, RATIO, SOFT, rectangular_monodromy
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.solvers.stability.chart import stability_boundary, stability_chart
-from femgear.solvers.stability.floquet import floquet_multipliers
+from femgear.solvers.stability.parametric import stability, stability_boundary, stability_chart
 from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.series import FourierSeries, StepSeries
 from femgear.system.system import MechanicalSystem
@@ -70,9 +69,9 @@ def test_chart_of_a_modal_basis_equals_the_linear_solver(geared_chain, chain_exc
     frequency = np.array([0.2, 2 * modes.frequency[3], modes.frequency[2] + modes.frequency[3]])
     chart = stability_chart(modes, excitation, 2 * np.pi * frequency, [0.5, 1.0])
     for column, depth in enumerate((0.3, 0.6)):
-        expected = floquet_multipliers(
+        expected = stability(
             modes, chain_excitation(depth), frequency, frequency_ratio=1e3, steps=400
-        )
+        ).modulus
         np.testing.assert_allclose(np.abs(chart.multiplier[:, column]), expected, rtol=1e-7)
 
 

@@ -2,19 +2,18 @@
 
 import numpy as np
 import pytest
+from validation.reference.step_rules import numerical_damping, period_error
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.stability.floquet import monodromy
-from femgear.solvers.time.newmark import (
+from femgear.solvers.time.steps import (
     AVERAGE_ACCELERATION,
     CENTRAL_DIFFERENCE,
     FOX_GOODWIN,
     LINEAR_ACCELERATION,
     StepRule,
     generalised_alpha,
-    numerical_damping,
-    period_error,
     stability_limit,
 )
 from femgear.solvers.time.transient import solve_transient

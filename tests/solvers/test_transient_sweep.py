@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.continuation.sweep import sweep_response, sweep_up_and_down
 from femgear.solvers.periodic.shooting import solve_shooting
+from femgear.solvers.time.stroboscopic import sweep_response, sweep_up_and_down
 from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.system.series import FourierSeries

@@ -5,22 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from validation.parametric import NATURAL, one_pair, rectangular_monodromy
+from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.branches import branch_maximum, frequency_response_curve, parameter_curve
+from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic import harmonic_balance
-from femgear.solvers.periodic.aft import sample_counts
 from femgear.solvers.periodic.equations import HarmonicBalance
 from femgear.solvers.periodic.harmonic_balance import (
     adapt_harmonics,
     periodic_response,
     solve_harmonic_balance,
 )
-from femgear.solvers.periodic.receptance import reduce_problem
-from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
+from femgear.solvers.periodic.phase_grid import sample_counts
+from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability import floquet
-from femgear.solvers.stability.floquet import floquet_verdict, stability
+from femgear.solvers.stability.floquet import floquet_verdict
+from femgear.solvers.stability.parametric import stability
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.solvers.stability.floquet import stability
+from femgear.solvers.stability.parametric import stability
 from femgear.system.series import mesh_harmonics, sample
 from femgear.system.system import MeshExcitation, Modes
 from validation.cases import reference_case, reference_modes, reference_static

@@ -10,7 +10,6 @@ import numpy as np
 from published.planetary_sets import TABLE_2, cases, kahraman_set
 
 from femgear.gears.phasing import phase_factors
-from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.system.mode_kinds import phasing
 from femgear.trains.helical.model import (
     HelicalSet,
@@ -22,6 +21,7 @@ from femgear.trains.helical.model import (
     phased_errors,
 )
 from validation import independent
+from validation.reference.frequency_response import mesh_error_response
 from validation.rows import Row, at_most, counted, information, within
 
 PAPER = "Kahraman, J. Mech. Des. 116, 1994"

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from femgear.solvers.chaos.lyapunov import lyapunov_exponents
 from femgear.solvers.continuation.branches import parameter_curve
-from femgear.solvers.continuation.sweep import sweep_response
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.stability.lyapunov import lyapunov_exponents
+from femgear.solvers.time.stroboscopic import sweep_response
 from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.series import FourierSeries, constant
 from femgear.trains.gear_pair.model import (

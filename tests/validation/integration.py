@@ -6,19 +6,18 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import Branch
-from femgear.solvers.continuation.sweep import sweep_response
-from femgear.solvers.time.newmark import (
+from femgear.solvers.time.steps import (
     AVERAGE_ACCELERATION,
     CENTRAL_DIFFERENCE,
     FOX_GOODWIN,
     LINEAR_ACCELERATION,
     StepRule,
-    numerical_damping,
-    period_error,
     stability_limit,
 )
+from femgear.solvers.time.stroboscopic import sweep_response
 from femgear.solvers.time.transient import solve_transient
 from validation.nonlinear import duffing, oscillator, response_curve
+from validation.reference.step_rules import numerical_damping, period_error
 from validation.rows import REPEATED, Row, at_most, counted, printed, within
 
 HUGHES = "T. J. R. Hughes, The Finite Element Method (2000), Eq. 9.1.22"

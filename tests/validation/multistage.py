@@ -18,7 +18,6 @@ from published.multistage_example import (
 )
 from published.planetary_sets import lin_parker_set
 
-from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.system.lumped import torsional_set
 from femgear.trains.multistage.model import (
     Member,
@@ -34,6 +33,7 @@ from femgear.trains.multistage.model import (
 )
 from femgear.trains.multistage.stages import error_response, multistage_modes
 from femgear.trains.planar.model import planar_modes
+from validation.reference.frequency_response import mesh_error_response
 from validation.rows import Row, at_most, counted, information, within
 
 STRUCTURE = "Kiracofe and Parker, J. Vib. Acoust. 129, 2007: structure of the modes"

@@ -18,12 +18,13 @@ from femgear.solvers.continuation.branches import Branch, branch_maximum, freque
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.solvers.periodic.shooting import ShootingSolution, solve_free_vibration, solve_shooting
+from femgear.solvers.periodic.shooting import ShootingSolution, solve_shooting
 from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.system.elements import PiecewiseSprings, PolynomialSprings
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.system.series import harmonics_of
 from femgear.system.system import MechanicalSystem
+from validation.reference.free_vibration import solve_free_vibration
 from validation.rows import Row, at_most, counted, printed, within
 
 NLVIB = "computed for example 1 of NLvib (Krack and Gross, 2019), confirmed by time integration"

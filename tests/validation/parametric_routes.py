@@ -9,8 +9,8 @@ import numpy as np
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
-from femgear.solvers.stability.chart import stability_boundary
 from femgear.solvers.stability.floquet import floquet_verdict
+from femgear.solvers.stability.parametric import stability_boundary
 from femgear.system.elements import GearMeshes
 from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.series import FourierSeries, StepSeries

@@ -242,7 +242,7 @@ def whole_ring() -> tuple[Row, ...]:
 
 def turning_carrier() -> tuple[Row, ...]:
     """Natural frequencies in the carrier frame, gyroscopic and convective terms included, up to 120 rad/s."""
-    from femgear.solvers.linear.campbell import campbell_data
+    from femgear.solvers.linear.tracking import campbell_data
     from femgear.trains.elastic.model import ring_wave_shares, turning_system
 
     basis = reference_modes()

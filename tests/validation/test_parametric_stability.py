@@ -7,7 +7,8 @@ from scipy.special import mathieu_a, mathieu_b
 
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.solvers.stability.floquet import floquet_multipliers, monodromy
+from femgear.solvers.stability.floquet import monodromy
+from femgear.solvers.stability.parametric import stability
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 # Gauss nodes of the fourth-order Magnus integrator (Iserles et al., Acta Numerica 9, 2000, Eq. 5.6)
@@ -128,7 +129,7 @@ def test_rectangular_stiffness_fixed_point_radius():
     response = solve_spectral(modes, excitation, frequency, excitation_harmonics=40, response_harmonics=80)
     np.testing.assert_allclose(response.spectral_radius, [0.096, 1.022, 0.579], atol=5e-4)
     assert response.method == ("fixed point", "direct", "fixed point") and np.all(response.converged)
-    multiplier = floquet_multipliers(modes, excitation, frequency, excitation_harmonics=40)
+    multiplier = stability(modes, excitation, frequency, excitation_harmonics=40).modulus
     np.testing.assert_allclose(multiplier[:2], [1.090, 1.005], atol=5e-4)
     exact = [rectangular_multiplier(ratio, 0.03 * NATURAL) for ratio in (2, 1, 0.5)]
     np.testing.assert_allclose(multiplier, exact, atol=1e-4)

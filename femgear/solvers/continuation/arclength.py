@@ -9,21 +9,25 @@ another curve is refused.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.continuation.bifurcation import Segment, branch_point, crossing_tangent, folds
 from femgear.solvers.continuation.corrector import (
     CurvePoint,
     LostError,
     ScaledCurve,
+    Segment,
+    bracketed_root,
+    branch_point,
     check_step,
     correct,
-    strain,
-    told_value,
+    crossing_tangent,
+    describe_value,
+    folds,
+    step_effort,
 )
 
 # A loop is closed when it meets its start within this (scaled) distance.
@@ -139,11 +143,11 @@ def continue_curve(
     parameter: float,
     *,
     limits: tuple[float, float],
-    scale=1.0,
+    scale: float | np.ndarray = 1.0,
     unit: float | None = None,
     direction: int = 1,
     options: StepOptions | None = None,
-    told: Callable[[float], str] = told_value,
+    describe: Callable[[float], str] = describe_value,
 ) -> Curve:
     """Follow the curve through a solution until it leaves the range of the parameter or closes.
 
@@ -164,7 +168,7 @@ def continue_curve(
     direction : int
         +1 starts towards larger parameters, -1 towards smaller ones.
     options : StepOptions, optional
-    told : callable
+    describe : callable
         The parameter as text with its name and unit, for messages.
 
     Returns
@@ -179,7 +183,7 @@ def continue_curve(
         No solution near the start.
     """
     curve = scaled_curve(
-        evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, told=told
+        evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, describe=describe
     )
     first = start_point(curve, start, parameter, limits=limits, direction=direction)
     return collect(curve, first, limits=limits, options=options)
@@ -192,9 +196,9 @@ def switch_branch(
     *,
     limits,
     options: StepOptions | None = None,
-    told: Callable[[float], str] = told_value,
+    describe: Callable[[float], str] = describe_value,
 ) -> tuple[Curve, Curve]:
-    """The curve that crosses a known one in a branch point, in both directions from there.
+    """Follow the curve that crosses a known one in a branch point, in both directions from there.
 
     Parameters
     ----------
@@ -203,7 +207,7 @@ def switch_branch(
     known : Curve
     index : int
         Of the branch point among the points of the known curve, one of ``known.branch_points``.
-    limits, options, told
+    limits, options, describe
         As for :func:`continue_curve`.
 
     Raises
@@ -221,7 +225,7 @@ def switch_branch(
     start = known.points[index]
     curve = scaled_curve(
         evaluate, start, known.parameter[index], limits=limits, scale=known.scale, unit=known.unit,
-        options=options, told=told,
+        options=options, describe=describe,
     )  # fmt: skip
     z = curve.scaled(start, known.parameter[index])
     _, derivative = curve.equations(z)
@@ -230,15 +234,26 @@ def switch_branch(
         tangent = crossing_tangent(curve, point)
     except LostError as error:
         raise ConvergenceError(
-            f"no other curve found at {told(float(known.parameter[index]))}: {error}", code="E-BRANCH",
+            f"no other curve found at {describe(float(known.parameter[index]))}: {error}", code="E-BRANCH",
             remedy="disturb the symmetry of the system a little",
         ) from error  # fmt: skip
-    sides = (replace(point, tangent=sign * tangent) for sign in (1.0, -1.0))
-    return tuple(collect(curve, side, limits=limits, options=options) for side in sides)
+    along, back = (
+        collect(curve, replace(point, tangent=sign * tangent), limits=limits, options=options)
+        for sign in (1.0, -1.0)
+    )
+    return along, back
 
 
 def scaled_curve(
-    evaluate, start, parameter: float, *, limits, scale=1.0, unit=None, options=None, told=told_value
+    evaluate: Callable,
+    start,
+    parameter: float,
+    *,
+    limits,
+    scale: float | np.ndarray = 1.0,
+    unit: float | None = None,
+    options: StepOptions | None = None,
+    describe: Callable[[float], str] = describe_value,
 ) -> ScaledCurve:
     """The equations with their scales, checked; arguments as for :func:`continue_curve`."""
     options = options or StepOptions()
@@ -247,7 +262,9 @@ def scaled_curve(
     scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
         raise CaseError("the scales of a curve must be positive", code="E-SCALE", limit="> 0")
-    curve = ScaledCurve(evaluate, scale, float(unit), options.tolerance, options.max_iterations, told=told)
+    curve = ScaledCurve(
+        evaluate, scale, float(unit), options.tolerance, options.max_iterations, describe=describe
+    )
     return _with_rows(curve, curve.scaled(start, parameter))
 
 
@@ -255,7 +272,7 @@ def start_point(curve: ScaledCurve, start, parameter: float, *, limits, directio
     """Corrected point at the parameter; the tangent goes with ``direction``."""
     if not limits[0] <= parameter <= limits[1]:
         raise CaseError(
-            f"the start at {curve.told(parameter)} lies outside the range", code="E-RANGE",
+            f"the start at {curve.describe(parameter)} lies outside the range", code="E-RANGE",
             limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
         )  # fmt: skip
     axis = np.zeros(len(curve.scale) + 1)
@@ -264,20 +281,17 @@ def start_point(curve: ScaledCurve, start, parameter: float, *, limits, directio
         return correct(curve, curve.scaled(start, parameter), axis, along=np.sign(direction) * axis)
     except LostError as error:
         raise ConvergenceError(
-            f"no solution found near the start at {curve.told(parameter)}: {error}", code="E-START",
+            f"no solution found near the start at {curve.describe(parameter)}: {error}", code="E-START",
             remedy="give a better start, or start away from a limit point",
         ) from error  # fmt: skip
 
 
-def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options=None) -> Curve:
-    """The whole curve from a corrected point in the sense of its tangent."""
-    walk, points = curve_points(curve, first, limits=limits, options=options), []
-    while True:
-        try:
-            points.append(next(walk))
-        except StopIteration as stop:
-            ending = stop.value
-            break
+def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options: StepOptions | None = None) -> Curve:
+    """The whole curve from a corrected point in the sense of its tangent.
+
+    ``first`` has orientation zero where it is a branch point.
+    """
+    points, closed, complete, message = _walk(curve, first, limits, options or StepOptions())
     z = np.array([p.z for p in points])
     parameter = z[:, -1] * curve.unit
     if points[-1].kind == "end":
@@ -288,9 +302,9 @@ def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options=None) -> C
         parameter=parameter,
         folds=np.flatnonzero(kinds == "fold"),
         branch_points=np.flatnonzero(kinds == "branch point"),
-        closed=ending.closed,
-        complete=ending.complete,
-        message=ending.message,
+        closed=closed,
+        complete=complete,
+        message=message,
         tangent=np.array([p.tangent for p in points]),
         iterations=np.array([p.iterations for p in points]),
         error=np.array([p.error for p in points]),
@@ -299,46 +313,29 @@ def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options=None) -> C
     )
 
 
-@dataclass(frozen=True)
-class Ending:
-    """How a curve ended; complete: a closed loop or an end of the range, otherwise the message says why."""
-
-    closed: bool
-    complete: bool
-    message: str
-
-
-def curve_points(
-    curve: ScaledCurve, first: CurvePoint, *, limits, options: StepOptions | None = None
-) -> Iterator[CurvePoint]:
-    """Points of a curve one by one, limit points and branch points among them; returns an `Ending`.
-
-    ``first`` has orientation zero where it is a branch point.
-    """
-    options = options or StepOptions()
+def _walk(
+    curve: ScaledCurve, first: CurvePoint, limits, options: StepOptions
+) -> tuple[list[CurvePoint], bool, bool, str]:
+    """Points, limit points and branch points among them; whether closed, whether complete, how it ended."""
     bounds = np.asarray(limits, float) / curve.unit
-    yield first
-    point, h, count = first, options.first, 1
-    while count < options.max_points:
+    points, point, h = [first], first, options.first
+    while len(points) < options.max_points:
         try:
             h = max(min(h, _longest(point, options)), options.smallest)
             segment, special, h = _step(curve, point, h, bounds, options)
         except LostError as lost:
-            return Ending(False, False, f"lost after {_where(curve, point)}: {lost}")
+            return points, False, False, f"lost after {_where(curve, point)}: {lost}"
         events = [*special, (segment.length, segment.last)]
-        events, closed = _closing(segment, first, events, count)
+        events, closed = _closing(segment, first, events, len(points))
         for _, end in _until_end(segment, events, bounds):
-            yield end
-            count += 1
+            points.append(end)
             if end.kind == "end":
-                return Ending(False, True, f"end of the range at {_where(curve, end)}")
+                return points, False, True, f"end of the range at {_where(curve, end)}"
         if closed:
-            return Ending(True, True, "closed loop")
+            return points, True, True, "closed loop"
         point = segment.last
-    where = _where(curve, point)
-    return Ending(
-        False, False, f"stopped at {where} after {count} points: raise max_points, largest or the scale"
-    )
+    stopped = f"stopped at {_where(curve, point)} after {len(points)} points"
+    return points, False, False, f"{stopped}: raise max_points, largest or the scale"
 
 
 def _checked_limits(limits) -> tuple[float, float]:
@@ -373,7 +370,7 @@ def _longest(point: CurvePoint, options: StepOptions) -> float:
 
 def _where(curve: ScaledCurve, point: CurvePoint) -> str:
     """The parameter of a point in words."""
-    return curve.told(float(point.z[-1] * curve.unit))
+    return curve.describe(float(point.z[-1] * curve.unit))
 
 
 def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: StepOptions):
@@ -386,9 +383,10 @@ def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: Step
                 new = correct(curve, point.z + h * point.tangent, point.tangent)
             shortness = h / (_CORNER * min(options.largest, _CORNER_LARGEST))
             corner = shortness <= 1.0
-            aims = {"angle": options.angle, "contraction": options.contraction, "corner": corner}
-            aims["sharp"] = shortness <= _SHARP
-            effort = strain(point, new, **aims)
+            effort = step_effort(
+                point, new, angle=options.angle, contraction=options.contraction, corner=corner,
+                sharp=shortness <= _SHARP,
+            )  # fmt: skip
             if not corner:
                 check_step(curve, point, new)
             segment = Segment(curve, point, new)
@@ -444,8 +442,6 @@ def _until_end(segment: Segment, events, bounds):
 
 def _at_bound(segment: Segment, low, high, bound: float):
     """Point exactly at the bound, between two points with a monotonous parameter between them."""
-    from scipy.optimize import brentq
-
     if low[1].z[-1] == bound:
         # the curve starts at the bound and leaves at once
         return low[0] + np.finfo(float).tiny, replace(low[1], kind="end")
@@ -454,7 +450,7 @@ def _at_bound(segment: Segment, low, high, bound: float):
     def gap(h: float) -> float:
         return known[h] if h in known else segment.at(h).z[-1] - bound
 
-    h = brentq(gap, low[0], high[0], xtol=1e-13 * segment.length, rtol=1e-14)
+    h = bracketed_root(gap, low[0], high[0], xtol=1e-13 * segment.length)
     near = segment.at(h) if h not in known else (low if h == low[0] else high)[1]
     try:
         exact = _at_parameter(segment.curve, near.z, bound, near.tangent)

@@ -1,15 +1,14 @@
 """Branches of periodic solutions over a frequency or another parameter, with limit points and stability.
 
-The harmonic equations along one parameter, a base frequency or anything that changes the system (`Route`),
-joined with arc-length continuation and Floquet multipliers: Krack and Gross, Harmonic Balance for Nonlinear
-Vibration Problems (2019), chapters 3 and 4.
+The harmonic equations along one parameter, a base frequency or anything that changes the system, joined with
+arc-length continuation and Floquet multipliers: Krack and Gross, Harmonic Balance for Nonlinear Vibration
+Problems (2019), chapters 3 and 4.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
@@ -21,8 +20,8 @@ from femgear.solvers.continuation.arclength import (
     scaled_curve,
     switch_branch,
 )
-from femgear.solvers.continuation.bifurcation import Segment
-from femgear.solvers.continuation.corrector import correct, told_value
+from femgear.solvers.continuation.corrector import Segment, correct, describe_value
+from femgear.solvers.linear.receptance import Reduction
 from femgear.solvers.periodic.equations import HarmonicBalance, harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
@@ -50,8 +49,7 @@ class Branch:
     solutions : tuple of PeriodicSolution
     curve : Curve
         The unknowns, limit points and branch points.
-    limits : (low, high)
-    route : Route
+    equations : ContinuationProblem
         The equations along the curve.
     stability : bool
         Whether verdicts were asked for.
@@ -60,8 +58,7 @@ class Branch:
     parameter: np.ndarray
     solutions: tuple[PeriodicSolution, ...]
     curve: Curve
-    limits: tuple[float, float]
-    route: Route = field(repr=False)
+    equations: ContinuationProblem = field(repr=False)
     stability: bool = True
 
     @property
@@ -143,45 +140,21 @@ class Branch:
     def message(self) -> str:
         """How the branch ended; where it was lost, what to change."""
         lost = self.curve.message.startswith("lost")
-        return self.curve.message + (f"; {_advice(self.solutions[-1], self.route)}" if lost else "")
+        return self.curve.message + (f"; {_advice(self.solutions[-1], self.equations)}" if lost else "")
 
 
-def frequency_response_curve(
-    problem: NonlinearSystem,
-    frequency: tuple[float, float],
-    *,
-    harmonics: int | None = None,
-    orders=None,
-    base: int = 0,
-    held=None,
-    start=None,
-    start_at: float | None = None,
-    stability: bool = True,
-    tolerance: float = 1e-7,
-    radius: bool | None = None,
-    samples=None,
-    reduction=None,
-    scale: float | None = None,
-    options: StepOptions | None = None,
-) -> Branch:
-    """Periodic solutions over a base frequency, past limit points.
+@dataclass(frozen=True)
+class CurveOptions:
+    """What curves over a frequency and over another parameter have in common.
 
     Parameters
     ----------
-    problem : NonlinearSystem
-    frequency : (first, last)
-        [rad/s]; the curve starts at the first one towards the last one, which may be lower. With stability
-        both are above zero.
     harmonics, orders, samples, reduction
-        As for ``harmonic_balance``.
-    base : int
-        Which base frequency varies.
-    held : (n_bases,) array, optional
-        The base frequencies, when there are several; the entry ``base`` is not used.
+        As for `harmonic_balance`; a reduction is for a curve over a frequency.
     start : PeriodicSolution or (n_columns, L) array, optional
         Near the solution to start from; found from the linear response when not given.
     start_at : float, optional
-        Frequency of the start, within the range, when it is not the first one; closed loops need that.
+        Parameter of the start, within the range, when it is not the first one; closed loops need that.
     stability : bool
         Floquet verdict and spectral radius of the fixed point at every point. With several base frequencies
         each verdict says "not covered".
@@ -190,9 +163,57 @@ def frequency_response_curve(
     radius : bool, optional
         The radius alone, with or without verdicts; nan without.
     scale : float, optional
-        Deflection [m] that counts as much as the whole range of frequencies; by default the larger of the
+        Deflection [m] that counts as much as the whole range of the parameter; by default the larger of the
         static deflection and the start.
     options : StepOptions, optional
+        How the curve is followed.
+    """
+
+    harmonics: int | None = None
+    orders: np.ndarray | None = None
+    samples: tuple[int, ...] | int | None = None
+    reduction: Reduction | None = None
+    start: PeriodicSolution | np.ndarray | None = None
+    start_at: float | None = None
+    stability: bool = True
+    tolerance: float = 1e-7
+    radius: bool | None = None
+    scale: float | None = None
+    options: StepOptions | None = None
+
+    def __post_init__(self):
+        object.__setattr__(self, "tolerance", checked_tolerance(self.tolerance))
+
+    def balance(self, problem: NonlinearSystem) -> HarmonicBalance:
+        """The harmonic equations of a problem on these lines."""
+        return harmonic_balance(
+            problem, harmonics=self.harmonics, orders=self.orders, samples=self.samples,
+            reduction=self.reduction,
+        )  # fmt: skip
+
+    @property
+    def with_radius(self) -> bool:
+        """Whether solutions get the spectral radius of their fixed point."""
+        return self.stability if self.radius is None else self.radius
+
+
+def frequency_response_curve(
+    problem: NonlinearSystem, frequency: tuple[float, float], *, base: int = 0, held=None, **options
+) -> Branch:
+    """Follow periodic solutions over a base frequency, past limit points.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    frequency : (first, last)
+        [rad/s]; the curve starts at the first one towards the last one, which may be lower. With stability
+        both are above zero.
+    base : int
+        Which base frequency varies.
+    held : (n_bases,) array, optional
+        The base frequencies, when there are several; the entry ``base`` is not used.
+    options
+        Fields of `CurveOptions`.
 
     Raises
     ------
@@ -201,10 +222,8 @@ def frequency_response_curve(
     ConvergenceError
         No solution at the start.
     """
-    tolerance, frequency = checked_tolerance(tolerance), _ends(frequency, "frequency", "rad/s")
-    balance = harmonic_balance(
-        problem, harmonics=harmonics, orders=orders, samples=samples, reduction=reduction
-    )
+    chosen, frequency = CurveOptions(**options), _ends(frequency, "frequency", "rad/s")
+    balance = chosen.balance(problem)
     bases = balance.orders.shape[1]
     others = np.ones(bases) if held is None and bases == 1 else held
     if others is None or np.shape(others) != (bases,) or not 0 <= base < bases:
@@ -218,62 +237,52 @@ def frequency_response_curve(
             code="E-RANGE",
             limit="two different ones, not negative",
         )
-    if stability and bases == 1:
+    if chosen.stability and bases == 1:
         require_period(min(frequency))
-    radius = stability if radius is None else radius
-    route = FrequencyRoute(balance, tuple(np.asarray(others, float).tolist()), base, radius)
-    return _follow(route, frequency, start, start_at, stability, tolerance, scale, options)
+    equations = ContinuationProblem(
+        balance, tuple(np.asarray(others, float).tolist()), (min(frequency), max(frequency)), base=base,
+        radius=chosen.with_radius,
+    )  # fmt: skip
+    return _follow(equations, frequency, chosen)
 
 
 def parameter_curve(
-    family: Callable[[float], NonlinearSystem],
-    parameter: tuple[float, float],
-    frequency,
-    *,
-    harmonics: int | None = None,
-    orders=None,
-    start=None,
-    start_at: float | None = None,
-    stability: bool = True,
-    tolerance: float = 1e-7,
-    radius: bool | None = None,
-    samples=None,
-    scale: float | None = None,
-    options: StepOptions | None = None,
+    family: Callable[[float], NonlinearSystem], parameter: tuple[float, float], frequency, **options
 ) -> Branch:
-    """Periodic solutions over any parameter at fixed base frequencies: amplitude, backlash, clearance, ...
+    """Follow periodic solutions over any parameter at fixed base frequencies: torque, backlash, clearance.
 
     Parameters
     ----------
     family : callable
-        Parameter -> NonlinearSystem; called within the range.
+        Parameter -> NonlinearSystem; called within the range. The derivative by the parameter is taken by
+        differences.
     parameter : (first, last)
         The curve starts at the first value towards the last one.
     frequency : float or (n_bases,) array
         [rad/s].
-    harmonics, orders, start, start_at, stability, tolerance, radius, samples, scale, options
-        As for :func:`frequency_response_curve`. The derivative by the parameter is taken by differences.
+    options
+        Fields of `CurveOptions`.
     """
-    tolerance, parameter = checked_tolerance(tolerance), _ends(parameter, "parameter", "")
+    chosen, parameter = CurveOptions(**options), _ends(parameter, "parameter", "")
     if not np.all(np.isfinite(parameter)) or min(parameter) == max(parameter):
         raise CaseError(
             f"a range of parameters {tuple(parameter)}", code="E-RANGE", limit="two different ones"
         )
-    if stability:
+    if chosen.stability:
         require_period(frequency)
-    begin = parameter[0] if start_at is None else start_at
-    balance = harmonic_balance(family(begin), harmonics=harmonics, orders=orders, samples=samples)
+    balance = chosen.balance(family(parameter[0] if chosen.start_at is None else chosen.start_at))
     held = checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s")
-    omega = tuple(np.atleast_1d(held).tolist())
-    radius = stability if radius is None else radius
-    route = FamilyRoute(family, balance, omega, (min(parameter), max(parameter)), samples, radius)
-    return _follow(route, parameter, start, start_at, stability, tolerance, scale, options)
+    equations = ContinuationProblem(
+        balance, tuple(np.atleast_1d(held).tolist()), (min(parameter), max(parameter)), family=family,
+        samples=chosen.samples, radius=chosen.with_radius,
+    )  # fmt: skip
+    return _follow(equations, parameter, chosen)
 
 
 def crossing_branches(
     branch: Branch, index: int, *, stability: bool = True, tolerance: float = 1e-7, options=None
 ) -> tuple[Branch, Branch]:
-    """The branch that crosses a known one in a branch point, in both directions from there.
+    """Follow the branch that crosses a known one in a branch point, in both directions from there.
 
     Parameters
     ----------
@@ -288,18 +297,22 @@ def crossing_branches(
     ConvergenceError
         The branch point is not simple.
     """
-    tolerance = checked_tolerance(tolerance)
-    curves = switch_branch(
-        branch.route.evaluate, branch.curve, index, limits=branch.limits, options=options,
-        told=branch.route.told,
-    )  # fmt: skip
-    return tuple(_branch(branch.route, curve, branch.limits, stability, tolerance) for curve in curves)
+    tolerance, equations = checked_tolerance(tolerance), branch.equations
+    along, back = switch_branch(
+        equations.evaluate,
+        branch.curve,
+        index,
+        limits=equations.limits,
+        options=options,
+        describe=equations.describe,
+    )
+    return _branch(equations, along, stability, tolerance), _branch(equations, back, stability, tolerance)
 
 
 def branch_maximum(
     branch: Branch, measure: Callable[[np.ndarray], float], *, tolerance: float = 1e-7
 ) -> tuple[float, float, PeriodicSolution]:
-    """Largest value along a branch, found between its points: parameter, value, solution.
+    """Find the largest value along a branch, between its points too: parameter, value, solution.
 
     Parameters
     ----------
@@ -309,112 +322,51 @@ def branch_maximum(
     tolerance : float
         Of the verdict, which the solution has where the branch has them.
     """
-    from scipy.optimize import minimize_scalar
+    from scipy.optimize import OptimizeResult, minimize_scalar
 
+    equations, known = branch.equations, branch.curve
     values = np.array([measure(lines) for lines in branch.lines])
     top = int(np.argmax(values))
-    best = (float(branch.parameter[top]), float(values[top]), branch.solutions[top])
-    known, z = (
-        branch.curve,
-        np.column_stack([branch.curve.points / branch.curve.scale, branch.parameter / branch.curve.unit]),
-    )
+    parameter, value, solution = float(branch.parameter[top]), float(values[top]), branch.solutions[top]
+    z = np.column_stack([known.points / known.scale, branch.parameter / known.unit])
     curve = scaled_curve(
-        branch.route.evaluate, known.points[top], known.parameter[top], limits=branch.limits,
+        equations.evaluate, known.points[top], known.parameter[top], limits=equations.limits,
         scale=known.scale, unit=known.unit,
     )  # fmt: skip
     for i in {max(top - 1, 0), min(top, len(z) - 2)}:
-        ends = [correct(curve, z[k], known.tangent[k]) for k in (i, i + 1)]
-        segment = Segment(curve, *ends)
+        first, last = (correct(curve, z[k], known.tangent[k]) for k in (i, i + 1))
+        segment = Segment(curve, first, last)
 
         def lowered(h: float, segment=segment) -> float:
             u, _ = curve.physical(segment.at(h).z)
-            return -measure(branch.route.balance.lines(u))
+            return -measure(equations.balance.lines(u))
 
-        found = minimize_scalar(
+        found: OptimizeResult = minimize_scalar(
             lowered, bounds=(0.0, segment.length), method="bounded", options={"xatol": 1e-10}
-        )
-        if -found.fun > best[1]:
+        )  # type: ignore[assignment]
+        if -found.fun > value:
             u, parameter = curve.physical(segment.at(found.x).z)
-            best = (parameter, float(-found.fun), branch.route.solution(u, parameter, 0.0))
+            value, solution = float(-found.fun), equations.solution(u, parameter, 0.0)
     if branch.stability:
-        best = (*best[:2], branch.route.judged(best[:1], best[2:], tolerance)[0])
-    return best
-
-
-class Route(Protocol):
-    """What a branch asks of the equations along its parameter; ``balance`` has them at its start."""
-
-    balance: HarmonicBalance
-
-    @property
-    def scale(self) -> float: ...
-
-    def told(self, parameter: float) -> str: ...
-
-    def evaluate(self, y, parameter: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
-
-    def first(self, parameter: float, start) -> PeriodicSolution: ...
-
-    def solution(self, y, parameter: float, error: float, iterations: int = 0) -> PeriodicSolution: ...
-
-    def judged(self, parameters, solutions, tolerance: float) -> tuple[PeriodicSolution, ...]: ...
+        solution = equations.judged([parameter], [solution], tolerance)[0]
+    return parameter, value, solution
 
 
 @dataclass(frozen=True)
-class FrequencyRoute:
-    """One base frequency varies, the others are held."""
+class ContinuationProblem:
+    """The harmonic equations along one parameter: a base frequency, or anything that changes the system.
+
+    ``balance`` has them at the start. Of the base frequencies ``frequency`` [rad/s] the one numbered ``base``
+    is the parameter, unless there is a ``family``: parameter -> NonlinearSystem, whose harmonic equations
+    take ``samples``.
+    """
 
     balance: HarmonicBalance
-    held: tuple[float, ...]
-    base: int
-    radius: bool = False
-
-    @property
-    def scale(self) -> float:
-        """Typical deflection [m]."""
-        return self.balance.scale
-
-    def told(self, parameter: float) -> str:
-        """The varied frequency in words."""
-        return f"frequency {parameter:.6g} rad/s ({parameter / (2.0 * np.pi):.6g} Hz)"
-
-    def frequency(self, parameter: float) -> np.ndarray:
-        """All base frequencies (n_bases,) [rad/s]."""
-        out = np.array(self.held)
-        out[self.base] = parameter
-        return out
-
-    def evaluate(self, y, parameter: float):
-        """Residual (n_y,), derivatives by the unknowns (n_y, n_y) and by the frequency (n_y,)."""
-        residual, jacobian, slope = self.balance.evaluate(y, self.frequency(parameter))
-        return residual, jacobian, slope[:, self.base]
-
-    def first(self, parameter: float, start) -> PeriodicSolution:
-        """Solution near the start."""
-        balance = self.balance
-        return solve_harmonic_balance(
-            balance.problem, self.frequency(parameter), orders=balance.orders, start=start,
-            samples=balance.grid.samples, reduction=balance.reduction, stability=False,
-        )  # fmt: skip
-
-    def solution(self, y, parameter: float, error: float, iterations: int = 0) -> PeriodicSolution:
-        """Solution at a corrected point."""
-        return _told(self.balance, y, self.frequency(parameter), error, iterations, self.radius)
-
-    def judged(self, parameters, solutions, tolerance: float) -> tuple[PeriodicSolution, ...]:
-        """The solutions with their Floquet verdicts."""
-        return judged(self.balance.problem, solutions, tolerance=tolerance)
-
-
-@dataclass(frozen=True)
-class FamilyRoute:
-    """The system varies with the parameter, the base frequencies are held."""
-
-    family: Callable[[float], NonlinearSystem]
-    balance: HarmonicBalance
-    omega: tuple[float, ...]
+    frequency: tuple[float, ...]
     limits: tuple[float, float]
-    samples: tuple[int, ...] | int | None
+    base: int = 0
+    family: Callable[[float], NonlinearSystem] | None = None
+    samples: tuple[int, ...] | int | None = None
     radius: bool = False
 
     @property
@@ -422,23 +374,36 @@ class FamilyRoute:
         """Typical deflection [m], the larger one of both ends."""
         return max(self.balance_at(parameter).scale for parameter in self.limits)
 
-    def told(self, parameter: float) -> str:
+    def describe(self, parameter: float) -> str:
         """The parameter in words."""
-        return told_value(parameter)
+        if self.family is not None:
+            return describe_value(parameter)
+        return f"frequency {parameter:.6g} rad/s ({parameter / (2.0 * np.pi):.6g} Hz)"
+
+    def frequency_at(self, parameter: float) -> np.ndarray:
+        """All base frequencies (n_bases,) [rad/s]."""
+        out = np.array(self.frequency)
+        if self.family is None:
+            out[self.base] = parameter
+        return out
 
     def balance_at(self, parameter: float) -> HarmonicBalance:
         """The equations; modes are computed again only where masses, stiffnesses or loads change."""
-        problem = self.family(parameter)
         known = self.balance
+        if self.family is None:
+            return known
+        problem = self.family(parameter)
         return harmonic_balance(
             problem, orders=known.orders, samples=self.samples,
             reduction=known.reduction if _same_linear_part(problem, known.problem) else None,
         )  # fmt: skip
 
-    def evaluate(self, y, parameter: float):
+    def evaluate(self, y, parameter: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residual (n_y,), derivatives by the unknowns (n_y, n_y) and by the parameter (n_y,)."""
+        residual, jacobian, slope = self.balance_at(parameter).evaluate(y, self.frequency_at(parameter))
+        if self.family is None:
+            return residual, jacobian, slope[:, self.base]
         step = _DIFFERENCE * (self.limits[1] - self.limits[0])
-        residual, jacobian, _ = self.balance_at(parameter).evaluate(y, np.array(self.omega))
         # three points within the range, central where there is room
         offset = np.array([-1.0, 1.0]) * step
         if parameter + offset[0] < self.limits[0]:
@@ -452,59 +417,70 @@ class FamilyRoute:
     def _residual(self, y, parameter: float) -> np.ndarray:
         balance = self.balance_at(parameter)
         lines = balance.lines(y)
-        value = balance.receptance(np.array(self.omega))[0]
+        value = balance.receptance(self.frequency_at(parameter))[0]
         return balance.unknowns(balance.residual(lines, balance.forces(lines), value))
 
     def first(self, parameter: float, start) -> PeriodicSolution:
-        """Solution near the start."""
+        """Solution at the start of the curve, near a given one."""
+        balance = self.balance
         return solve_harmonic_balance(
-            self.family(parameter), self.omega, orders=self.balance.orders, start=start,
-            samples=self.samples, stability=False,
+            balance.problem, self.frequency_at(parameter), orders=balance.orders, start=start,
+            samples=balance.grid.samples, reduction=balance.reduction, stability=False,
         )  # fmt: skip
 
     def solution(self, y, parameter: float, error: float, iterations: int = 0) -> PeriodicSolution:
         """Solution at a corrected point."""
-        return _told(self.balance_at(parameter), y, np.array(self.omega), error, iterations, self.radius)
+        frequency = self.frequency_at(parameter)
+        message = f"Point of a branch; last Newton step {error:.1e} of the scaled unknowns."
+        message += coincidence_note(self.balance.orders, frequency)
+        return self.balance_at(parameter).solution(
+            y, frequency, radius=self.radius, converged=True, iterations=iterations,
+            factorisations=iterations, message=message,
+        )  # fmt: skip
 
     def judged(self, parameters, solutions, tolerance: float) -> tuple[PeriodicSolution, ...]:
         """The solutions with their Floquet verdicts, each of its own system."""
+        if self.family is None:
+            return judged(self.balance.problem, solutions, tolerance=tolerance)
         return tuple(
             judged(self.family(float(parameter)), [solution], tolerance=tolerance)[0]
             for parameter, solution in zip(parameters, solutions)
         )
 
 
-def _follow(route, ends, start, start_at, stability, tolerance, scale, options) -> Branch:
-    """The branch of a route between two ends of its parameter."""
-    limits = (float(min(ends)), float(max(ends)))
-    begin = float(ends[0]) if start_at is None else float(start_at)
+def _follow(equations: ContinuationProblem, ends: tuple[float, float], chosen: CurveOptions) -> Branch:
+    """The branch between two ends of the parameter."""
+    limits, describe = equations.limits, equations.describe
+    begin = ends[0] if chosen.start_at is None else float(chosen.start_at)
     if not limits[0] <= begin <= limits[1]:
         raise CaseError(
-            f"the start at {route.told(begin)} lies outside the range", code="E-RANGE", key="start_at",
+            f"the start at {describe(begin)} lies outside the range", code="E-RANGE", key="start_at",
             limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
         )  # fmt: skip
-    first = route.first(begin, start)
+    first = equations.first(begin, chosen.start)
     if not first.converged:
         raise ConvergenceError(
-            f"no periodic solution found at the start, {route.told(begin)}: {first.message}", code="E-START",
+            f"no periodic solution found at the start, {describe(begin)}: {first.message}", code="E-START",
             remedy="give a start, or start where the response is nearly linear",
         )  # fmt: skip
-    size = max(route.scale, float(np.abs(first.deflection).max())) if scale is None else scale
+    scale = chosen.scale
+    if scale is None:
+        scale = max(equations.scale, float(np.abs(first.deflection).max()))
     curve = continue_curve(
-        route.evaluate, route.balance.unknowns(first.deflection), begin, limits=limits, scale=size,
-        direction=1 if ends[1] > ends[0] else -1, options=options, told=route.told,
+        equations.evaluate, equations.balance.unknowns(first.deflection), begin, limits=limits, scale=scale,
+        direction=1 if ends[1] > ends[0] else -1, options=chosen.options, describe=describe,
     )  # fmt: skip
-    return _branch(route, curve, limits, stability, tolerance)
+    return _branch(equations, curve, chosen.stability, chosen.tolerance)
 
 
-def _branch(route: Route, curve: Curve, limits, stability: bool, tolerance: float) -> Branch:
+def _branch(equations: ContinuationProblem, curve: Curve, stability: bool, tolerance: float) -> Branch:
     solutions = tuple(
-        route.solution(u, float(parameter), float(error), int(count))
+        equations.solution(u, float(parameter), float(error), int(count))
         for u, parameter, error, count in zip(curve.points, curve.parameter, curve.error, curve.iterations)
     )
     if stability:
-        solutions = route.judged(curve.parameter, solutions, tolerance)
-    return Branch(curve.parameter, solutions, curve, limits, route, stability)
+        solutions = equations.judged(curve.parameter, solutions, tolerance)
+    return Branch(curve.parameter, solutions, curve, equations, stability)
 
 
 def _ends(value, key: str, unit: str) -> tuple[float, float]:
@@ -518,9 +494,9 @@ def _ends(value, key: str, unit: str) -> tuple[float, float]:
     return float(ends[0]), float(ends[1])
 
 
-def _advice(last: PeriodicSolution, route: Route) -> str:
+def _advice(last: PeriodicSolution, equations: ContinuationProblem) -> str:
     """What to change where a branch was lost."""
-    balance = route.balance
+    balance = equations.balance
     unsmoothed = any(getattr(element, "smoothing", 1.0) == 0.0 for element in balance.problem.elements)
     found = ["start from the other end of the range"]
     if last.tail > _LONG_TAIL:
@@ -530,17 +506,6 @@ def _advice(last: PeriodicSolution, route: Route) -> str:
     elif not unsmoothed:
         found.append(f"take more samples than {max(balance.grid.samples)}")
     return ", or ".join([*found, "lower StepOptions(smallest)"])
-
-
-def _told(
-    balance: HarmonicBalance, y, frequency, error: float, iterations: int, radius: bool
-) -> PeriodicSolution:
-    message = f"Point of a branch; last Newton step {error:.1e} of the scaled unknowns."
-    message += coincidence_note(balance.orders, frequency)
-    return balance.solution(
-        y, frequency, radius=radius, converged=True, iterations=iterations, factorisations=iterations,
-        message=message,
-    )  # fmt: skip
 
 
 def _same_linear_part(one: NonlinearSystem, other: NonlinearSystem) -> bool:

@@ -10,8 +10,10 @@ and any viscous damping,
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.system import MechanicalSystem, Modes, Response, freeze
@@ -53,10 +55,10 @@ class ComplexModes:
     dofs : tuple of str
     """
 
-    eigenvalue: np.ndarray
-    shape: np.ndarray
-    drift: np.ndarray
-    left: np.ndarray
+    eigenvalue: NDArray[np.complex128]
+    shape: NDArray[np.complex128]
+    drift: NDArray[np.complex128]
+    left: NDArray[np.complex128]
     paired: np.ndarray
     speed: float
     dofs: tuple[str, ...]
@@ -102,7 +104,7 @@ def solve_modes(
     count: int | None = None,
     max_frequency: float | None = None,
 ) -> Modes:
-    """Modes of ``K + W diag(k) W^T`` and ``M`` with the static flexibility of the modes left out.
+    """Solve for the modes of ``K + W diag(k) W^T`` and ``M``, with the static flexibility of those left out.
 
     Parameters
     ----------
@@ -134,17 +136,9 @@ def solve_modes(
     -----
     Residual flexibility ``W^T K^+ W - sum r r^T / omega^2``, ``r = W^T phi`` (Geradin and Rixen, Mechanical
     Vibrations, 3rd ed., section 2.9); ``K^+`` is the inverse on the motions free of rigid modes.
-
-    With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give
-    ``d = S (W^T q - C g)`` and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the
-    directions ``W S^T``, whose total stiffness is ``W (k^-1 + C)^-1 W^T``, and the flexibility ``S C`` beside
-    that of the modes left out.
     """
     stiffness = total_stiffness(system, mesh_stiffness)
-    if count is not None and max_frequency is not None:
-        raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
-    scale, values, shape = _eigen(system.M, stiffness, count, max_frequency)
-    rigid = _rigid(values, scale, len(system.M))
+    values, shape, rigid = _eigen(system.M, stiffness, count, max_frequency)
     if np.any(rigid):
         shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
     springs = spring_directions(system, mesh_stiffness)
@@ -154,8 +148,8 @@ def solve_modes(
     rows[:, rigid] = 0.0
     modal_load[rigid] = 0.0
     omega = np.sqrt(np.where(rigid, 0.0, values))
-    flexible = pseudo_solve(system.M, stiffness, shape[:, rigid], np.column_stack([springs, system.load]))
-    static = springs.T @ flexible
+    loads = np.column_stack([springs, system.load])
+    static = springs.T @ pseudo_solve(system.M, stiffness, shape[:, rigid], loads)
     residual = static[:, :-1] - _modal_flexibility(rows, rows, omega)
     if system.flexibility is not None:
         residual += _spring_share(system, mesh_stiffness) @ system.flexibility
@@ -230,7 +224,7 @@ def output_response(modes: Modes, response: Response, rows, *, residual, load) -
 
 
 def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.0) -> ComplexModes:
-    """All modes of the damped, rotating system.
+    """Solve for all modes of the damped, rotating system.
 
     Parameters
     ----------
@@ -266,24 +260,25 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
     state[:m, m : 2 * m] = scale * np.eye(m)
     state[m : 2 * m, :m] = -np.diag(square[elastic]) / scale
     state[m:, m:] = -damping[np.ix_(order, order)]
-    value, vector = linalg.eig(state)
+    pairs = linalg.eig(state)
+    value, vector = np.asarray(pairs[0], np.complex128), np.asarray(pairs[1])
     inverse = _inverse(vector)
     zero = max(_ZERO * np.abs(value).max(), 100.0 * np.finfo(float).eps * np.linalg.norm(state))
     value = np.where(np.abs(value) <= zero, 0.0, value)
-    value = np.where(np.abs(value.imag) <= _ZERO * np.abs(value), value.real, value)
-    kept = np.flatnonzero(value.imag >= 0.0)
+    value = np.where(np.abs(np.imag(value)) <= _ZERO * np.abs(value), np.real(value), value)
+    kept = np.flatnonzero(np.imag(value) >= 0.0)
     kept = kept[np.argsort(np.abs(value[kept]), kind="stable")]
     modes = ComplexModes(
         eigenvalue=value[kept], shape=real[:, elastic] @ vector[:m, kept],
         drift=real[:, rigid] @ vector[2 * m :, kept] * scale,
         left=(inverse[kept, m:] @ real[:, order].T).conj().T / scale,
-        paired=value[kept].imag > 0.0, speed=float(speed), dofs=system.dofs,
+        paired=np.imag(value[kept]) > 0.0, speed=float(speed), dofs=system.dofs,
     )  # fmt: skip
     return _normalised(modes, system.M)
 
 
 def whirl(shape, mass, planes) -> np.ndarray:
-    """Sense of the orbits of every mode, from -1 (backward) over 0 (straight) to 1 (forward).
+    """Find the sense of the orbits of every mode, from -1 (backward) over 0 (straight) to 1 (forward).
 
     An orbit ``Re((X, Y) exp(i omega t))`` covers area at the rate ``-omega Im(conj(X) Y)``, positive for a
     counter-clockwise one; the sum over the planes, weighted with their masses, is divided by its bound (G.
@@ -305,7 +300,7 @@ def whirl(shape, mass, planes) -> np.ndarray:
     shape, mass, planes = np.asarray(shape), np.asarray(mass, float), np.asarray(planes, int).reshape(-1, 2)
     x, y = shape[planes[:, 0]], shape[planes[:, 1]]
     weight = np.sqrt(mass[planes[:, 0]] * mass[planes[:, 1]])
-    area = -2.0 * weight @ (x.conj() * y).imag
+    area = -2.0 * weight @ np.imag(x.conj() * y)
     bound = weight @ (np.abs(x) ** 2 + np.abs(y) ** 2)
     total = mass @ np.abs(shape) ** 2
     return np.where(bound > 1e-12 * total, area / np.where(bound > 0.0, bound, 1.0), 0.0)
@@ -333,7 +328,7 @@ def damping_matrix(system: MechanicalSystem, speed: float = 0.0) -> np.ndarray:
 
 
 def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray:
-    """Viscous damping ``M Phi diag(2 zeta omega) Phi^T M`` (n, n) of modal damping ratios.
+    """Make viscous damping ``M Phi diag(2 zeta omega) Phi^T M`` (n, n) of modal damping ratios.
 
     Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 3.1: all modes of the system whose columns have
     the stiffnesses ``mesh_stiffness`` (n_columns,) get ``ratio``, a number or one a mode; rigid ones none.
@@ -390,7 +385,13 @@ def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
 
 
 def spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
-    """Directions (n, n_meshes) whose products with the motions are the deflections of the mesh springs."""
+    """Directions (n, n_meshes) whose products with the motions are the deflections of the mesh springs.
+
+    With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give
+    ``d = S (W^T q - C g)`` and ``f = k S W^T q + S^T g`` with ``S = (I + C k)^-1``: springs k in the
+    directions ``W S^T``, whose total stiffness is ``W (k^-1 + C)^-1 W^T``, and the flexibility ``S C`` beside
+    that of the modes left out.
+    """
     return system.W if system.flexibility is None else system.W @ _spring_share(system, mesh_stiffness).T
 
 
@@ -422,14 +423,16 @@ def mass_error() -> ConvergenceError:
 
 def _spring_share(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     """``(I + C k)^-1``: what the springs take of the mesh deflections, the bodies taking the rest."""
-    flexibility = system.flexibility
+    flexibility = np.asarray(system.flexibility)
     return np.linalg.inv(np.eye(len(flexibility)) + flexibility * np.asarray(mesh_stiffness, float))
 
 
 def _eigen(mass, stiffness, count, max_frequency):
-    """Largest eigenvalue scale, eigenvalues and mass-normalised shapes that are asked for."""
+    """Eigenvalues and mass-normalised shapes that are asked for, and which of them are rigid."""
     from scipy import linalg
 
+    if count is not None and max_frequency is not None:
+        raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
     n = len(mass)
     try:
         factor = np.linalg.cholesky(0.5 * (mass + mass.T))
@@ -439,7 +442,7 @@ def _eigen(mass, stiffness, count, max_frequency):
     standard = linalg.solve_triangular(factor, standard.T, lower=True)
     standard = 0.5 * (standard + standard.T)
     scale = np.abs(standard).sum(axis=1).max()
-    subset = None
+    subset: dict[str, Any] = {"driver": "evd"}
     if count is not None:
         if count < 1 or int(count) != count:
             raise CaseError("at least one mode is needed", code="E-MODES", value=count)
@@ -450,7 +453,7 @@ def _eigen(mass, stiffness, count, max_frequency):
             raise CaseError("the highest frequency must be positive", code="E-MODES", value=max_frequency)
         top = (2.0 * np.pi * max_frequency) ** 2 * (1.0 + 10.0 * _MULTIPLE)
         subset = {"subset_by_value": (-np.inf, top)}
-    values, vectors = linalg.eigh(standard, **(subset or {"driver": "evd"}))
+    values, vectors = linalg.eigh(standard, **subset)
     if not np.all(np.isfinite(values)) or not len(values):
         raise ConvergenceError(
             f"no natural frequency below {max_frequency} Hz", code="E-MODES",
@@ -461,7 +464,8 @@ def _eigen(mass, stiffness, count, max_frequency):
         while kept < len(values) and values[kept] - values[kept - 1] < _MULTIPLE * abs(values[kept]):
             kept += 1
         values, vectors = values[:kept], vectors[:, :kept]
-    return scale, values, linalg.solve_triangular(factor, vectors, lower=True, trans="T")
+    shape = linalg.solve_triangular(factor, vectors, lower=True, trans=1)
+    return values, shape, _rigid(values, scale, n)
 
 
 def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:

@@ -1,30 +1,30 @@
-"""Modes followed over a parameter, where their branches cross or veer, and where their energy sits.
+"""Modes followed over a parameter, and the Campbell diagram.
 
-Modes are assigned by shape and eigenvalue, and steps are refined where modes veer (`track_modes`). Branches
-that come close cross or veer (`approaches`). The kinetic and the strain energy of modes is shared by bodies,
-meshes and supports (`kinetic_shares`, `strain_shares`).
+Modes are assigned by shape and eigenvalue, and steps are refined where modes veer (`track_modes`). Over the
+speed they make a Campbell diagram, where lines of excitation meet them (`campbell_data`).
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import ComplexModes
-from femgear.system.system import freeze
+from femgear.solvers.linear.modal import ComplexModes, complex_modes, whirl
+from femgear.system.system import MechanicalSystem, freeze
 
 # Relative distance of eigenvalues that belong to one multiple eigenvalue, whose vectors are free.
 _MULTIPLE = 1e-7
+# Lowest MAC over one step, and how often a step is halved to reach it.
+_AGREEMENT, _MOST_HALVINGS = 0.9, 14
 # Relative distance at which two branches may pass each other: closer ones count as crossing.
 _CROSSING = 1e-6
 # Cost of a relative distance of eigenvalues, and its bound, against 1 - MAC.
 _CONTINUITY, _BOUND = 10.0, 0.5
-# Strain energy relative to the sum of the absolute terms below which a motion has none.
-_UNSTRAINED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class TrackedModes:
 
     value: np.ndarray
     given: np.ndarray
-    eigenvalue: np.ndarray
+    eigenvalue: NDArray[np.complex128]
     shape: np.ndarray
     agreement: np.ndarray
     unresolved: tuple[tuple[float, float], ...]
@@ -70,32 +70,61 @@ class TrackedModes:
 
 
 @dataclass(frozen=True)
-class Approach:
-    """Two branches at their smallest distance.
+class CriticalSpeed:
+    """A line of excitation at a natural frequency.
 
     Parameters
     ----------
-    first, second : int
-        Branches.
-    value : float
-        Parameter of the smallest distance.
-    frequency, gap : float
-        Mean frequency and smallest distance there [Hz].
-    exchange : float
-        MAC of the first branch before with the second after: one where they change shapes, zero where each
-        keeps its own.
-    kind : str
-        ``"crossing"`` where the branches pass through each other; ``"veering"`` where they turn away and
-        exchange their shapes; ``"approach"`` where they turn away and mostly keep them.
+    speed : float
+        [rad/s]
+    frequency : float
+        [Hz]
+    branch : int
+    order : float
+        Of the line, in multiples of the speed.
     """
 
-    first: int
-    second: int
-    value: float
+    speed: float
     frequency: float
-    gap: float
-    exchange: float
-    kind: str
+    branch: int
+    order: float
+
+
+@dataclass(frozen=True)
+class CampbellData:
+    """Modes over the speed.
+
+    Parameters
+    ----------
+    tracked : TrackedModes
+        Its parameter is the speed [rad/s].
+    whirl : (p, m) array
+        Sense of the orbits, see `modal.whirl`; zero without planes.
+    orders : (k,) array
+        Lines of excitation, ``order speed / 2 pi`` [Hz].
+    critical : tuple of CriticalSpeed
+        By speed.
+    """
+
+    tracked: TrackedModes
+    whirl: np.ndarray
+    orders: np.ndarray
+    critical: tuple[CriticalSpeed, ...]
+
+    @property
+    def speed(self) -> np.ndarray:
+        """(p,) [rad/s]."""
+        return self.tracked.value
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """(p, m) [Hz], those of free damped motion."""
+        return self.tracked.eigenvalue.imag / (2.0 * np.pi)
+
+    @property
+    def damping_ratio(self) -> np.ndarray:
+        """(p, m)."""
+        return self.tracked.damping_ratio
 
 
 def track_modes(
@@ -104,8 +133,6 @@ def track_modes(
     mass,
     *,
     count: int | None = None,
-    agreement: float = 0.9,
-    max_halvings: int = 14,
 ) -> TrackedModes:
     """Follow modes from one parameter value to the next.
 
@@ -123,10 +150,6 @@ def track_modes(
     mass : (n, n) array
     count : int, optional
         Lowest modes of the first value to follow; all when not given.
-    agreement : float
-        Lowest MAC over one step.
-    max_halvings : int
-        The smallest step is the given one over ``2 ** max_halvings``.
 
     Raises
     ------
@@ -148,16 +171,16 @@ def track_modes(
     points = [_Point(first.value, first.eigenvalue[order], first.vector[:, order])]
     agreements, unresolved = [], []
     for start, end in itertools.pairwise(values):
-        smallest = 1.5 * abs(end - start) / 2.0**max_halvings
+        smallest = 1.5 * abs(end - start) / 2.0**_MOST_HALVINGS
         pending = [_solved(family, float(end), root)]
         while pending:
             old = points[-1]
             new, fits = _assigned(old, pending[-1])
-            between = _refined(old, new, fits, agreement)
+            between = _refined(old, new, fits)
             if between is not None and abs(new.value - old.value) > smallest:
                 pending.append(_solved(family, between, root))
                 continue
-            if fits.min() < agreement:
+            if fits.min() < _AGREEMENT:
                 unresolved.append((old.value, new.value))
             if len(points) == 1:
                 points[0] = _turned(old, new)
@@ -172,146 +195,67 @@ def oscillating(modes: ComplexModes) -> tuple[np.ndarray, np.ndarray]:
     return modes.eigenvalue[modes.paired], modes.right[:, modes.paired]
 
 
-def mac(first, second, mass) -> np.ndarray:
-    """Modal assurance criterion (m1, m2) with the mass as weight.
-
-    ``|a^H M b|^2 / (a^H M a) (b^H M b)`` (R. J. Allemang, Sound and Vibration 37(8), 2003, 14-23).
-
-    Parameters
-    ----------
-    first, second : (n, m1), (n, m2) arrays
-    mass : (n, n) array
-    """
-    root = np.linalg.cholesky(np.asarray(mass, float)).T
-    return np.abs(_unit(root @ first).conj().T @ _unit(root @ second)) ** 2
-
-
-def approaches(tracked: TrackedModes, mass, *, within: float = 0.1) -> tuple[Approach, ...]:
-    """Crossings and veerings of tracked modes, in the order of the parameter.
-
-    Near a veering of two modes the squared distance of their eigenvalues is a parabola in the parameter
-    (N. C. Perkins and C. D. Mote, J. Sound Vib. 106, 1986, 451-463), whose vertex is taken.
+def campbell_data(
+    system_at: Callable[[float], MechanicalSystem],
+    speeds,
+    mesh_stiffness,
+    *,
+    orders=(),
+    planes=None,
+    count: int | None = None,
+) -> CampbellData:
+    """Natural frequencies over the speed, followed as branches, with their critical speeds.
 
     Parameters
     ----------
-    tracked : TrackedModes
-    mass : (n, n) array
-    within : float
-        Largest distance relative to the frequency.
-    """
-    f = tracked.eigenvalue.imag / (2.0 * np.pi)
-    found = []
-    for first in range(f.shape[1]):
-        for second in range(first + 1, f.shape[1]):
-            found += _between(tracked, f, mass, first, second, within)
-    return tuple(sorted(found, key=lambda one: one.value))
-
-
-def coupling_factor(first, second, mass, stiffness_change, mass_change=None, *, squared) -> float:
-    """How far two modes veer instead of crossing, from derivatives at one parameter value.
-
-    With ``s_ij = phi_i^T (dK - lambda dM) phi_j`` the two eigenvalues change as those of the 2 x 2 matrix of
-    ``s``, so that their smallest distance is this factor times the present one:
-    ``2 |s_12| / sqrt((s_11 - s_22)^2 + 4 s_12^2)``. Zero: they cross. One: they are at their smallest
-    distance. ``s_12`` is the coupling of Perkins and Mote (1986); J. Lin and R. G. Parker (Mech. Struct.
-    Mach. 29, 2001, 411-429) evaluate it for planetary gears.
-
-    Parameters
-    ----------
-    first, second : (n,) arrays
-        Real shapes.
-    mass, stiffness_change : (n, n) arrays
-        M and dK/dp, the meshes included.
-    mass_change : (n, n) array, optional
-        dM/dp.
-    squared : (float, float)
-        ``omega^2`` of both [1/s^2].
-    """
-    mass = np.asarray(mass)
-    pair = np.column_stack([first, second])
-    pair = pair / np.sqrt(np.einsum("im,im->m", pair, mass @ pair))
-    s = pair.T @ stiffness_change @ pair
-    if mass_change is not None:
-        s = s - 0.5 * (squared[0] + squared[1]) * (pair.T @ mass_change @ pair)
-    size = np.hypot(s[0, 0] - s[1, 1], 2.0 * s[0, 1])
-    return float(2.0 * abs(s[0, 1]) / size) if size > 0.0 else 0.0
-
-
-def kinetic_shares(mass, shape, groups: Mapping[str, Sequence[int]]) -> dict[str, np.ndarray]:
-    """Shares (m,) of groups of coordinates in the kinetic energy of every mode.
-
-    ``Re sum_i conj(x_i) (M x)_i / x^H M x`` over the group (Geradin and Rixen, Mechanical Vibrations, 3rd
-    ed., section 2.3). They add up to one.
-
-    Parameters
-    ----------
-    mass : (n, n) array
-    shape : (n, m) array
-        Real or complex; complex ones by their mean over a period.
-    groups : mapping of str to indices
-        Every coordinate in one group; `body_groups` makes them from names.
+    system_at : callable
+        The system at a speed [rad/s], of constant mass; ``lambda speed: system`` where only the gyroscopic
+        term, which is multiplied by the speed here, depends on it.
+    speeds : (k,) array
+        [rad/s], ascending or descending.
+    mesh_stiffness : (n_meshes,) array
+        [N/m]
+    orders : (k,) array
+        Lines of excitation in multiples of the speed; the h-th harmonic of the meshes of a set with a fixed
+        ring of z teeth is ``h z`` over the speed of the carrier.
+    planes : (k, 2) int array, optional
+        Rows of x and y of bodies, for the sense of whirl.
+    count : int, optional
+        Lowest modes to follow.
 
     Raises
     ------
     CaseError
-        Coordinates that are in no group or in two (E-GROUPS).
+        Fewer than two speeds, or speeds that do not ascend or descend (E-VALUES).
+
+    Notes
+    -----
+    Critical speeds are roots of the monotone cubic interpolation (`scipy.interpolate.PchipInterpolator`) of
+    each branch less the line: their error falls with the third power of the speed step.
     """
-    shape = np.asarray(shape)
-    places = np.concatenate([np.asarray(rows, int) for rows in groups.values()])
-    if not np.array_equal(np.sort(places), np.arange(len(shape))):
+    speeds = np.asarray(speeds, float)
+    if speeds.ndim != 1 or len(speeds) < 2 or not np.all(np.isfinite(speeds)):
         raise CaseError(
-            f"{len(places)} coordinates in groups, of {len(shape)}", code="E-GROUPS",
-            limit="every coordinate in one group",
+            f"a Campbell diagram over speeds of shape {speeds.shape}", code="E-VALUES", key="speeds",
+            limit="two or more finite speeds [rad/s], ascending or descending",
+            remedy="list the speeds at which the modes are wanted",
         )  # fmt: skip
-    energy = (shape.conj() * (np.asarray(mass) @ shape)).real
-    total = energy.sum(axis=0)
-    return {name: energy[np.asarray(rows, int)].sum(axis=0) / total for name, rows in groups.items()}
-
-
-def strain_shares(parts: Mapping[str, tuple[np.ndarray, np.ndarray]], shape) -> dict[str, np.ndarray]:
-    """Shares (m,) of springs in the strain energy of every mode.
-
-    ``sum_c k_c |w_c^T x|^2 / total`` of each part. They add up to one; of a motion that strains nothing all
-    are zero.
-
-    Parameters
-    ----------
-    parts : mapping of str to (columns (n, g), stiffness (g,))
-        Springs ``k`` along the columns ``w``: meshes are columns of W, supports unit columns. Together they
-        must be the whole stiffness, which `stiffness_of` gives for comparison.
-    shape : (n, m) array
-        Real or complex; complex ones by their mean over a period.
-    """
-    shape = np.asarray(shape)
-    energy, bound = {}, np.zeros(shape.shape[1])
-    for name, (columns, stiffness) in parts.items():
-        k = np.asarray(stiffness, float)
-        energy[name] = k @ np.abs(columns.T @ shape) ** 2
-        bound += np.abs(k) @ (np.abs(columns).T @ np.abs(shape)) ** 2
-    total = sum(energy.values())
-    strained = np.abs(total) > _UNSTRAINED * bound
-    return {
-        name: np.where(strained, one / np.where(strained, total, 1.0), 0.0) for name, one in energy.items()
-    }
-
-
-def stiffness_of(parts: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """``sum w k w^T`` (n, n) of all parts."""
-    return sum((columns * stiffness) @ columns.T for columns, stiffness in parts.values())
-
-
-def body_groups(dofs: Sequence[str]) -> dict[str, np.ndarray]:
-    """Coordinates of every body, from names such as ``"planet 2: x"``."""
-    groups: dict[str, list[int]] = {}
-    for place, name in enumerate(dofs):
-        groups.setdefault(name.split(":")[0], []).append(place)
-    return {name: np.array(rows) for name, rows in groups.items()}
+    mass = np.asarray(system_at(float(speeds[0])).M)
+    tracked = track_modes(
+        lambda speed: oscillating(complex_modes(system_at(speed), mesh_stiffness, speed=speed)),
+        speeds, mass, count=count,
+    )  # fmt: skip
+    senses = np.zeros(tracked.eigenvalue.shape)
+    if planes is not None:
+        senses = np.array([whirl(shape, np.diag(mass), planes) for shape in tracked.shape])
+    orders = np.atleast_1d(np.asarray(orders, float))
+    return CampbellData(tracked, senses, orders, _critical(tracked, orders))
 
 
 @dataclass(frozen=True)
 class _Point:
     value: float
-    eigenvalue: np.ndarray
+    eigenvalue: NDArray[np.complex128]
     vector: np.ndarray
     slope: np.ndarray | None = None
 
@@ -396,7 +340,7 @@ def _turned(first: _Point, second: _Point) -> _Point:
     return _Point(first.value, first.eigenvalue, vector, second.slope)
 
 
-def _refined(old: _Point, new: _Point, fits: np.ndarray, limit: float) -> float | None:
+def _refined(old: _Point, new: _Point, fits: np.ndarray) -> float | None:
     """A value between two points at which to look first, or None where the step is good."""
     a, b = old.eigenvalue.imag, new.eigenvalue.imag
     before, after = a[:, None] - a, b[:, None] - b
@@ -408,52 +352,24 @@ def _refined(old: _Point, new: _Point, fits: np.ndarray, limit: float) -> float 
         share = before[i, j] / (before[i, j] - after[i, j])
         # an end that is hit exactly would repeat a point
         return float(old.value + step * min(max(share, 0.02), 0.98))
-    return float(old.value + 0.5 * step) if fits.min() < limit else None
+    return float(old.value + 0.5 * step) if fits.min() < _AGREEMENT else None
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector, axis=0)
 
 
-def _between(tracked: TrackedModes, f, mass, first: int, second: int, within: float) -> list[Approach]:
-    """Approaches of two branches."""
-    value, difference = tracked.value, f[:, first] - f[:, second]
-    mean = 0.5 * (f[:, first] + f[:, second])
-    gap, scale = np.abs(difference), np.abs(mean)
-    apart = gap > 1e-6 * scale
+def _critical(tracked: TrackedModes, orders) -> tuple[CriticalSpeed, ...]:
+    from scipy.interpolate import PchipInterpolator
+
+    rising = np.argsort(tracked.value)
+    speed, angular = tracked.value[rising], tracked.eigenvalue.imag[rising]
     found = []
-    places = np.flatnonzero(apart)
-    # signs are compared over the points that are apart, so that a hit on the crossing does not hide it
-    for left, right in itertools.pairwise(places):
-        if difference[left] * difference[right] < 0.0:
-            share = difference[left] / (difference[left] - difference[right])
-            at = value[left] + share * (value[right] - value[left])
-            found.append((at, np.interp(share, [0, 1], mean[[left, right]]), 0.0, left, right))
-    inner = np.flatnonzero((gap[1:-1] < gap[:-2]) & (gap[1:-1] <= gap[2:]) & apart[1:-1]) + 1
-    for i in inner:
-        if gap[i] > within * scale[i] or not np.all(difference[i - 1 : i + 2] * difference[i] > 0.0):
-            continue
-        at, smallest = _vertex(value[i - 1 : i + 2], gap[i - 1 : i + 2])
-        found.append((at, mean[i], smallest, i, i))
-    return [_named(tracked, mass, gap, first, second, *one) for one in found]
-
-
-def _vertex(value: np.ndarray, gap: np.ndarray) -> tuple[float, float]:
-    """Where the parabola through the squares of three distances is smallest, and the distance there."""
-    x = value - value[1]
-    c = np.linalg.solve(np.vander(x, 3, increasing=True), gap**2)
-    shift = float(np.clip(-0.5 * c[1] / c[2], *sorted((x[0], x[2]))))
-    square = c[0] + shift * (c[1] + shift * c[2])
-    return float(value[1] + shift), float(np.sqrt(max(square, 0.0)))
-
-
-def _named(tracked, mass, gap, first, second, at, mean, smallest, left, right) -> Approach:
-    if smallest > 0.0:
-        # shapes are compared where the branches are five times as far apart: 1 / 25 of them is then mixed
-        wide = np.flatnonzero(gap >= 5.0 * smallest)
-        left, right = (
-            max(wide[wide < left], default=0), min(wide[wide > right], default=len(gap) - 1)
-        )  # fmt: skip
-    exchange = mac(tracked.shape[left][:, [first]], tracked.shape[right][:, [second]], mass)[0, 0]
-    kind = "crossing" if smallest == 0.0 else "veering" if exchange > 0.5 else "approach"
-    return Approach(first, second, float(at), float(mean), float(smallest), float(exchange), kind)
+    apart = 1e-9 * np.ptp(speed)
+    for order in orders:
+        for branch, one in enumerate(angular.T):
+            roots = np.sort(PchipInterpolator(speed, one - order * speed).roots(extrapolate=False))
+            # a root at a knot is found from both sides
+            for s in roots[np.append(True, np.diff(roots) > apart)[: len(roots)]]:
+                found.append(CriticalSpeed(float(s), float(order * s / (2 * np.pi)), branch, float(order)))
+    return tuple(sorted(found, key=lambda one: one.speed))

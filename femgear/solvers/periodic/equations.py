@@ -18,12 +18,14 @@ deflection grows without end, and so does everything that is measured by it (`un
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.periodic.aft import (
+from femgear.solvers.linear.receptance import Reduction, reduce_problem, source_columns
+from femgear.solvers.periodic.phase_grid import (
     PhaseGrid,
     coupled_pairs,
     forces_on_grid,
@@ -31,7 +33,6 @@ from femgear.solvers.periodic.aft import (
     phase_grid,
     sample_counts,
 )
-from femgear.solvers.periodic.receptance import Reduction, reduce_problem, source_columns
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.system.elements import Element
 from femgear.system.entries import checked_count
@@ -96,7 +97,7 @@ class HarmonicBalance:
 
     def unknowns(self, lines) -> np.ndarray:
         """Real vector ``Re X_0, Re X_1, Im X_1, ...`` column by column, of lines (n_columns, L)."""
-        lines = np.asarray(lines, complex)
+        lines = np.asarray(lines, np.complex128)
         out = np.empty((len(lines), 2 * lines.shape[1] - 1))
         out[:, 0], out[:, 1::2], out[:, 2::2] = lines[:, 0].real, lines[:, 1:].real, lines[:, 1:].imag
         return out.ravel()
@@ -135,25 +136,20 @@ class HarmonicBalance:
     def jacobian(self, forces, receptance) -> np.ndarray:
         """Derivative (n_y, n_y) of the residual by the unknowns."""
         n, width = len(self.reduction.reference), 2 * len(self.orders) - 1
-        columns = np.zeros((n, len(self.orders), n, width), complex)
+        columns = np.zeros((n, len(self.orders), n, width), np.complex128)
         transfer = receptance[:, :, :n].transpose(1, 0, 2)
         for (row, column), block in zip(self.pairs, forces.products):
             columns[:, :, column] += transfer[:, :, row, None] * block
         out = np.empty((n, width, n, width))
-        out[:, 0], out[:, 1::2], out[:, 2::2] = columns[:, 0].real, columns[:, 1:].real, columns[:, 1:].imag
+        out[:, 0], out[:, 1::2] = np.real(columns[:, 0]), np.real(columns[:, 1:])
+        out[:, 2::2] = np.imag(columns[:, 1:])
         out = out.reshape(n * width, n * width)
         out[np.diag_indices(n * width)] += 1.0
         return out
 
     def evaluate(self, y, frequency) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residual (n_y,) [m], its derivative (n_y, n_y) by y and (n_y, n_bases) by the base frequencies.
-
-        Parameters
-        ----------
-        y : (n_y,) array
-            See `unknowns`.
-        frequency : (n_bases,) array
-            Base frequencies [rad/s].
+        """Residual (n_y,) [m] at the unknowns y, its derivatives (n_y, n_y) by y and (n_y, n_bases) by the
+        base frequencies [rad/s].
         """
         lines = self.lines(y)
         forces = self.forces(lines)
@@ -163,23 +159,20 @@ class HarmonicBalance:
         residual = self.unknowns(self.residual(lines, forces, value))
         return residual, self.jacobian(forces, value), slope
 
-    def spectral_radius(self, y, frequency) -> float:
+    def spectral_radius(self, y, frequency, forces: LineForces | None = None) -> float:
         """Spectral radius of the fixed point ``X <- T_load S - T (F - reference X)`` at the unknowns y.
 
         Largest modulus of the eigenvalues of ``T d(F - reference X)/dX``, the Jacobian of the residual less
         one; all are computed up to 600 unknowns. Beyond, Arnoldi's method finds it to 1 %.
         """
+        receptance = self.receptance(frequency)[0]
         if self.size > MANY:
-            tangent = linearised(self, self.receptance(frequency)[0], np.asarray(y, float))[1]
-            found = krylov_radius(tangent)
+            found = krylov_radius(linearised(self, receptance, np.asarray(y, float))[1])
             if found is not None:
                 return found
-        return self._radius(self.forces(self.lines(y)), self.receptance(frequency)[0])
-
-    def _radius(self, forces: LineForces, receptance) -> float:
-        matrix = self.jacobian(forces, receptance)
+        matrix = self.jacobian(forces or self.forces(self.lines(y)), receptance)
         matrix[np.diag_indices(self.size)] -= 1.0
-        return largest_modulus(matrix)
+        return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
 
     def linear_start(self, frequency) -> np.ndarray:
         """Unknowns of the response with reference springs, forced by what the elements do at its mean."""
@@ -197,16 +190,11 @@ class HarmonicBalance:
         frequency = np.atleast_1d(np.asarray(frequency, float))
         lines = self.lines(y)
         forces = self.forces(lines)
-        if radius or "residual" not in what_happened:
-            receptance = self.receptance(frequency)[0]
         if "residual" not in what_happened:
-            error = self.unknowns(self.residual(lines, forces, receptance))
+            error = self.unknowns(self.residual(lines, forces, self.receptance(frequency)[0]))
             what_happened["residual"] = relative_residual(self, error, y)
         if radius:
-            many = self.size > MANY
-            what_happened["spectral_radius"] = (
-                self.spectral_radius(y, frequency) if many else self._radius(forces, receptance)
-            )
+            what_happened["spectral_radius"] = self.spectral_radius(y, frequency, forces)
         told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
         note = uncarried_note(
             self,
@@ -231,14 +219,10 @@ class HarmonicBalance:
 
 @dataclass(frozen=True)
 class LineForces:
-    """What the elements do beyond their reference springs.
+    """Lines (n_columns, L) [N] of what the elements do beyond their reference springs.
 
-    Parameters
-    ----------
-    lines : (n_columns, L) complex array
-        [N]
-    products : (n_pairs, L, 2 L - 1) complex array
-        Their derivative by the unknowns of one column, for every coupled pair [N/m].
+    ``products`` (n_pairs, L, 2 L - 1) [N/m]: their derivative by the unknowns of one column, for every
+    coupled pair.
     """
 
     lines: np.ndarray
@@ -342,14 +326,9 @@ def element_name(problem: NonlinearSystem, column: int) -> str:
 
 @dataclass(frozen=True)
 class LineTangent:
-    """``dR/dX`` of the harmonic equations at one deflection.
+    """``dR/dX`` of the harmonic equations at one deflection, without a matrix of its size.
 
-    Parameters
-    ----------
-    balance : HarmonicBalance
-    receptance : (L, n_columns, n_columns + n_loads) complex array
-    stiffness : (N, n_pairs) array
-        Tangents of the coupled pairs less the reference springs, on the grid [N/m].
+    ``stiffness`` (N, n_pairs) [N/m]: tangents of the coupled pairs less the reference springs, on the grid.
     """
 
     balance: HarmonicBalance
@@ -370,9 +349,9 @@ class LineTangent:
 
     def solve(self, error) -> np.ndarray | None:
         """``dR/dX^-1 error`` to three digits; None where GMRES does not get there."""
-        from scipy.sparse.linalg import LinearOperator, gmres
+        from scipy.sparse.linalg import gmres
 
-        operator = LinearOperator((len(error),) * 2, matvec=lambda y: y + self.fixed_point(y), dtype=float)
+        operator = _operator(len(error), lambda y: y + self.fixed_point(y))
         step, state = gmres(operator, error, rtol=_ACCURACY, restart=_PRODUCTS, maxiter=1)
         return None if state else step
 
@@ -386,54 +365,36 @@ def linearised(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, Lin
     return error, LineTangent(balance, receptance, stiffness)
 
 
-def largest_modulus(matrix: np.ndarray) -> float:
-    """Largest modulus of the eigenvalues of a real matrix (n, n)."""
-    n = len(matrix)
-    if n <= MANY:
-        return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
-    from scipy.sparse import linalg
-
-    # a fixed start: the same value every time
-    start = np.random.default_rng(0).standard_normal(n)
-    try:
-        values = linalg.eigs(
-            matrix, k=2, ncv=40, v0=start, which="LM", tol=1e-10, maxiter=200, return_eigenvectors=False
-        )
-    except linalg.ArpackError:
-        values = np.linalg.eigvals(matrix)
-    return float(np.abs(values).max())
-
-
 def krylov_radius(tangent: LineTangent) -> float | None:
     """Largest modulus of the eigenvalues of the fixed point, to 1 %; None where Arnoldi's method fails.
 
     Hundreds of lines far from any resonance have eigenvalues of nearly the same modulus: more digits would
     take ten times as many products.
     """
-    from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
+    from scipy.sparse.linalg import ArpackError, eigs
 
     size = tangent.balance.size
-    operator = LinearOperator((size, size), matvec=tangent.fixed_point, dtype=float)
+    operator = _operator(size, tangent.fixed_point)
     # a fixed start: the same value every time
     start = np.random.default_rng(0).standard_normal(size)
     try:
         values = eigs(
-            operator, k=1, ncv=30, v0=start, which="LM", tol=1e-2, maxiter=60, return_eigenvectors=False
-        )
+            operator, k=1, ncv=30, v0=start, which="LM", tol=1e-2,  # type: ignore[arg-type]
+            maxiter=60, return_eigenvectors=False,
+        )  # fmt: skip
     except ArpackError:
         return None
     return float(np.abs(values).max())
 
 
-def relative_residual(balance: HarmonicBalance, error, y) -> float:
-    """Largest violation relative to the largest deflection, of which the mean counts up to `far` only.
+def _operator(size: int, product: Callable[[np.ndarray], np.ndarray]):
+    from scipy.sparse.linalg import LinearOperator
 
-    Parameters
-    ----------
-    balance : HarmonicBalance
-    error, y : (n_y,) arrays
-        Residual [m] and unknowns.
-    """
+    return LinearOperator((size, size), matvec=product, dtype=float)  # type: ignore[call-arg]
+
+
+def relative_residual(balance: HarmonicBalance, error, y) -> float:
+    """Violation ``error`` [m] over the largest deflection at y, of which the mean counts up to `far` only."""
     table = np.abs(np.reshape(y, (len(balance.reduction.reference), -1)))
     mean = min(float(table[:, 0].max()), far(balance))
     size = max(mean, float(table[:, 1:].max(initial=0.0)), 1e-9 * balance.scale)
@@ -449,15 +410,8 @@ def far(balance: HarmonicBalance) -> float:
 def uncarried_note(balance: HarmonicBalance, lines, residual, converged: bool) -> str:
     """Which column's mean load nothing carries; empty where there is no such column.
 
-    Parameters
-    ----------
-    balance : HarmonicBalance
-    lines : (n_columns, L) complex array
-        Deflections [m].
-    residual : callable
-        Without arguments: violation (n_columns, L) of the harmonic equations at the lines [m].
-    converged : bool
-        Converged lines are doubted only where their mean is far away and out of balance.
+    ``residual()`` gives the violation (n_columns, L) of the harmonic equations at the lines [m]. Converged
+    lines are doubted only where their mean is far away and out of balance.
     """
     mean = np.abs(lines[:, 0])
     finite = bool(np.all(np.isfinite(lines)))
@@ -524,7 +478,7 @@ def _free_balance(balance: HarmonicBalance) -> tuple[np.ndarray, np.ndarray]:
     square, shape = linalg.eigh(0.5 * (system.K + system.K.T), system.M)
     whole = np.diag(system.K) + np.einsum("ij,j,ij->i", system.W, reference, system.W)
     free = shape[:, np.abs(square) <= _FREE * np.abs(whole / np.diag(system.M)).max()]
-    steady = sum(force.force.real for force in balance.problem.forces if not any(force.orders))
+    steady = sum(np.real(force.force) for force in balance.problem.forces if not any(force.orders))
     strain, load = free.T @ system.W, free.T @ (system.load + steady)
     size = np.abs(strain).max(axis=1, initial=0.0)
     # motions that strain no column carry no load either: the reduction has made sure

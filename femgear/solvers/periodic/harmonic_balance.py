@@ -11,16 +11,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.solvers.linear.receptance import Reduction, respond, source_columns
 from femgear.solvers.periodic.equations import (
     MANY,
     HarmonicBalance,
+    LineForces,
     LineTangent,
     harmonic_balance,
     linearised,
     reduced,
     relative_residual,
 )
-from femgear.solvers.periodic.receptance import Reduction, respond, source_columns
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import judged, require_period
 from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
@@ -38,22 +39,18 @@ def solve_harmonic_balance(
     problem: NonlinearSystem,
     frequency,
     *,
-    harmonics: int | None = None,
-    orders=None,
     start=None,
-    samples=None,
-    reduction: Reduction | None = None,
     tolerance: float = 1e-10,
     max_iterations: int = 50,
     stability: bool = True,
     radius: bool | None = None,
+    **equations,
 ) -> PeriodicSolution:
-    """Periodic or quasi-periodic solution at given base frequencies, by Newton's method with line search.
+    """Find a periodic or quasi-periodic motion at given base frequencies by Newton's method with line search.
 
     Parameters
     ----------
-    problem, harmonics, orders, samples, reduction
-        See `harmonic_balance`.
+    problem : NonlinearSystem
     frequency : float or (n_bases,) array
         Base frequencies [rad/s], not negative.
     start : PeriodicSolution or (n_columns, L) complex array, optional
@@ -69,6 +66,8 @@ def solve_harmonic_balance(
     radius : bool, optional
         The radius alone, with or without the verdict; it takes all eigenvalues of one matrix of the size of
         the unknowns.
+    equations
+        ``harmonics`` or ``orders``, ``samples``, ``reduction`` of `harmonic_balance`.
 
     Returns
     -------
@@ -83,9 +82,7 @@ def solve_harmonic_balance(
     ConvergenceError
         An undamped resonance of the system with reference springs at a line.
     """
-    balance = harmonic_balance(
-        problem, harmonics=harmonics, orders=orders, samples=samples, reduction=reduction
-    )
+    balance = harmonic_balance(problem, **equations)
     frequency = _checked_frequency(balance, frequency)
     tolerance = checked_tolerance(tolerance)
     max_iterations = checked_count(max_iterations, "max_iterations", code="E-TOLERANCE")
@@ -198,13 +195,12 @@ class PeriodicResponse:
 
     @property
     def verdict(self) -> FloquetVerdict:
-        """Its ``stable`` is None where the solution did not converge, has several base frequencies or too
-        long a period for its fastest mode."""
+        """Its ``stable`` is None where there are several base frequencies or too long a period."""
         return self.solution.verdict
 
     @property
     def tail(self) -> float:
-        """Share of the amplitude in the upper half of the lines: a measure of truncation."""
+        """Share of the amplitude in the upper half of the lines."""
         return self.solution.tail
 
     @property
@@ -355,7 +351,7 @@ class _Embedding:
     def _system(self, point):
         """Residual and its derivative (n_y, n_y + 1) by the scaled unknowns and t."""
         y, t = self.scale * point[:-1], point[-1]
-        forces, full = _residual(self.balance, self.receptance, y)
+        full, forces = _with_matrix(self.balance, self.receptance, y)
         change = full - (y - self.linear)
         jacobian = t * self.balance.jacobian(forces, self.receptance)
         jacobian[np.diag_indices(len(y))] += 1.0 - t
@@ -385,17 +381,11 @@ class _Embedding:
         return None, rounds
 
 
-def _residual(balance: HarmonicBalance, receptance, y):
-    """What the elements do at the unknowns y, and the residual (n_y,)."""
+def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineForces]:
+    """Residual (n_y,) at the unknowns y, and what its derivative is made of."""
     lines = balance.lines(y)
     forces = balance.forces(lines)
-    return forces, balance.unknowns(balance.residual(lines, forces, receptance))
-
-
-def _with_matrix(balance: HarmonicBalance, receptance, y):
-    """Residual (n_y,) at the unknowns y, and what its derivative is made of."""
-    forces, error = _residual(balance, receptance, y)
-    return error, forces
+    return balance.unknowns(balance.residual(lines, forces, receptance)), forces
 
 
 def _newton_step(balance: HarmonicBalance, receptance, y, error, tangent) -> np.ndarray:

@@ -1,27 +1,35 @@
 """Periodic solutions by shooting: the start is sought from which the motion returns to itself.
 
-R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed., sections 7.1 to 7.4; M. Peeters et al.,
-Mech. Syst. Signal Process. 23 (2009) 195-216, for free vibrations. The derivatives of the motion by its start
-are integrated with it; over one period they are the monodromy matrix, which gives the verdict. Contact forces
-are continuous, so the derivatives are too at every contact change: no jump has to be added (R. I. Leine and
-H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, section 7.2: the saltation matrix is
-the unit matrix). The fixed point of the harmonic equations has its radius at the lines of the motion.
+R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed., sections 7.1 to 7.4. The derivatives of the
+motion by its start are integrated with it; over one period they are the monodromy matrix, which gives the
+verdict. Contact forces are continuous, so the derivatives are too at every contact change: no jump has to be
+added (R. I. Leine and H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, section 7.2:
+the saltation matrix is the unit matrix). The fixed point of the harmonic equations has its radius at the
+lines of the motion.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from femgear.errors import CaseError, FemgearError
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution, open_verdict, verdict_of
-from femgear.solvers.time.adaptive import Contacts, Flow, checked_start, flow, motion_scale, trajectory
+from femgear.solvers.time.adaptive import (
+    Flow,
+    checked_start,
+    flow,
+    motion_scale,
+    sampled,
+    trajectory,
+)
 from femgear.solvers.time.stroboscopic import common_period
-from femgear.solvers.time.transient import sampled, solve_transient
+from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import Element
-from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
+from femgear.system.entries import checked_count, checked_tolerance
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, checked_bases, element_forces
 from femgear.system.series import harmonics_of, line_tail
 
@@ -79,6 +87,52 @@ class ShootingSolution:
         return self.solution.stable
 
 
+@dataclass(frozen=True)
+class ShootingOptions:
+    """Accuracy of shooting and what its result holds.
+
+    Parameters
+    ----------
+    harmonics : int
+        Lines of the result, of the period.
+    samples : int
+        Instants from which the lines are computed.
+    integration : float
+        Tolerance of the integrator, which stops at contact changes.
+    tolerance : float
+        Of the distance between start and end, relative to the size of the motion.
+    max_iterations : int
+    radius : bool
+        Whether the spectral radius of the fixed point is computed; the verdict always is.
+    """
+
+    harmonics: int = 20
+    samples: int = 2048
+    integration: float = 1e-11
+    tolerance: float = 1e-9
+    max_iterations: int = 30
+    radius: bool = True
+
+    def __post_init__(self):
+        most = checked_count(self.max_iterations, "max_iterations", code="E-TOLERANCE")
+        for name, value in (
+            ("tolerance", checked_tolerance(self.tolerance)),
+            ("integration", checked_tolerance(self.integration, "integration")),
+            ("max_iterations", most),
+        ):
+            object.__setattr__(self, name, value)
+        if self.harmonics < 1 or self.samples < 4 * self.harmonics:
+            raise CaseError(
+                f"{self.harmonics} harmonics, {self.samples} samples", code="E-SHOOTING",
+                limit="a harmonic or more, four samples a harmonic or more",
+            )  # fmt: skip
+
+    def integrator(self, moving: Flow, start) -> dict[str, Any]:
+        """Options of `trajectory` for motions of the size of a start."""
+        scale = motion_scale(moving, start)
+        return {"tolerance": self.integration, "events": True, "max_steps": _MOST_STEPS, "scale": scale}
+
+
 def solve_shooting(
     problem: NonlinearSystem,
     frequency,
@@ -87,15 +141,9 @@ def solve_shooting(
     periods: int = 1,
     segments: int = 1,
     settle: int = 20,
-    harmonics: int = 20,
-    samples: int = 2048,
-    events: bool = True,
-    integration: float = 1e-11,
-    tolerance: float = 1e-9,
-    max_iterations: int = 30,
-    radius: bool = True,
+    **options,
 ) -> ShootingSolution:
-    """Forced periodic motion by Newton iterations on its start.
+    """Find a forced periodic motion by Newton iterations on its start.
 
     Parameters
     ----------
@@ -109,19 +157,8 @@ def solve_shooting(
     segments : int
         Pieces of the period whose starts are all unknown: multiple shooting, for motions that grow fast.
     settle : int
-    harmonics : int
-        Lines of the result, of the period.
-    samples : int
-        Instants from which the lines are computed.
-    events : bool
-        Stop at contact changes, see `adaptive`.
-    integration : float
-        Tolerance of the integrator.
-    tolerance : float
-        Of the distance between start and end, relative to the size of the motion.
-    max_iterations : int
-    radius : bool
-        Whether the spectral radius of the fixed point is computed; the verdict always is.
+    options
+        Fields of `ShootingOptions`.
 
     Returns
     -------
@@ -137,134 +174,41 @@ def solve_shooting(
         Frequencies without the common period or more of them than the problem has (E-FREQUENCY), numbers
         out of range (tolerances: E-TOLERANCE), a start that does not fit (E-START).
     """
-    frequency = checked_bases(problem, frequency)
-    tolerance, integration = checked_tolerance(tolerance), checked_tolerance(integration, "integration")
-    max_iterations = checked_count(max_iterations, "max_iterations", code="E-TOLERANCE")
+    frequency, chosen = checked_bases(problem, frequency), ShootingOptions(**options)
     period = common_period(frequency, periods)
     segments = checked_count(segments, "segments", code="E-SHOOTING")
-    if harmonics < 1 or samples < 4 * harmonics:
-        limit = "a harmonic or more, four samples a harmonic or more"
-        raise CaseError(f"{harmonics} harmonics, {samples} samples", code="E-SHOOTING", limit=limit)
     start = checked_start(problem, _settled(problem, frequency, period, settle) if start is None else start)
     moving = flow(problem, frequency, variational=True)
-    unknowns = _guess(moving, start, period, segments, integration, events)
-    options = _options(moving, start, integration, events)
-    history, factorisations, stuck = [], 0, False
-    for _ in range(max_iterations + 1):
-        ends, maps = _shoot(moving, unknowns, period, options)
+    unknowns = _guess(moving, start, period, segments, chosen.integration)
+    integrator = chosen.integrator(moving, start)
+    history, stuck = [], False
+    while True:
+        ends, maps = _shoot(moving, unknowns, period, integrator)
         defect = ends - np.roll(unknowns, -1, axis=0)
         size = max(_size(unknowns), np.finfo(float).tiny)
         history.append(float(np.abs(defect).max() / size))
-        if history[-1] <= tolerance or len(history) > max_iterations:
+        if history[-1] <= chosen.tolerance or len(history) > chosen.max_iterations:
             break
-        update, out_of_reach = _update(maps, defect, _ROUNDING * integration)
-        factorisations += 1
-        stuck = out_of_reach > 0.5 and np.abs(update).max() <= tolerance * size
+        update, out_of_reach = _update(maps, defect, _ROUNDING * chosen.integration)
+        stuck = out_of_reach > 0.5 and bool(np.abs(update).max() <= chosen.tolerance * size)
         if stuck:
             break
-        unknowns = _improved(moving, unknowns, update, np.abs(defect).max(), period, options)
+        unknowns = _improved(moving, unknowns, update, np.abs(defect).max(), period, integrator)
     whole = np.linalg.multi_dot(maps[::-1]) if segments > 1 else maps[0]
-    lines = 2.0 * np.pi / period, harmonics, samples
-    found = _result(
-        problem, moving, unknowns[0], whole, lines, options, history, tolerance, factorisations, stuck
-    )
-    return _told(problem, found, moving.frequency, integration, radius)
-
-
-def solve_free_vibration(
-    problem: NonlinearSystem,
-    start,
-    period: float,
-    *,
-    fixed: int = 0,
-    conservative: bool = True,
-    harmonics: int = 20,
-    samples: int = 2048,
-    events: bool = True,
-    integration: float = 1e-12,
-    tolerance: float = 1e-10,
-    max_iterations: int = 30,
-    radius: bool = True,
-) -> ShootingSolution:
-    """Periodic motion of a system that nothing drives: its period is unknown too.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-        Without harmonic forces and without coefficients that change in time.
-    start : pair of (n,) arrays
-        First guess; the degree of freedom ``fixed`` keeps zero velocity there, which sets the phase.
-    period : float
-        First guess [s].
-    fixed : int
-    conservative : bool
-        The displacement of ``fixed`` is kept as the amplitude. A limit cycle, which has its own amplitude,
-        needs ``False``.
-    harmonics, samples, events, integration, tolerance, max_iterations, radius
-        As for `solve_shooting`.
-
-    Raises
-    ------
-    CaseError
-        Forces, a period or a ``fixed`` out of range (E-SHOOTING), a start that does not fit (E-START).
-    """
-    tolerance, integration = checked_tolerance(tolerance), checked_tolerance(integration, "integration")
-    period = checked_numbers(period, "period", code="E-SHOOTING", unit="s").item()
-    if problem.forces or not (np.isfinite(period) and period > 0.0):
-        raise CaseError(
-            f"free vibration with {len(problem.forces)} harmonic forces and a period of {period} s",
-            code="E-SHOOTING", limit="no forces and a period above 0 s",
-        )  # fmt: skip
-    n = len(problem.system.M)
-    if not 0 <= fixed < n:
-        told = f"degree of freedom {fixed} fixed"
-        raise CaseError(told, code="E-SHOOTING", key="fixed", limit=f"0 to {n - 1}")
-    if start is None:
-        raise CaseError(
-            "a free vibration without a start", code="E-START", key="start",
-            limit=f"displacements and velocities of shape ({n},)", remedy="give a first guess of the motion",
-        )  # fmt: skip
-    start = checked_start(problem, start)
-    moving = flow(problem, 0.0, variational=True)
-    y = flow(problem, 0.0).state(*start)
-    y[n + fixed] = 0.0
-    free = np.setdiff1d(np.arange(2 * n), [n + fixed, fixed] if conservative else [n + fixed])
-    options, history = _options(moving, start, integration, events), []
-    for _ in range(max_iterations + 1):
-        ends, maps = _shoot(moving, y[None], period, options)
-        defect = ends[0] - y
-        history.append(float(np.abs(defect).max() / _size(y)))
-        if history[-1] <= tolerance or len(history) > max_iterations:
-            break
-        slope = _derivative(moving, ends[0], period)
-        matrix = np.column_stack([(maps[0] - np.eye(2 * n))[:, free], slope / moving.rate])
-        update = np.linalg.lstsq(matrix, -defect, rcond=_SINGULAR)[0]
-        y, period = _closer(moving, y, period, free, update, np.abs(defect).max(), options)
-    lines = 2.0 * np.pi / period, harmonics, samples
-    found = _result(problem, moving, y, maps[0], lines, options, history, tolerance, len(history) - 1)
-    # the phase is free, and so is the amplitude of a conservative system
-    return _told(problem, found, moving.frequency, integration, radius, trivial=2 if conservative else 1)
+    found = _result(moving, unknowns[0], whole, period, chosen, integrator, history, stuck=stuck)
+    return _judged(moving, found, chosen)
 
 
 def verdict_of_monodromy(
     problem: NonlinearSystem, monodromy: np.ndarray, period: float, *, error: float, trivial: int = 0
 ) -> FloquetVerdict:
-    """Verdict of a monodromy matrix in (q, v / rate).
+    """Verdict of a monodromy matrix (2n, 2n) in (q, v / rate), of relative error ``error``, over a period
+    [s].
 
     Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
     rounding splits; they are left out (as `floquet.floquet_verdicts` does). Of those that damping feels the
-    position has the multiplier one and is left out, the velocity counts.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    monodromy : (2n, 2n) array
-    period : float
-        [s]
-    error : float
-        Relative error of the matrix.
-    trivial : int
-        Multipliers one of a free vibration, its phase and its amplitude, which are left out too.
+    position has the multiplier one and is left out, the velocity counts. ``trivial`` multipliers one of a
+    free vibration, its phase and its amplitude, are left out too.
     """
     matrix, positions = _without_free_motions(problem, monodromy)
     values = np.linalg.eigvals(matrix)
@@ -278,17 +222,11 @@ def verdict_of_monodromy(
 
 
 def radius_of_lines(problem: NonlinearSystem, turns, omega: float, lines: np.ndarray) -> tuple[float, str]:
-    """Spectral radius of the fixed point at the lines of a periodic motion; nan and the reason without one.
+    """Spectral radius of the fixed point at the lines (n_columns, L) [m] of a periodic motion of ``omega``
+    [rad/s].
 
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    turns : (n_bases,) int array
-        See `on_one_base`.
-    omega : float
-        Angular frequency of the motion [rad/s].
-    lines : (n_columns, L) complex array
-        Mean and harmonics of the deflections [m].
+    The base frequencies are ``turns`` (n_bases,) times that of the motion. Nan and the reason without a
+    radius.
     """
     try:
         balance = harmonic_balance(on_one_base(problem, turns), orders=np.arange(lines.shape[1])[:, None])
@@ -298,14 +236,7 @@ def radius_of_lines(problem: NonlinearSystem, turns, omega: float, lines: np.nda
 
 
 def on_one_base(problem: NonlinearSystem, turns) -> NonlinearSystem:
-    """The problem over one base frequency of which the given ones are multiples.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    turns : (n_bases,) int array
-        The base frequencies over the single one.
-    """
+    """The problem over one base frequency of which the given ones are the multiples ``turns`` (n_bases,)."""
     turns = tuple(int(turn) for turn in turns)
     if turns == (1,):
         return problem
@@ -362,15 +293,9 @@ def _without_free_motions(problem: NonlinearSystem, monodromy: np.ndarray) -> tu
         return monodromy, positions
     moving = right[:rank]
     # q = L^-T z and z = L^T q with M = L L^T; the moving part of z is closed in itself
-    back = linalg.solve_triangular(root, moving.T, lower=True, trans="T")
+    back = linalg.solve_triangular(root, moving.T, lower=True, trans=1)
     there, here = np.kron(np.eye(2), moving @ root.T), np.kron(np.eye(2), back)
     return there @ monodromy @ here, positions
-
-
-def _options(moving: Flow, start, integration, events) -> dict:
-    """Options of the integrator; a scale is set only where the integrator has none of its own."""
-    options = {"tolerance": integration, "events": events, "max_steps": _MOST_STEPS}
-    return options | {"scale": motion_scale(moving, start)}
 
 
 def _settled(problem, frequency, period, settle):
@@ -384,14 +309,14 @@ def _settled(problem, frequency, period, settle):
     return found.displacement[-1], found.velocity[-1]
 
 
-def _guess(moving: Flow, start, period, segments, integration, events):
+def _guess(moving: Flow, start, period, segments, integration) -> np.ndarray:
     """States (segments, 2n) at the starts of the segments, along the motion from the first one."""
     plain = replace(moving, variational=False)
     y = plain.state(*start)
     scale, out = motion_scale(plain, start), [y]
     for k in range(segments - 1):
         span = period * k / segments, period * (k + 1) / segments
-        steps = trajectory(plain, y, *span, tolerance=max(integration, 1e-8), events=events, scale=scale)
+        steps = trajectory(plain, y, *span, tolerance=max(integration, 1e-8), events=True, scale=scale)
         y = sampled(steps, np.array(span[1:]), y)[0][0]
         out.append(y)
     return np.array(out)
@@ -440,43 +365,24 @@ def _improved(moving: Flow, unknowns, update, before, period, options):
     return unknowns + update
 
 
-def _closer(moving: Flow, y, period, free, update, before, options):
-    """The Newton step in state and period, halved until the defect gets smaller."""
-    plain = replace(moving, variational=False)
-    # a change of the period by half would shoot at another motion
-    share = min(1.0, 0.3 * period * moving.rate / max(abs(update[-1]), 1e-300))
-    for _ in range(8):
-        tried, longer = y.copy(), period + share * update[-1] / moving.rate
-        tried[free] += share * update[:-1]
-        ends, _ = _shoot(plain, tried[None], longer, options)
-        if np.abs(ends[0] - tried).max() < before:
-            break
-        share *= 0.5
-    return tried, longer
-
-
 def _size(state) -> float:
     return float(np.abs(state).max())
 
 
-def _derivative(moving: Flow, y, time):
-    """``dy/dt`` of the state without derivatives."""
-    law = Contacts(moving.problem.elements, moving.problem.system.W.shape[1])
-    return replace(moving, variational=False).derivative(law)(time, y)
-
-
 def _result(
-    problem, moving, y, monodromy, lines, options, history, tolerance, factorisations, stuck=False
-):  # fmt: skip
-    """Lines of the motion from ``y`` on."""
-    omega, harmonics, samples = lines
-    period, plain = 2.0 * np.pi / omega, replace(moving, variational=False)
+    moving: Flow, y, monodromy, period: float, chosen: ShootingOptions, integrator, history, *, stuck=False
+) -> ShootingSolution:
+    """Lines of the motion from the state ``y`` (2n,) on."""
+    plain, samples = replace(moving, variational=False), chosen.samples
+    # the period of the frequency that the solution names
+    omega = 2.0 * np.pi / period
+    period = 2.0 * np.pi / omega
     times = period * np.arange(samples) / samples
-    found, _ = sampled(trajectory(plain, y, 0.0, period, **options), times, y)
+    found, _ = sampled(trajectory(plain, y, 0.0, period, **integrator), times, y)
     q, v, x = (part.T for part in plain.split(found.T))
-    force = element_forces(problem, x, times[:, None] * moving.frequency)[0]
-    deflection, forces = harmonics_of(x.T, harmonics), harmonics_of(force.T, harmonics)
-    converged = history[-1] <= tolerance
+    force = element_forces(moving.problem, x, times[:, None] * moving.frequency)[0]
+    deflection, forces = harmonics_of(x.T, chosen.harmonics), harmonics_of(force.T, chosen.harmonics)
+    converged = history[-1] <= chosen.tolerance
     message = "the motion returns to its start" if converged else (
         f"after {len(history) - 1} iterations start and end differ by {history[-1]:.2g} of the motion: "
         "give a better start, or more segments"
@@ -486,13 +392,12 @@ def _result(
             f"no start returns: a period changes the motion by {history[-1]:.2g} of it where "
             "monodromy - 1 is singular; give some damping, balance free loads or move the frequency"
         )
-    orders = np.arange(harmonics + 1)[:, None]
+    orders = np.arange(chosen.harmonics + 1)[:, None]
     solution = PeriodicSolution(
-        frequency=[omega], orders=orders, deflection=deflection, force=forces,
+        frequency=np.array([omega]), orders=orders, deflection=deflection, force=forces,
         converged=converged, residual=history[-1], iterations=len(history) - 1,
-        factorisations=factorisations, message=message,
-        tail=line_tail(deflection, orders, rounding=10.0 * tolerance),
-        history=tuple(history),
+        factorisations=len(history) - 1 + stuck, message=message,
+        tail=line_tail(deflection, orders, rounding=10.0 * chosen.tolerance), history=tuple(history),
     )  # fmt: skip
     values = np.linalg.eigvals(monodromy)
     return ShootingSolution(
@@ -500,19 +405,19 @@ def _result(
     )
 
 
-def _told(
-    problem, found: ShootingSolution, frequency, integration: float, radius: bool, *, trivial: int = 0
+def _judged(
+    moving: Flow, found: ShootingSolution, chosen: ShootingOptions, *, trivial: int = 0
 ) -> ShootingSolution:
     """The motion with its verdict and the spectral radius of the fixed point at its lines."""
-    solution = found.solution
-    told = {"verdict": open_verdict("not covered: the solution did not converge")}
+    solution, problem = found.solution, moving.problem
+    told: dict[str, Any] = {"verdict": open_verdict("not covered: the solution did not converge")}
     if solution.converged:
         told["verdict"] = verdict_of_monodromy(
-            problem, found.monodromy, found.period, error=integration, trivial=trivial
+            problem, found.monodromy, found.period, error=chosen.integration, trivial=trivial
         )
-    if radius:
+    if chosen.radius:
         omega = float(solution.frequency[0])
-        turns = np.rint(frequency / omega).astype(int)
+        turns = np.rint(moving.frequency / omega).astype(int)
         value, note = radius_of_lines(problem, turns, omega, solution.deflection)
         told |= {"spectral_radius": value, "message": solution.message + note}
     return replace(found, solution=replace(solution, **told))

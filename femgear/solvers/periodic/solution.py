@@ -92,7 +92,7 @@ class PeriodicSolution:
     def at(self, time) -> np.ndarray:
         """Deflections (..., n_columns) at the instants ``time`` (...) [s]."""
         wave = np.exp(1j * np.asarray(time, float)[..., None] * self.line_frequency)
-        return (wave @ self.deflection.T).real
+        return np.real(wave @ self.deflection.T)
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def verdict_of(
     size = np.abs(multipliers)
     # of a complex pair the one with positive imaginary part first, whatever rounding does to the moduli
     rounded = np.round(size / max(size.max(initial=0.0), 1e-300), 9)
-    multipliers = multipliers[np.lexsort((-multipliers.imag, -rounded))]
+    multipliers = multipliers[np.lexsort((-np.imag(multipliers), -rounded))]
     largest = float(np.abs(multipliers[0])) if len(multipliers) else 0.0
     with np.errstate(divide="ignore"):
         exponents = np.log(multipliers) / period
@@ -204,6 +204,6 @@ def _on_border(multipliers: np.ndarray, velocities: int) -> complex | None:
     the first, inside the circle by more than rounding.
     """
     near = np.minimum(np.abs(multipliers - 1.0), np.abs(multipliers + 1.0)) <= CIRCLE
-    slow = np.flatnonzero(near & (np.abs(multipliers) < 1.0 - _ROUNDING) & (multipliers.real > 0.0))
+    slow = np.flatnonzero(near & (np.abs(multipliers) < 1.0 - _ROUNDING) & (np.real(multipliers) > 0.0))
     near[slow[:velocities]] = False
     return multipliers[np.argmax(near)] if np.any(near) else None

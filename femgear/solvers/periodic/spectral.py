@@ -36,7 +36,7 @@ def solve_spectral(
     method: str = "auto",
     max_iterations: int = 100,
 ) -> Response:
-    """Periodic response at all mesh frequencies.
+    """Solve for the periodic response of the gear meshes at all mesh frequencies.
 
     The force of mesh j is ``f_j = F_j + k_j (d_j - s_j)`` (see MeshExcitation) with k, s and F cut to
     `excitation_harmonics`. With ``k~ = k - mean`` and the receptance T of the system that has the mean
@@ -91,38 +91,15 @@ def solve_spectral(
             solved = _solve_batch(modes, data, frequency[part] / excitation.periods, options, top)
             for i, *values in zip(part, *solved, strict=True):
                 found[i] = values
-    deflection, force, modal, residual, iterations, radius, tail, direct = map(np.array, zip(*found))
-    converged = residual <= 10.0 * tolerance
-    if method != "fixed point" and not np.all(converged):
-        worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
-        raise ConvergenceError(
-            f"residual {residual[worst]:.3e} of the harmonic equations at {frequency[worst]:.6g} Hz",
-            code="E-RESONANCE", limit=f"{10.0 * tolerance:.1e}",
-            remedy="the equations are nearly singular there: give the modes more damping or move the speed",
-        )  # fmt: skip
-    for array in (deflection, force, modal):
-        array[~converged] = np.nan
-    tail = np.where(converged, tail, np.nan)
-    return Response(
-        mesh_frequency=frequency, deflection=deflection, force=force, modal=modal, converged=converged,
-        residual=residual, iterations=iterations, spectral_radius=radius, tail=tail,
-        method=tuple("direct" if flag else "fixed point" for flag in direct),
-        message=_message(frequency, converged, direct, radius, tail, force), periods=excitation.periods,
-    )  # fmt: skip
+    return _response(frequency, found, method, tolerance, excitation.periods)
 
 
 @dataclass(frozen=True)
 class HarmonicProblem:
     """``E_h + T_h (g E)_h = S_h`` for every harmonic h, mesh and speed.
 
-    Parameters
-    ----------
-    receptance : (n, n, n_speeds, H + 1) complex array
-        ``T_h`` [m/N].
-    product : (n, 2 (H + 1), 2 (H + 1)) array
-        Multiplication by the stiffness fluctuation of each mesh, see `series.product_matrix` [N/m].
-    source : (n, n_speeds, H + 1) complex array
-        ``S_h`` [m].
+    Receptance T (n, n, n_speeds, H + 1) [m/N]; product (n, 2 (H + 1), 2 (H + 1)), multiplication by the
+    stiffness fluctuation of each mesh, see `series.product_matrix` [N/m]; source S (n, n_speeds, H + 1) [m].
     """
 
     receptance: np.ndarray
@@ -138,13 +115,8 @@ class HarmonicProblem:
 class Twins:
     """Meshes that repeat others later in time: ``x_j(t) = x_leader(j)(t - phase_j T)``.
 
-    Parameters
-    ----------
-    leaders : (n_groups,) int array
-        First mesh of every group.
-    group : (n_meshes,) int array
-    shift : (n_meshes, H + 1) complex array
-        Factors ``exp(-2 pi i h phase_j)``.
+    First mesh of every group (n_groups,), group of every mesh (n_meshes,), factors ``exp(-2 pi i h phase_j)``
+    (n_meshes, H + 1).
     """
 
     leaders: np.ndarray
@@ -185,7 +157,7 @@ def modal_receptance(modes: Modes, modal: np.ndarray) -> np.ndarray:
     rows = modes.mesh_deflection
     n, lower = len(rows), np.tril_indices(len(rows))
     pairs = (rows[lower[0]] * rows[lower[1]]).T
-    flat = np.stack([modal.real @ pairs, modal.imag @ pairs], axis=-1).view(complex)[..., 0]
+    flat = np.stack([np.real(modal) @ pairs, np.imag(modal) @ pairs], axis=-1).view(complex)[..., 0]
     flat += modes.residual[lower]
     out = np.empty((n, n, *modal.shape[:-1]), dtype=complex)
     for index, (i, j) in enumerate(zip(*lower)):
@@ -226,7 +198,7 @@ def matrices(problem: HarmonicProblem) -> np.ndarray:
     for i in range(n):
         for j in range(n):
             block = problem.receptance[i, j][:, :, None] * columns[j]
-            out[:, i, :, 0, j], out[:, i, :, 1, j] = block.real, block.imag
+            out[:, i, :, 0, j], out[:, i, :, 1, j] = np.real(block), np.imag(block)
     return out.reshape(speeds, 2 * n * size, 2 * n * size)
 
 
@@ -250,23 +222,12 @@ def solve_direct(problem: HarmonicProblem) -> np.ndarray:
             "the harmonic equations are singular: there is no periodic response at a parametric resonance",
             code="E-RESONANCE", remedy="give the modes some damping or move the speed",
         ) from error  # fmt: skip
-    return (
-        np.ascontiguousarray(solution[..., 0])
-        .view(complex)
-        .reshape(speeds, n, size)
-        .transpose(1, 0, 2)
-        .copy()
-    )
+    rows = np.ascontiguousarray(solution[..., 0]).view(complex)
+    return rows.reshape(speeds, n, size).transpose(1, 0, 2).copy()
 
 
 def find_twins(signals: tuple[np.ndarray, ...]) -> Twins:
-    """Group meshes whose signals are the same but for one time shift.
-
-    Parameters
-    ----------
-    signals : tuple of (n_meshes, H + 1) complex arrays
-        Harmonics of stiffness, deflection, force, load deflection: all must share the shift.
-    """
+    """Group meshes whose signals, harmonics (n_meshes, H + 1), are all the same but for one time shift."""
     scales = [max(np.abs(signal).max(), np.finfo(float).tiny) for signal in signals]
     stacked = np.stack([signal / scale for signal, scale in zip(signals, scales)])
     n, size = stacked.shape[1:]
@@ -301,18 +262,18 @@ def expand_twins(deflection: np.ndarray, twins: Twins) -> np.ndarray:
     return deflection[twins.group] * twins.shift[:, None, :]
 
 
-def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7, steps: int = 20) -> np.ndarray:
+def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7) -> np.ndarray:
     """Spectral radius of ``T G`` per speed.
 
     Eigenvalues of the full matrices while their number of entries cubed, times the speeds, stays below
-    `exact_limit`; otherwise the largest Ritz value of `steps` Arnoldi steps from one random vector (Saad,
+    `exact_limit`; otherwise the largest Ritz value of 20 Arnoldi steps from one random vector (Saad,
     Numerical Methods for Large Eigenvalue Problems, algorithm 6.1), all speeds together.
     """
     n, speeds, size = problem.source.shape
     if speeds * (2 * n * size) ** 3 <= exact_limit:
         return np.abs(np.linalg.eigvals(matrices(problem))).max(axis=-1)
-    steps = min(steps, n * (2 * size - 1))
-    start = np.random.default_rng(0).standard_normal((n, speeds, size, 2)).view(complex)[..., 0]
+    steps = min(20, n * (2 * size - 1))
+    start = np.random.default_rng(0).standard_normal((n, speeds, size, 2)).view(np.complex128)[..., 0]
     start.imag[..., 0] = 0.0
     basis = np.empty((speeds, steps + 1, 2 * n * size))
     hessenberg = np.zeros((speeds, steps + 1, steps))
@@ -329,6 +290,28 @@ def spectral_radius(problem: HarmonicProblem, *, exact_limit: float = 2e7, steps
         hessenberg[:, k + 1, k] = length
         basis[:, k + 1] = image[..., 0] / np.maximum(length, np.finfo(float).tiny)[:, None]
     return np.abs(np.linalg.eigvals(hessenberg[:, :-1])).max(axis=-1)
+
+
+def _response(frequency, found, method: str, tolerance: float, periods: int) -> Response:
+    """The batches together; refuses what even the direct solution does not satisfy."""
+    deflection, force, modal, residual, iterations, radius, tail, direct = map(np.array, zip(*found))
+    converged = residual <= 10.0 * tolerance
+    if method != "fixed point" and not np.all(converged):
+        worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
+        raise ConvergenceError(
+            f"residual {residual[worst]:.3e} of the harmonic equations at {frequency[worst]:.6g} Hz",
+            code="E-RESONANCE", limit=f"{10.0 * tolerance:.1e}",
+            remedy="the equations are nearly singular there: give the modes more damping or move the speed",
+        )  # fmt: skip
+    for array in (deflection, force, modal):
+        array[~converged] = np.nan
+    tail = np.where(converged, tail, np.nan)
+    return Response(
+        mesh_frequency=frequency, deflection=deflection, force=force, modal=modal, converged=converged,
+        residual=residual, iterations=iterations, spectral_radius=radius, tail=tail,
+        method=tuple("direct" if flag else "fixed point" for flag in direct),
+        message=_message(frequency, converged, direct, radius, tail, force), periods=periods,
+    )  # fmt: skip
 
 
 def _check_harmonics(excitation_harmonics: np.ndarray, response_harmonics: np.ndarray) -> None:

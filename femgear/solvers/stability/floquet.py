@@ -1,9 +1,8 @@
 """Stability of periodic motions: Floquet multipliers from the monodromy matrix or by Hill's method.
 
-Gear meshes with a stiffness that varies with time are judged at many speeds at once (`stability`), periodic
-solutions of nonlinear problems one by one or many of one problem (`floquet_verdicts`). Small motions about a
-periodic state are followed through one period in modes with the tangents of the elements (`frame_of`,
-`passage`),
+Periodic solutions of nonlinear problems are judged one by one or many of one problem (`floquet_verdicts`).
+Small motions about a periodic state are followed through one period in modes with the tangents of the
+elements (`frame_of`, `passage`),
 
 ``M z'' + (C + speed G) z' + K z + W k(t) W^T z = 0`` in the modes of ``K + W diag(reference) W^T``, for many
 states at once.
@@ -17,28 +16,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.periodic.solution import (
-    CIRCLE,
-    FloquetVerdict,
-    PeriodicSolution,
-    open_verdict,
-    verdict_of,
-)
+from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution, open_verdict, verdict_of
 from femgear.system.elements import tangent_jumps
 from femgear.system.entries import checked_numbers, checked_tolerance
 from femgear.system.nonlinear import NonlinearSystem, element_forces
-from femgear.system.series import mesh_harmonics, sample
-from femgear.system.system import MeshExcitation, Modes
+from femgear.system.system import Modes
 
-# Angle [rad] that the fastest mode turns in one step, and steps in a period of the highest harmonic.
-_MESH_STEP_ANGLE = 1.0
-_STEPS_PER_HARMONIC = 8
-# Modes that exchange less than this share of their stiffness move independently.
-_UNCOUPLED = 1e-9
-# Speeds treated together.
-_SPEEDS_TOGETHER = 64
 # Angle [rad] that the fastest mode turns in a step of the first sequence, and sequences of halved steps.
-_FRAME_STEP_ANGLE = 0.7
+_STEP_ANGLE = 0.7
 _LEVELS = 7
 # Steps in a period beyond which they are not halved again.
 _MOST_HALVED = 320_000
@@ -58,262 +43,47 @@ _MOST_STEPS = 20_000
 _MOST_ENTRIES = 4_000_000
 
 
-@dataclass(frozen=True)
-class Stability:
-    """Floquet verdict beside a periodic response; it does not depend on the load, only on k(t).
-
-    Parameters
-    ----------
-    mesh_frequency : (n_speeds,) array
-        [Hz].
-    multiplier : (n_speeds,) complex array
-        Multiplier of largest modulus over one period of the excitation record, rigid modes left out.
-    modes_kept : (n_speeds,) int array
-        Modes that were followed in time; the others counted as static flexibility.
-    steps : (n_speeds,) int array
-        Time steps a period.
-    """
-
-    mesh_frequency: np.ndarray
-    multiplier: np.ndarray
-    modes_kept: np.ndarray
-    steps: np.ndarray
-
-    @property
-    def stable(self) -> np.ndarray:
-        """(n_speeds,) bool: no perturbation grows (largest modulus at most 1 within 1e-6)."""
-        return np.abs(self.multiplier) <= 1.0 + CIRCLE
-
-
-def stability(
-    modes: Modes,
-    excitation: MeshExcitation,
-    mesh_frequency,
-    *,
-    excitation_harmonics: int = 6,
-    steps: int | None = None,
-    frequency_ratio: float = 2.0,
-) -> Stability:
-    """Floquet multipliers of the linear system with the truncated mesh stiffnesses.
-
-    Parameters
-    ----------
-    modes, excitation
-        As given to ``solve_spectral``.
-    mesh_frequency : float or (n_speeds,) array
-        [Hz], positive.
-    excitation_harmonics : int
-        Mesh harmonics of the stiffness that are kept.
-    steps : int, optional
-        Time steps a period. By default 8 in a period of the highest harmonic and one for every radian of
-        the fastest mode that is followed.
-    frequency_ratio : float
-        Modes above this many times the highest excitation frequency are counted as static flexibility:
-        parametric resonances need ``h f = f_i + f_j``, their first order a ratio of one, their second order
-        two. Their own multipliers ``exp(-zeta omega T)`` still count. The static flexibility costs up to
-        1e-3 of a modulus below one and less of a growing one; a ratio of 5 or 20 follows nearly every mode.
-
-    Returns
-    -------
-    Stability
-
-    Raises
-    ------
-    CaseError
-        Frequencies that are not positive, data that cannot be used, too few steps.
-    ConvergenceError
-        A mesh stiffness so negative that the static flexibility cannot carry it.
-
-    Notes
-    -----
-    ``q'' + 2 zeta w q' + w^2 q + R^T kappa(t) R q = 0`` with ``kappa = k~ (I + T_res k~)^-1``. Between
-    the kicks that the meshes give, a matrix of rank n_meshes, the damped modes move exactly: algorithm 4A of
-    Chin (Phys. Lett. A 226, 1997), fourth order with positive steps; its corrected kick
-    ``kappa - dt^2/24 kappa R R^T kappa`` holds with damping too, because ``[B, [A, B]]`` does not contain the
-    damping. Modes that no stiffness couples are separate eigenvalue problems.
-    """
-    frequency = np.atleast_1d(np.array(mesh_frequency, dtype=float))
-    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)) or np.any(frequency <= 0.0):
-        raise CaseError(
-            "a period needs finite, positive mesh frequencies", code="E-FREQUENCY", key="mesh_frequency",
-            value=frequency.tolist(), limit="> 0 Hz",
-        )  # fmt: skip
-    if not frequency_ratio >= 1.0:
-        raise CaseError(
-            "modes up to the highest excitation frequency must be followed", code="E-MODES",
-            key="frequency_ratio", value=frequency_ratio, limit=">= 1",
-        )  # fmt: skip
-    stiffness = mesh_harmonics(excitation, excitation_harmonics)[0]
-    stiffness[:, 0] -= modes.mesh_stiffness
-    lines = excitation_harmonics * excitation.periods
-    cut = frequency * excitation_harmonics * frequency_ratio
-    kept = np.searchsorted(modes.frequency, cut, side="right")
-    multiplier = np.empty(len(frequency), dtype=complex)
-    taken = np.empty(len(frequency), dtype=int)
-    for number in np.unique(kept):
-        chosen = np.flatnonzero(kept == number)
-        for part in np.array_split(chosen, -(-len(chosen) // _SPEEDS_TOGETHER)):
-            period = excitation.periods / frequency[part]
-            fastest = 2.0 * np.pi * modes.frequency[:number].max(initial=0.0) * period.max()
-            taken[part] = steps or int(np.ceil(max(fastest / _MESH_STEP_ANGLE, _STEPS_PER_HARMONIC * lines)))
-            multiplier[part] = _largest(modes, stiffness, number, period, int(taken[part[0]]))
-    moving = kept - np.searchsorted(modes.frequency, 0.0, side="right")
-    return Stability(frequency, multiplier, np.maximum(moving, 0), taken)
-
-
-def floquet_multipliers(
-    modes: Modes,
-    excitation: MeshExcitation,
-    mesh_frequency,
-    *,
-    excitation_harmonics: int = 6,
-    steps: int | None = None,
-    frequency_ratio: float = 2.0,
-) -> np.ndarray:
-    """Largest modulus (n_speeds,) of the Floquet multipliers; see :func:`stability`."""
-    verdict = stability(
-        modes,
-        excitation,
-        mesh_frequency,
-        excitation_harmonics=excitation_harmonics,
-        steps=steps,
-        frequency_ratio=frequency_ratio,
-    )
-    return np.abs(verdict.multiplier)
-
-
-def decisive_harmonics(modes: Modes, excitation: MeshExcitation, kept: int, *, least: int = 6) -> int:
-    """Highest mesh harmonic of the stiffness that could by itself make the response unstable.
-
-    ``q'' + 2 zeta w q' + w^2 (1 + eps cos 2 w t) q = 0`` is stable below ``eps = 4 zeta`` (Nayfeh and Mook,
-    Nonlinear Oscillations, 1979, section 5.3), and a mode whose strain is all in the mesh has
-    ``eps = |k_h|/k_0``; half of that is taken.
-
-    Parameters
-    ----------
-    modes, excitation
-        As given to `stability`.
-    kept : int
-        Mesh harmonics of the response.
-    least : int
-        Smallest number, as far as there are so many.
-
-    Returns
-    -------
-    int
-        At most 64: the amplitudes fall as one over the harmonic.
-    """
-    most = min(kept, 64)
-    stiffness = np.abs(mesh_harmonics(excitation, most)[0])
-    damped = modes.damping_ratio[modes.frequency > 0.0].min(initial=1.0)
-    large = np.flatnonzero((stiffness[:, 1:] > 2.0 * damped * stiffness[:, :1]).any(axis=0))
-    # lines of a record of several periods
-    highest = 0 if not len(large) else -(-(int(large[-1]) + 1) // excitation.periods)
-    return min(most, max(least, highest))
-
-
 def monodromy(matrices, durations) -> np.ndarray:
     """Transition matrix over one period of ``x' = A x`` with A constant in pieces, by matrix exponentials.
 
     Parameters
     ----------
-    matrices : (n_pieces, n, n) array
+    matrices : (..., n_pieces, n, n) array
         ``A`` in order of time.
-    durations : (n_pieces,) array
+    durations : (..., n_pieces) array
         [s], positive.
 
     Returns
     -------
-    (n, n) array
+    (..., n, n) array
         ``expm(A_last dt_last) ... expm(A_0 dt_0)``; its eigenvalues are the Floquet multipliers.
     """
     from scipy.linalg import expm
 
     matrices, durations = np.asarray(matrices, dtype=float), np.asarray(durations, dtype=float)
-    if matrices.ndim != 3 or durations.shape != matrices.shape[:1] or np.any(durations <= 0.0):
+    if matrices.ndim < 3 or durations.shape != matrices.shape[:-2] or np.any(durations <= 0.0):
         raise CaseError("every matrix needs one positive duration", code="E-SHAPE", key="durations")
     out = np.eye(matrices.shape[-1])
-    for step in expm(matrices * durations[:, None, None]):
+    for step in np.moveaxis(expm(matrices * durations[..., None, None]), -3, 0):
         out = step @ out
     return out
 
 
-def _largest(modes: Modes, stiffness, number: int, period: np.ndarray, steps: int) -> np.ndarray:
-    """Multiplier of largest modulus for speeds that follow the first `number` modes."""
-    natural = 2.0 * np.pi * modes.frequency
-    static = natural > 0.0
-    static[:number] = False
-    rows = modes.mesh_deflection
-    flexibility = modes.residual + (rows[:, static] / natural[static] ** 2) @ rows[:, static].T
-    kicks = _kicks(stiffness, flexibility, steps)
-    moving = np.flatnonzero(natural[:number] > 0.0)
-    best = np.zeros(len(period), dtype=complex)
-    for group in _coupled(rows[:, moving] / natural[moving], kicks):
-        index = moving[group]
-        found = _multipliers(natural[index], modes.damping_ratio[index], rows[:, index], kicks, period)
-        best = np.where(np.abs(found) > np.abs(best), found, best)
-    if np.any(static):
-        slowest = np.exp(-np.min(modes.damping_ratio[static] * natural[static]) * period)
-        best = np.where(slowest > np.abs(best), slowest, best)
-    return best
+def stiffness_in_series(change: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
+    """Put a static flexibility (n_c, n_c) in series with stiffnesses (..., n_c, n_c), ``k (1 + T k)^-1``.
 
-
-def _kicks(stiffness: np.ndarray, flexibility: np.ndarray, steps: int) -> np.ndarray:
-    """``kappa = k~ (I + T_res k~)^-1`` (2 steps, n, n) at the ends and middles of the steps [N/m]."""
-    lines = stiffness.shape[-1] - 1
-    if steps <= lines:
-        raise CaseError(
-            f"{steps} steps cannot follow {lines} harmonics", code="E-HARMONICS", key="steps",
-            value=steps, limit=f">= {lines + 1}", remedy="take more steps",
-        )  # fmt: skip
-    change = sample(stiffness, 2 * steps).T
-    carried = np.eye(len(stiffness)) + flexibility * change[:, None, :]
+    Raises
+    ------
+    ConvergenceError
+        Elements so much softer than their reference that the flexibility cannot carry them (E-RESIDUAL).
+    """
+    carried = np.eye(len(flexibility)) + flexibility @ change
     if np.linalg.eigvals(carried).real.min() <= 0.0:
         raise ConvergenceError(
-            "the modes left out are more flexible than the meshes themselves at their lowest stiffness",
+            "the modes left out are more flexible than the meshes or elements at their lowest stiffness",
             code="E-RESIDUAL", remedy="keep more modes",
         )  # fmt: skip
-    return change[:, :, None] * np.linalg.inv(carried)
-
-
-def _coupled(rows: np.ndarray, kicks: np.ndarray) -> list[np.ndarray]:
-    """Groups of modes that the kicks couple, from the rows (n_meshes, m) divided by the frequencies."""
-    from scipy.sparse.csgraph import connected_components
-
-    if not rows.shape[1]:
-        return []
-    strength = np.abs(rows.T @ kicks @ rows).max(axis=0)
-    number, label = connected_components(strength > _UNCOUPLED, directed=False)
-    return [np.flatnonzero(label == g) for g in range(number)]
-
-
-def _multipliers(natural, damping_ratio, rows, kicks, period) -> np.ndarray:
-    """Largest multiplier (n_speeds,) of one group of modes, followed through one period."""
-    speeds, m, steps = len(period), len(natural), len(kicks) // 2
-    dt = (period / steps)[:, None, None]
-    stay, turn, back, keep = _half_step(natural, damping_ratio, 0.5 * dt)
-    gyration = rows @ rows.T
-    velocity_rows = (rows / natural).T
-    q = np.zeros((speeds, m, 2 * m))
-    q[:, range(m), range(m)] = 1.0
-    u = np.roll(q, m, axis=-1)
-    for step in range(steps):
-        first, middle = kicks[2 * step], kicks[2 * step + 1]
-        corrected = middle - dt**2 / 24.0 * (middle @ gyration @ middle)
-        for kick in (first * (dt / 3.0), corrected * (2.0 * dt / 3.0)):
-            u -= velocity_rows @ (kick @ (rows @ q))
-            q, u = stay * q + turn * u, back * q + keep * u
-    values = np.linalg.eigvals(np.concatenate([q, u], axis=1))
-    return values[np.arange(speeds), np.abs(values).argmax(axis=1)]
-
-
-def _half_step(natural, damping_ratio, duration):
-    """Exact motion of damped modes, ``u = q' / w``: ``q <- stay q + turn u``, ``u <- back q + keep u``."""
-    w, zeta = natural[:, None], damping_ratio[:, None]
-    angle = np.sqrt((1.0 - zeta**2).astype(complex)) * w * duration
-    sine = (np.sinc(angle / np.pi) * (w * duration)).real
-    cosine, decay = np.cos(angle).real, np.exp(-zeta * w * duration)
-    return decay * (cosine + zeta * sine), decay * sine, -decay * sine, decay * (cosine - zeta * sine)
+    return change @ np.linalg.inv(carried)
 
 
 @dataclass(frozen=True)
@@ -356,7 +126,7 @@ class Frame:
 
     def steps(self, period):
         """Steps of the first sequence over a period [s], as floats: they may be beyond all bounds."""
-        return np.ceil(np.maximum(8.0, self.fastest * np.asarray(period, float) / _FRAME_STEP_ANGLE))
+        return np.ceil(np.maximum(8.0, self.fastest * np.asarray(period, float) / _STEP_ANGLE))
 
     @property
     def fastest(self) -> float:
@@ -364,17 +134,9 @@ class Frame:
         return float(np.sqrt(np.abs(self.square).max(initial=0.0)))
 
     def kappa(self, tangent: np.ndarray) -> np.ndarray:
-        """Change of stiffness (..., n_c, n_c) with the modes left out in series, ``k (1 + T_res k)^-1``."""
+        """Change of stiffness (..., n_c, n_c) of tangents [N/m], the modes left out in series."""
         change = tangent - np.diag(self.reference)
-        if not np.any(self.residual):
-            return change
-        carried = np.eye(len(self.residual)) + self.residual @ change
-        if np.linalg.eigvals(carried).real.min() <= 0.0:
-            raise ConvergenceError(
-                "the modes left out are more flexible than the elements at their lowest stiffness",
-                code="E-RESIDUAL", remedy="keep more modes",
-            )  # fmt: skip
-        return change @ np.linalg.inv(carried)
+        return stiffness_in_series(change, self.residual) if np.any(self.residual) else change
 
     def state_matrices(self, kappa: np.ndarray) -> np.ndarray:
         """``A`` (..., 2 n, 2 n) of ``(eta, eta')' = A (eta, eta')`` with kappa (..., n_c, n_c)."""
@@ -385,18 +147,19 @@ class Frame:
         out[..., n:, n:] = -self.damping
         return out
 
+    def exact_monodromy(self, tangents: np.ndarray, durations) -> np.ndarray:
+        """Monodromy matrices of tangents (..., pieces, n_c, n_c) that are constant over durations [s]."""
+        n = len(self.square)
+        both = np.concatenate([np.ones(n), np.full(n, self.fastest or 1.0)])
+        return monodromy(self.state_matrices(self.kappa(tangents)) * both / both[:, None], durations)
+
 
 def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
-    """Modes of a problem about its reference stiffness, lowest first.
+    """Modes of a problem about its reference stiffness, at most so many, lowest first.
 
     Free motions that no column and no coupling of the damping feels are left out: the multipliers of their
-    positions are one, those of their velocities follow from `Frame.drift`.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    modes : int
-        Largest number of modes kept; the others leave their static flexibility.
+    positions are one, those of their velocities follow from `Frame.drift`. Modes left out leave their static
+    flexibility.
     """
     from scipy import linalg
 
@@ -438,29 +201,10 @@ def frame_of_modes(modes: Modes) -> Frame:
     return Frame(omega**2, damping, modes.mesh_deflection[:, moving], modes.mesh_stiffness, residual)
 
 
-@dataclass(frozen=True)
-class Passage:
-    """Monodromy matrices of several states.
-
-    Parameters
-    ----------
-    matrix : (p, 2 n, 2 n) array
-        In coordinates ``(eta, eta' / s)`` with a scale s of every mode.
-    error : (p,) array
-        Estimated error of the matrix relative to its norm.
-    steps : (p,) int array
-        Steps of the finest sequence; zero for exact exponentials.
-    """
-
-    matrix: np.ndarray
-    error: np.ndarray
-    steps: np.ndarray
-
-
 def passage(
     frame: Frame, period, tangents: Callable, breaks: list[np.ndarray], *, tolerance: float = 1e-7
-) -> Passage:
-    """Monodromy matrices over one period by a splitting of fourth order with Richardson extrapolation.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Integrate small motions over one period, by a splitting of fourth order with Richardson extrapolation.
 
     Algorithm 4B of Chin (Phys. Lett. A 226, 1997; for forces that depend on time Chin and Chen, J. Chem.
     Phys. 117, 2002): damped modes move exactly between kicks of the elements at the Gauss points of every
@@ -469,9 +213,8 @@ def passage(
 
     Parameters
     ----------
-    frame : Frame
     period : (p,) array
-        [s].
+        [s]
     tangents : callable
         ``(fraction (m, s), states (m,)) -> (m, s, n_c, n_c)`` tangents [N/m] at fractions of the period.
     breaks : list of p arrays
@@ -479,23 +222,28 @@ def passage(
     tolerance : float
         Relative error of the matrix at which halving ends, after at most 7 sequences, fewer where a
         period takes thousands of steps.
+
+    Returns
+    -------
+    (p, 2 n, 2 n), (p,) arrays
+        Monodromy matrices in coordinates ``(eta, eta' / s)`` with a scale s of every mode, and their
+        estimated errors relative to their norms.
     """
     period = np.asarray(period, float)
     size, n = len(period), len(frame.square)
-    out = Passage(np.empty((size, 2 * n, 2 * n)), np.full(size, np.inf), np.zeros(size, int))
+    matrix, errors = np.empty((size, 2 * n, 2 * n)), np.full(size, np.inf)
     open_states, table = np.arange(size), None
     base = int(frame.steps(period.max(initial=0.0)))
     for level in range(_LEVELS):
         start, duration = _steps([breaks[i] for i in open_states], base, level)
         found = _through(frame, period[open_states], start, duration, tangents, open_states)
         table, error = _extrapolated(table, found)
-        out.matrix[open_states], out.error[open_states] = table[-1], error
-        out.steps[open_states] = start.shape[1]
+        matrix[open_states], errors[open_states] = table[-1], error
         rest = error > tolerance
         open_states, table = open_states[rest], [entry[rest] for entry in table]
         if not len(open_states) or (level and base << (level + 1) > _MOST_HALVED):
             break
-    return out
+    return matrix, errors
 
 
 def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:
@@ -621,7 +369,7 @@ def floquet_verdicts(
     harmonics: int | None = None,
     modes: int = 100,
 ) -> tuple[FloquetVerdict, ...]:
-    """Stability of periodic solutions of one problem.
+    """Judge the stability of periodic solutions of one problem by their Floquet multipliers.
 
     Parameters
     ----------
@@ -657,8 +405,9 @@ def floquet_verdicts(
         )
     tolerance = checked_tolerance(tolerance)
     frame = frame_of(problem, modes=modes)
-    out = [_not_covered(solution) or _too_long(frame, solution) for solution in solutions]
-    covered = [i for i, verdict in enumerate(out) if verdict is None]
+    early = {i: _not_covered(one) or _too_long(frame, one) for i, one in enumerate(solutions)}
+    out = {i: verdict for i, verdict in early.items() if verdict is not None}
+    covered = [i for i in early if i not in out]
     for first in range(0, len(covered), _STATES_TOGETHER):
         part = covered[first : first + _STATES_TOGETHER]
         chosen = [solutions[i] for i in part]
@@ -666,24 +415,13 @@ def floquet_verdicts(
             found = [_by_hill(frame, problem, solution, harmonics) for solution in chosen]
         else:
             found = _by_monodromy(frame, problem, chosen, tolerance)
-        for i, verdict in zip(part, found):
-            out[i] = verdict
-    return tuple(out)
+        out |= zip(part, found)
+    return tuple(out[i] for i in range(len(solutions)))
 
 
-def floquet_verdict(
-    problem: NonlinearSystem,
-    solution: PeriodicSolution,
-    *,
-    method: str = "monodromy",
-    tolerance: float = 1e-7,
-    harmonics: int | None = None,
-    modes: int = 100,
-) -> FloquetVerdict:
-    """Stability of one periodic solution; see :func:`floquet_verdicts`."""
-    return floquet_verdicts(
-        problem, [solution], method=method, tolerance=tolerance, harmonics=harmonics, modes=modes
-    )[0]
+def floquet_verdict(problem: NonlinearSystem, solution: PeriodicSolution, **options) -> FloquetVerdict:
+    """Judge the stability of one periodic solution; options as for `floquet_verdicts`."""
+    return floquet_verdicts(problem, [solution], **options)[0]
 
 
 def judged(
@@ -701,18 +439,7 @@ def judged(
 
 
 def require_period(frequency) -> None:
-    """Refuse the single base frequency zero, which has no period to judge stability over.
-
-    Parameters
-    ----------
-    frequency : float or (n_bases,) array
-        [rad/s]; several ones are let through, their verdict is "not covered".
-
-    Raises
-    ------
-    CaseError
-        The only base frequency is zero (E-FREQUENCY).
-    """
+    """Refuse the single base frequency zero, which has no period to judge stability over (E-FREQUENCY)."""
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
     if frequency.size == 1 and frequency.ravel()[0] == 0.0:
         raise CaseError(
@@ -743,16 +470,8 @@ def hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: 
     ``z = exp(lambda t) sum_h z_h exp(i h omega t)`` in the first-order form gives the eigenvalues of the
     block Toeplitz matrix ``A_(h - m) - i h omega``. Of every exponent it holds copies ``lambda + i k omega``;
     those with the most symmetric eigenvectors are the converged ones (Moore, SIAM J. Numer. Anal. 42, 2005):
-    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each.
-
-    Parameters
-    ----------
-    frame : Frame
-    kappa : (samples, n_c, n_c) array
-        Change of stiffness from the reference over one period [N/m].
-    omega : float
-        Base frequency [rad/s].
-    harmonics : int
+    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each. ``kappa``
+    (samples, n_c, n_c) is the change of stiffness from the reference over one period [N/m].
     """
     n, orders = len(frame.square), np.arange(-harmonics, harmonics + 1)
     lines = np.fft.fft(kappa, axis=0) / len(kappa)
@@ -799,20 +518,23 @@ def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[Fl
     tangents = tangents_of(problem, solutions)
     breaks = tangent_jumps(tangents, np.arange(len(solutions)))
     exact = [_constant_pieces(tangents, i, inner) for i, inner in enumerate(breaks)]
-    out = [
-        None if pieces is None else _exact_verdict(frame, T, inner, pieces)
-        for T, inner, pieces in zip(period, breaks, exact)
-    ]
+    out = {
+        i: _exact_verdict(frame, float(period[i]), breaks[i], pieces)
+        for i, pieces in enumerate(exact)
+        if pieces is not None
+    }
     open_states = np.array([i for i, pieces in enumerate(exact) if pieces is None], int)
     for rest in _portions(frame, period, open_states):
-        moved = passage(
+        matrix, errors = passage(
             frame, period[rest], lambda f, states, rest=rest: tangents(f, rest[states]),
             [breaks[i] for i in rest], tolerance=tolerance,
         )  # fmt: skip
-        values = np.linalg.eigvals(moved.matrix)
-        for i, multipliers, error in zip(rest, values, moved.error):
-            out[i] = verdict_of(multipliers, period[i], "splitting", float(error), tolerance, **_free(frame))
-    return out
+        values = np.linalg.eigvals(matrix)
+        for i, multipliers, error in zip(rest, values, errors):
+            out[i] = verdict_of(
+                multipliers, float(period[i]), "splitting", float(error), tolerance, **_free(frame)
+            )
+    return [out[i] for i in range(len(solutions))]
 
 
 def _portions(frame: Frame, period, states: np.ndarray) -> list[np.ndarray]:
@@ -839,10 +561,7 @@ def _constant_pieces(tangents, state: int, inner: np.ndarray) -> np.ndarray | No
 
 def _exact_verdict(frame: Frame, period: float, inner, pieces) -> FloquetVerdict:
     durations = np.diff(np.concatenate([[0.0], inner, [1.0]])) * period
-    unit = frame.fastest or 1.0
-    both = np.concatenate([np.ones(len(frame.square)), np.full(len(frame.square), unit)])
-    matrices = frame.state_matrices(frame.kappa(pieces)) * both / both[:, None]
-    multipliers = np.linalg.eigvals(monodromy(matrices, durations))
+    multipliers = np.linalg.eigvals(frame.exact_monodromy(pieces, durations))
     return verdict_of(multipliers, period, "exact exponentials", 0.0, np.inf, **_free(frame))
 
 

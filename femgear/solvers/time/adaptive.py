@@ -12,7 +12,7 @@ where it is open, whatever the sign of u: smooth across the change.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, is_dataclass, replace
 
 import numpy as np
 
@@ -153,24 +153,16 @@ def trajectory(
     motion: Flow, start, begin: float, end: float, *, method="DOP853", tolerance=1e-10, scale=None,
     events=False, max_steps=1_000_000,
 ) -> Iterator[tuple]:  # fmt: skip
-    """Accepted steps of the integrator: yields (from, to, interpolation of y).
+    """Integrate from a state of ``Flow.state``; yields accepted steps (from, to [s], interpolation of y).
 
     Parameters
     ----------
-    motion : Flow
-    start : (size,) array
-        From ``Flow.state``.
-    begin, end : float
-        [s].
     method : str
         One of `METHODS`; with tangents only "DOP853".
     tolerance : float
-        Relative local error, and absolute of ``scale``.
-    scale : float, optional
-        Size of the motion [m].
+        Relative local error, and absolute of ``scale``, the size of the motion [m].
     events : bool
         Stop at every contact change and at every break of a step series.
-    max_steps : int
 
     Raises
     ------
@@ -180,7 +172,7 @@ def trajectory(
     steps = stepped(motion.problem, motion.frequency) if events else []
     y, t, taken = np.asarray(start, float), begin, 0
     q, v, x = motion.split(y)
-    scale = scale or typical_deflection(motion.problem, q, v, motion.rate) or 1.0
+    scale = scale or motion_scale(motion, (q, v)) or 1.0
     atol = tolerance * np.full(len(y), scale)
     if motion.variational:
         # derivatives of the scaled state are numbers of order one
@@ -205,6 +197,25 @@ def trajectory(
                 )  # fmt: skip
             yield t0, t1, dense
         t, y = stop, dense(stop)
+
+
+def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
+    """States (n_times, size) of an adaptive integration at ascending instants, and the number of its steps.
+
+    ``pieces`` comes from `trajectory`; instants before its first step have the state ``start``.
+    """
+    found, filled, steps = np.empty((len(times), len(start))), 0, 0
+    for begin, end, dense in pieces:
+        early = int(np.searchsorted(times, begin, side="right")) if not steps else filled
+        found[filled:early] = start
+        last = int(np.searchsorted(times, end, side="right"))
+        if last > early:
+            found[early:last] = dense(times[early:last]).T
+        filled, steps = max(last, early), steps + 1
+    if filled < len(times):
+        # the end of the last step, but for rounding
+        found[filled:] = dense(times[filled:]).T if steps else start
+    return found, steps
 
 
 def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.ndarray]:
@@ -235,34 +246,30 @@ def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.
     )  # fmt: skip
 
 
-def typical_deflection(problem: NonlinearSystem, q, v, rate: float) -> float:
-    """Size of the motion: the start, and the static answer to loads and element forces at rest [m]."""
-    system = problem.system
-    theta = np.zeros(problem.bases)
-    at_rest, _ = Contacts(problem.elements, system.W.shape[1]).forces(np.zeros(system.W.shape[1]), theta)
-    pushes = [system.load, system.W @ at_rest, *(np.abs(f.force) for f in problem.forces)]
-    carrying = problem.stiffness + rate * rate * system.M
-    static = [np.abs(np.linalg.solve(carrying, p)).max() for p in pushes]
-    return max(np.abs(q).max(), np.abs(v).max() / rate, *static)
-
-
 def motion_scale(motion: Flow, start) -> float | None:
     """Size of the motion [m] to which an integration tolerance refers; None leaves it to the integrator.
 
-    `typical_deflection` solves with the stiffness at rest plus inertia, which is singular at an
-    unstable rest such as the top between two wells. Inertia alone holds the loads then.
+    The start, and the static answer to loads and element forces at rest, held by the stiffness there plus
+    inertia. That is singular at an unstable rest such as the top between two wells: inertia alone holds then.
     """
     q, v = start
+    system, rate = motion.problem.system, motion.rate
+    columns = np.zeros(system.W.shape[1])
+    at_rest, _ = Contacts(motion.problem.elements, len(columns)).forces(
+        columns, np.zeros(motion.problem.bases)
+    )
+    pushes = [system.load, system.W @ at_rest, *(np.abs(f.force) for f in motion.problem.forces)]
+    carrying = motion.problem.stiffness + rate * rate * system.M
     try:
-        return typical_deflection(motion.problem, q, v, motion.rate) or None
+        held = [np.abs(np.linalg.solve(carrying, push)).max() for push in pushes]
     except np.linalg.LinAlgError:
-        loads = np.abs(motion.loads).max() / motion.rate
-        return float(max(np.abs(q).max(), np.abs(v).max() / motion.rate, loads)) or None
+        held = [np.abs(motion.loads).max() / rate]
+    return float(max(np.abs(q).max(), np.abs(v).max() / rate, *held)) or None
 
 
 def _smooth_pieces(motion: Flow, law: Contacts, y, t, stop, small, method, tolerance, atol):
     """Steps up to ``stop``, the contact state changed wherever a switch crosses zero."""
-    has_switches = law.closed is not None and sum(map(len, law.closed)) > 0
+    has_switches = sum(map(len, law.closed)) > 0
     first, stuck = None, 0
     while stop - t > small:
         solver = _solver(motion, law, t, y, stop, method, tolerance, atol, first)
@@ -307,7 +314,7 @@ def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
 
 def _first_change(motion: Flow, law: Contacts, dense, t0, t1, small):
     """Instant of the first contact change in a step and the switches that change, or the end and None."""
-    from scipy.optimize import brentq
+    from scipy.optimize import root_scalar
 
     times = np.linspace(t0, t1, _SAMPLES + 1)
     gaps = _gaps(motion, law, dense, times)
@@ -324,7 +331,10 @@ def _first_change(motion: Flow, law: Contacts, dense, t0, t1, small):
         if gap(times[k]) <= 0.0:
             instants[j] = times[k]
             continue
-        instants[j] = brentq(gap, times[k], times[k + 1], xtol=1e-300, rtol=4.0 * np.finfo(float).eps)
+        bracket = times[k], times[k + 1]
+        instants[j] = root_scalar(
+            gap, bracket=bracket, method="brentq", xtol=1e-300, rtol=4.0 * np.finfo(float).eps
+        ).root
     return float(instants.min()), instants <= instants.min() + small
 
 
@@ -366,39 +376,37 @@ class SharpMeshes:
         return (line * drive + behind * back)[:, None], (k * (drive + back))[:, None, None]
 
 
-def sharp(elements) -> tuple[Element, ...]:
-    """The elements with their meshes as `SharpMeshes` where those say the same."""
-    return tuple(
-        SharpMeshes(
-            e.columns, _coefficients(e), np.where(np.isfinite(e.backlash), e.backlash, 0.0),
-            np.isfinite(e.backlash),
-        )
-        if type(e) is GearMeshes and e.separates and not e.smoothing
-        else e
-        for e in elements
-    )  # fmt: skip
+Piece = Element | GearMeshes | SharpMeshes
 
 
-def switches(element: Element, x, theta) -> np.ndarray:
-    """Arguments (..., m) of the positive parts of an element, zero of them for a smooth one.
+def _sharp(element: Element) -> Piece:
+    """Gear meshes as `SharpMeshes` where those say the same, else the element itself."""
+    if type(element) is not GearMeshes or not element.separates or element.smoothing:
+        return element
+    has_back = np.isfinite(element.backlash)
+    backlash = np.where(has_back, element.backlash, 0.0)
+    return SharpMeshes(element.columns, _coefficients(element), backlash, has_back)
 
-    Parameters
-    ----------
-    element : Element
-    x : (..., g, d) array
-    theta : (..., n_bases) array
-    """
+
+def switches(element: Piece, x, theta) -> np.ndarray:
+    """Arguments (..., m) of the positive parts of an element at deflections x (..., g, d); none if smooth."""
     x = np.asarray(x, float)
     if isinstance(element, SharpMeshes):
         return element.switches(x, theta)
     if isinstance(element, PiecewiseSprings) and not element.smoothing:
         return (x - element.breaks).reshape(*x.shape[:-2], -1)
     if isinstance(element, RadialBearings) and element.springs is not None and not element.smoothing:
-        return (x @ element.directions.T - element.clearance[:, None]).reshape(*x.shape[:-2], -1)
+        return _ring_overlaps(element, x).reshape(*x.shape[:-2], -1)
     return np.zeros((*x.shape[:-2], 0))
 
 
-def frozen(element: Element, x, theta, closed) -> tuple[np.ndarray, np.ndarray]:
+def _ring_overlaps(element: RadialBearings, x) -> np.ndarray:
+    """Overlaps (..., g, springs) of the springs of bearings at deflections x (..., g, 2) [m]."""
+    assert element.directions is not None
+    return x @ element.directions.T - np.asarray(element.clearance)[:, None]
+
+
+def frozen(element: Piece, x, theta, closed) -> tuple[np.ndarray, np.ndarray]:
     """Forces (g, d) and tangents (g, d, d) of an element whose switches are closed as given, one instant."""
     if not len(closed):
         return element.evaluate(x, theta)
@@ -411,32 +419,32 @@ def frozen(element: Element, x, theta, closed) -> tuple[np.ndarray, np.ndarray]:
         rest = np.maximum(-element.breaks, 0.0) @ change
         force = element.slopes[0] * x[:, 0] + ((x - element.breaks) * closed) @ change - rest
         return force[:, None], (element.slopes[0] + closed @ change)[:, None, None]
-    each = (4.0 * element.stiffness / element.springs)[:, None] * closed
-    stretch = x @ element.directions.T - element.clearance[:, None]
+    assert isinstance(element, RadialBearings) and element.directions is not None and element.springs
+    each = (4.0 * np.asarray(element.stiffness) / element.springs)[:, None] * closed
     tangents = np.einsum("gs,si,sj->gij", each, element.directions, element.directions)
-    return (each * stretch) @ element.directions, tangents
+    return (each * _ring_overlaps(element, x)) @ element.directions, tangents
 
 
 @dataclass(frozen=True)
 class Contacts:
     """Elements of a problem with the contact state between two changes.
 
-    ``closed``: one bool array an element, or None, when the elements are evaluated as they are.
+    ``closed``: one bool array an element; none where the elements are evaluated as they are.
     """
 
-    elements: tuple[Element, ...]
+    elements: tuple[Piece, ...]
     columns: int
-    closed: tuple[np.ndarray, ...] | None = None
+    closed: tuple[np.ndarray, ...] = ()
 
     def forces(self, x, theta):
         """Forces (n_c,) and tangents (n_c, n_c) of one instant."""
         total, tangent = np.zeros(self.columns), np.zeros((self.columns, self.columns))
         for number, element in enumerate(self.elements):
             own = x[element.columns]
-            if self.closed is None:
-                force, slope = element.evaluate(own, theta)
-            else:
+            if self.closed:
                 force, slope = frozen(element, own, theta, self.closed[number])
+            else:
+                force, slope = element.evaluate(own, theta)
             if element.columns.shape[1] == 1:
                 np.add.at(total, element.columns, force)
                 np.add.at(tangent, (element.columns[:, 0], element.columns[:, 0]), slope[:, 0, 0])
@@ -466,7 +474,7 @@ def contacts(problem: NonlinearSystem, x, theta, rate, *, events: bool) -> Conta
 
     A switch at zero within rounding is closed when its deflection rate opens the next instant so.
     """
-    elements, columns = sharp(problem.elements), problem.system.W.shape[1]
+    elements, columns = tuple(map(_sharp, problem.elements)), problem.system.W.shape[1]
     if not events:
         return Contacts(elements, columns)
     size = np.abs(x).max(initial=0.0)
@@ -479,8 +487,7 @@ def stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, float
     """Breaks (fractions) and repetition rate [1/s] of every step series of the elements."""
     found = []
     for element in problem.elements:
-        for field in fields(element):
-            series = getattr(element, field.name)
+        for series in vars(element).values():
             if isinstance(series, StepSeries) and len(series.breaks) > 1:
                 rate = float(phase_of(frequency, series.orders)) / (2.0 * np.pi)
                 if rate < 0.0:
@@ -506,25 +513,27 @@ def held(problem: NonlinearSystem, theta) -> NonlinearSystem:
     elements = []
     for element in problem.elements:
         changed = {
-            field.name: constant(getattr(element, field.name).at(theta))
-            for field in fields(element)
-            if isinstance(getattr(element, field.name), StepSeries)
+            name: constant(series.at(theta))
+            for name, series in vars(element).items()
+            if isinstance(series, StepSeries)
         }
-        elements.append(replace(element, **changed) if changed else element)
+        elements.append(replace(element, **changed) if changed and is_dataclass(element) else element)
     return replace(problem, elements=tuple(elements))
 
 
 def _coefficients(element: GearMeshes):
     """A function of the phases (..., n_bases): ``k``, deflection and force (3, ..., g)."""
+    assert element.deflection is not None and element.force is not None
     series = element.stiffness, element.deflection, element.force
+    waves = [s for s in series if isinstance(s, FourierSeries)]
     changing = {s.orders for s in series if not (isinstance(s, FourierSeries) and s.amplitudes.shape[1] == 1)}
-    if len(changing) > 1 or not all(isinstance(s, FourierSeries) for s in series):
+    if len(changing) > 1 or len(waves) < len(series):
         return lambda theta: np.stack(np.broadcast_arrays(*(s.at(theta) for s in series)))
-    count, groups = max(s.amplitudes.shape[1] for s in series), len(element.columns)
-    table = np.zeros((3, groups, count), complex)
-    for row, s in zip(table, series):
+    count, groups = max(s.amplitudes.shape[1] for s in waves), len(element.columns)
+    table = np.zeros((3, groups, count), np.complex128)
+    for row, s in zip(table, waves):
         row[:, : s.amplitudes.shape[1]] = s.amplitudes
-    means = np.ascontiguousarray(table[..., 0].real)
+    means = np.ascontiguousarray(np.real(table[..., 0]))
     if not changing:
         return lambda theta: means.reshape(3, *[1] * (np.ndim(theta) - 1), groups)
     orders, table, harmonic = changing.pop(), table.reshape(3 * groups, count).T, 1j * np.arange(count)

@@ -1,52 +1,51 @@
-"""The map of one period: fixed steps that are tabulated once and repeated from period to period."""
+"""The map of one period, and what its repetition shows: sections, bifurcation diagrams, slow sweeps.
+
+Fixed steps of one period are tabulated once and repeated from period to period (`stroboscopic_map`). The
+motion once a period is a stroboscopic section (A. H. Nayfeh and B. Balachandran, Applied Nonlinear Dynamics,
+1995, sections 1.2 and 2.4). A sweep starts every frequency from the end of the last one, so that it jumps
+where a branch ends; T. C. Kim, T. E. Rook and R. Singh, J. Sound Vib. 281 (2005) 965-993, sweep gear pairs
+so.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.time.adaptive import checked_start
-from femgear.solvers.time.newmark import Marched, march
-from femgear.solvers.time.transient import fixed_step_scheme, start_state
-from femgear.system.entries import checked_count, checked_numbers
+from femgear.solvers.time.steps import Marched, Scheme, march
+from femgear.solvers.time.transient import step_scheme
+from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
 from femgear.system.nonlinear import Law, NonlinearSystem, tabulated_law
+from femgear.system.series import harmonics_of
 
 # Largest number of steps in a period, and so the memory of its states.
 _MOST_STEPS = 100_000
 
 
 @dataclass(frozen=True)
-class Strobe:
-    """Everything that a period of a given problem needs.
+class StroboscopicMap:
+    """The map of one period [s] of a problem, all tables of its steps made once.
 
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    frequency : (n_bases,) array
-        [rad/s].
-    period : float
-        [s].
-    scheme : Scheme
-    law, loads
-        Of the instants of one period, see `newmark.march`.
-    theta : (steps + 1, n_bases) array
-        Phases of those instants.
+    ``law`` and ``loads`` belong to the instants of one period, see `march`, with the phases ``theta`` (steps
+    + 1, n_bases).
     """
 
     problem: NonlinearSystem
     frequency: np.ndarray
     period: float
-    scheme: object
+    scheme: Scheme
     law: Law
     loads: np.ndarray
     theta: np.ndarray
 
     def enter(self, start):
         """State of the scheme and column forces for displacement and velocity (n,); rest for None."""
-        start = checked_start(self.problem, start)
-        return start_state(self.scheme, start, self.theta[:1], self.law)
+        q, v = checked_start(self.problem, start)
+        return self.scheme.start(q, v, self.theta[:1], self.law)
 
     def run(self, state, g) -> Marched:
         """One period of motion from a state at phase zero."""
@@ -70,10 +69,27 @@ class Strobe:
         return part[0], part[1]
 
 
-def strobe(
-    problem: NonlinearSystem, frequency, *, steps: int, periods: int = 1, method="average acceleration"
-) -> Strobe:  # fmt: skip
-    """Prepare the map of ``periods`` periods of the first base frequency in ``steps`` equal steps.
+def stroboscopic_map(
+    problem: NonlinearSystem,
+    frequency,
+    *,
+    steps: int = 200,
+    periods: int = 1,
+    method: str = "average acceleration",
+) -> StroboscopicMap:
+    """Prepare the map of one period of the motion.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    frequency : float or (n_bases,) array
+        Base frequencies [rad/s]; all must repeat after ``periods`` periods of the first one.
+    steps : int
+        Equal time steps in a period of the map.
+    periods : int
+        Periods of the first base frequency in one of the map: 2 measures period doubling.
+    method : str
+        A fixed-step method of `solve_transient`.
 
     Raises
     ------
@@ -84,11 +100,11 @@ def strobe(
     period = common_period(frequency, periods)
     if not 4 <= steps <= _MOST_STEPS:
         raise CaseError(f"{steps} steps in a period", code="E-STEP", key="steps", limit=f"4 to {_MOST_STEPS}")
-    scheme = fixed_step_scheme(problem, frequency, method, period / steps)
+    scheme, _ = step_scheme(problem, frequency, method, period / steps, period / steps)
     theta = (period * np.arange(steps + 1) / steps)[:, None] * frequency
     # the last instant is the first of the next period
     theta[-1] = theta[0]
-    return Strobe(
+    return StroboscopicMap(
         problem, frequency, period, scheme, tabulated_law(problem, theta), scheme.table(theta), theta
     )
 
@@ -109,3 +125,267 @@ def common_period(frequency, periods: int) -> float:
             remedy="raise the number of periods, or use harmonic balance with two base frequencies",
         )  # fmt: skip
     return float(2.0 * np.pi * periods / frequency[0])
+
+
+@dataclass(frozen=True)
+class PoincareSection:
+    """Points of a section.
+
+    Parameters
+    ----------
+    time : (n_points,) array
+        [s].
+    displacement, velocity : (n_points, n) arrays
+    deflection : (n_points, n_columns) array
+        ``W^T q`` [m].
+    """
+
+    time: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+    deflection: np.ndarray
+
+    def repeats_after(self, tolerance: float = 1e-4) -> int:
+        """Smallest number p of points after which all displacements repeat; 0 when none up to a half does.
+
+        The tolerance is relative to the largest displacement. A motion of period p times that of the section.
+        """
+        q, size = self.displacement, np.abs(self.displacement).max(initial=0.0)
+        for p in range(1, len(q) // 2 + 1):
+            if np.abs(q[p:] - q[:-p]).max() <= tolerance * size:
+                return p
+        return 0
+
+
+@dataclass(frozen=True)
+class BifurcationDiagram:
+    """Stroboscopic points over a parameter.
+
+    Parameters
+    ----------
+    parameter : (n_values,) array
+    displacement, velocity : (n_values, n_points, n) arrays
+    deflection : (n_values, n_points, n_columns) array
+        [m].
+    repeats : (n_values,) int array
+        Periods after which the motion repeats, 0 where it does not within half the points.
+    """
+
+    parameter: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+    deflection: np.ndarray
+    repeats: np.ndarray
+
+
+def stroboscopic_section(
+    problem: NonlinearSystem,
+    frequency,
+    *,
+    points: int = 100,
+    skip: int = 100,
+    start=None,
+    phase: float = 0.0,
+    **steps,
+) -> PoincareSection:
+    """Take the motion once in every period.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    frequency : float or (n_bases,) array
+        [rad/s]
+    points : int
+        Periods that give a point.
+    skip : int
+        Periods before them.
+    start : pair of (n,) arrays, optional
+        Displacement and velocity at phase zero; at rest when not given.
+    phase : float
+        Share of the period at which the points are taken, rounded to a step, 0 to 1.
+    steps
+        ``steps``, ``periods``, ``method`` of `stroboscopic_map`.
+    """
+    if points < 1 or skip < 0 or not 0.0 <= phase <= 1.0:
+        raise CaseError(
+            f"{points} points after {skip} periods at phase {phase}", code="E-SECTION",
+            limit="one point or more, no negative skip, a phase between 0 and 1",
+        )  # fmt: skip
+    once = stroboscopic_map(problem, frequency, **steps)
+    state, g = once.enter(start)
+    count = len(once.loads)
+    place = np.array([round(phase * count)])
+    rows = []
+    for done in range(skip + points):
+        block = once.run(state, g)
+        if done >= skip:
+            rows.append((*once.motion(block, place), once.columns(block)[place]))
+        state, g = block.states[-1], block.excess[-1]
+    q, v, x = (np.concatenate(part) for part in zip(*rows))
+    time = once.period * (skip + np.arange(points) + place[0] / count)
+    return PoincareSection(time, q, v, x)
+
+
+def bifurcation_diagram(
+    build: Callable[[float], tuple[NonlinearSystem, np.ndarray]],
+    parameters,
+    *,
+    points: int = 60,
+    start=None,
+    tolerance: float = 1e-4,
+    **section,
+) -> BifurcationDiagram:
+    """Take stroboscopic points over a parameter; every value starts where the last one ended.
+
+    Parameters
+    ----------
+    build : callable
+        Problem and base frequencies [rad/s] for a value of the parameter.
+    parameters : (n_values,) array
+        In the order in which they are swept.
+    tolerance : float
+        For ``repeats``, see `PoincareSection.repeats_after`.
+    points, start, section
+        Options of `stroboscopic_section`.
+
+    Raises
+    ------
+    CaseError
+        No values or some that are not finite (E-VALUES), a start that does not fit (E-START).
+    """
+    tolerance = checked_tolerance(tolerance)
+    parameters = np.atleast_1d(checked_numbers(parameters, "parameters", code="E-VALUES", unit=""))
+    if parameters.ndim != 1 or not len(parameters) or not np.all(np.isfinite(parameters)):
+        raise CaseError(
+            f"a bifurcation diagram over parameters of shape {parameters.shape}", code="E-VALUES",
+            key="parameters", limit="one or more finite numbers", remedy="list the values to sweep over",
+        )  # fmt: skip
+    rows = []
+    for value in parameters:
+        taken = stroboscopic_section(*build(value), points=points, start=start, **section)
+        rows.append((taken.displacement, taken.velocity, taken.deflection, taken.repeats_after(tolerance)))
+        start = taken.displacement[-1], taken.velocity[-1]
+    return BifurcationDiagram(parameters, *(np.array(column) for column in zip(*rows)))
+
+
+@dataclass(frozen=True)
+class SweepResponse:
+    """Settled motion at every frequency of a sweep, in the order of the sweep.
+
+    Parameters
+    ----------
+    frequency : (n_frequencies,) array
+        First base frequency [rad/s].
+    amplitude : (n_frequencies, n_columns) array
+        Half the difference of largest and smallest deflection [m].
+    lowest, highest : (n_frequencies, n_columns) arrays
+        Smallest and largest deflection [m].
+    lines : (n_frequencies, n_columns, H + 1) complex array
+        Harmonics of the deflections over one period of the map [m].
+    settled : (n_frequencies,) bool array
+        The motion repeats after one period of the map within the tolerance.
+    periods : (n_frequencies,) int array
+        Periods of the map until then.
+    displacement, velocity : (n_frequencies, n) arrays
+        At phase zero of the settled motion.
+    """
+
+    frequency: np.ndarray
+    amplitude: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
+    lines: np.ndarray
+    settled: np.ndarray
+    periods: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+
+    def jumps(self, share: float = 0.2) -> np.ndarray:
+        """Indices i where some amplitude changes by more than ``share`` of the largest from i to i + 1."""
+        change = np.abs(np.diff(self.amplitude, axis=0)) / self.amplitude.max(axis=0, initial=1e-300)
+        return np.flatnonzero(np.any(change > share, axis=1))
+
+
+def sweep_response(
+    problem: NonlinearSystem | Callable[[float], tuple[NonlinearSystem, np.ndarray]],
+    frequencies,
+    *,
+    start=None,
+    least: int = 5,
+    most: int = 500,
+    tolerance: float = 1e-6,
+    harmonics: int = 5,
+    **steps,
+) -> SweepResponse:
+    """Sweep the base frequency in the order given, the motion carried along.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem or callable
+        A function gives the problem and all its base frequencies for a value of the sweep.
+    frequencies : (n_frequencies,) array
+        [rad/s], positive.
+    start : pair of (n,) arrays, optional
+        Displacement and velocity at phase zero of the first frequency; at rest when not given.
+    least, most : int
+        Periods of the map for settling.
+    tolerance : float
+        Change of the state from period to period, relative to its size, at which it has settled.
+    harmonics : int
+    steps
+        ``steps``, ``periods``, ``method`` of `stroboscopic_map`.
+
+    Raises
+    ------
+    CaseError
+        No frequencies or some that are not positive, numbers out of range (E-TOLERANCE: a tolerance that is
+        not between 0 and 1), a start that does not fit.
+    ConvergenceError
+        A step whose column equations do not converge.
+    """
+    tolerance = checked_tolerance(tolerance)
+    checked_count(harmonics, "harmonics", code="E-HARMONICS", least=0)
+    frequencies = np.atleast_1d(checked_numbers(frequencies, "frequencies", code="E-FREQUENCY", unit="rad/s"))
+    valid = frequencies.ndim == 1 and len(frequencies) and np.all(np.isfinite(frequencies))
+    if not valid or np.any(frequencies <= 0.0) or not 1 <= least <= most:
+        raise CaseError(
+            "a sweep needs positive frequencies and a period or more to settle", code="E-FREQUENCY",
+            key="frequencies", limit="one or more > 0 rad/s, 1 <= least <= most",
+            remedy="list the frequencies in the order of the sweep",
+        )  # fmt: skip
+    rows = []
+    for value in frequencies:
+        case, bases = problem(value) if callable(problem) else (problem, value)
+        once = stroboscopic_map(case, bases, **steps)
+        block, settled, count = _settle(once, start, least, most, tolerance)
+        x = once.columns(block)
+        q, v = (part[0] for part in once.motion(block, np.array([-1])))
+        low, high = x.min(axis=0), x.max(axis=0)
+        lines = harmonics_of(x[:-1].T, harmonics)
+        rows.append((0.5 * (high - low), low, high, lines, settled, count, q, v))
+        start = q, v
+    return SweepResponse(frequencies, *(np.array(column) for column in zip(*rows)))
+
+
+def sweep_up_and_down(problem, frequencies, **options) -> tuple[SweepResponse, SweepResponse]:
+    """A sweep over ascending frequencies and, from its end, back; arguments as for `sweep_response`."""
+    given = checked_numbers(frequencies, "frequencies", code="E-FREQUENCY", unit="rad/s")
+    frequencies = np.sort(np.atleast_1d(given))
+    up = sweep_response(problem, frequencies, **options)
+    options["start"] = up.displacement[-1], up.velocity[-1]
+    return up, sweep_response(problem, frequencies[::-1], **options)
+
+
+def _settle(once: StroboscopicMap, start, least: int, most: int, tolerance: float):
+    """Repeat the period until the state does: the last block, whether it settled, the number of periods."""
+    state, g = once.enter(start)
+    count = 0
+    while True:
+        block = once.run(state, g)
+        change = np.abs(block.states[-1] - state)[:2]
+        # displacement and velocity have their own sizes
+        size = np.abs(block.states[:, :2]).max(axis=(0, 2))
+        state, g, count = block.states[-1], block.excess[-1], count + 1
+        settled = bool(np.all(change.max(axis=1) <= tolerance * size))
+        if (settled and count >= least) or count == most:
+            return block, settled, count

@@ -9,19 +9,21 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.solvers.time import adaptive
 from femgear.solvers.time.adaptive import checked_start, motion_scale
-from femgear.solvers.time.modal_steps import modal_scheme
-from femgear.solvers.time.newmark import (
+from femgear.solvers.time.steps import (
     RULES,
+    Scheme,
     StepRule,
     generalised_alpha,
     highest_frequency,
     march_times,
+    modal_scheme,
     rule_scheme,
     stability_limit,
 )
 from femgear.system.elements import GearMeshes, PiecewiseSprings
 from femgear.system.entries import checked_numbers, checked_tolerance
 from femgear.system.nonlinear import NonlinearSystem, checked_bases, drift_note, element_forces, tabulated_law
+from femgear.system.system import freeze
 
 # Steps in the shortest natural period when no step is given: average acceleration errs by 0.2 % of it.
 _STEPS_A_PERIOD = 40
@@ -31,6 +33,8 @@ _COARSE = 1e-3
 _WRONG = 1.0
 # Phases at which the largest mesh stiffness is looked for.
 _PHASES = 256
+# Largest residual of the column equations in a step, local error of the adaptive methods, Newton iterations.
+_COLUMNS, _LOCAL, _ITERATIONS = 1e-10, 1e-9, 30
 METHODS = (*RULES, "newmark", "generalised alpha", "modal", *adaptive.METHODS)
 
 
@@ -77,10 +81,7 @@ class TransientResponse:
     message: str
 
     def __post_init__(self):
-        for name in ("time", "displacement", "velocity", "deflection", "force"):
-            array = np.array(getattr(self, name), float)
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        freeze(self, "time", "displacement", "velocity", "deflection", "force")
 
 
 def solve_transient(
@@ -91,16 +92,11 @@ def solve_transient(
     start=None,
     method: str = "average acceleration",
     step: float | None = None,
-    gamma: float = 0.5,
-    beta: float = 0.25,
-    radius: float = 0.8,
-    count: int | None = None,
     tolerance: float | None = None,
-    max_iterations: int = 30,
     events: bool = False,
-    scale: float | None = None,
+    **parameters,
 ) -> TransientResponse:
-    """Integrate in time from ``times[0]`` on.
+    """Integrate the motion in time from ``times[0]`` on.
 
     Parameters
     ----------
@@ -112,27 +108,17 @@ def solve_transient(
     start : pair of (n,) arrays, optional
         Displacement and velocity at the start; at rest without deflection when not given.
     method : str
-        "average acceleration", "linear acceleration", "Fox-Goodwin", "central difference", "newmark" with
-        ``gamma`` and ``beta``, "generalised alpha" with ``radius`` (see `newmark`), "modal" (exact linear
-        part, see `modal_steps`), or SciPy's "DOP853", "Radau", "LSODA".
+        "average acceleration", "linear acceleration", "Fox-Goodwin", "central difference", "newmark",
+        "generalised alpha", "modal" (exact linear part), see `steps`, or SciPy's "DOP853", "Radau", "LSODA".
     step : float, optional
         Of the fixed-step methods [s], shortened to divide the time evenly; a 40th of the shortest natural
         period when not given. Between steps a cubic of displacements and velocities is used.
-    gamma, beta, radius : float
-    count : int, optional
-        Modes of "modal"; all when not given.
     tolerance : float, optional
         Relative: of the column equations in a step (1e-10 when not given) or of the local error (1e-9).
-    max_iterations : int
-        Newton iterations a step.
     events : bool
         Adaptive methods stop at contact changes, see `adaptive`.
-    scale : float, optional
-        Size of the motion [m] to which the tolerance of adaptive methods refers; estimated when not given.
-
-    Returns
-    -------
-    TransientResponse
+    parameters
+        Of a fixed-step method: ``gamma``, ``beta``, ``radius``, ``count``, see `step_scheme`.
 
     Raises
     ------
@@ -145,43 +131,61 @@ def solve_transient(
     times = _checked_times(times)
     if tolerance is not None:
         tolerance = checked_tolerance(tolerance)
-    q, v = checked_start(problem, start)
+    start = checked_start(problem, start)
     frequency = checked_bases(problem, frequency)
     if method in adaptive.METHODS:
-        options = {"tolerance": tolerance or 1e-9, "events": events, "scale": scale}
-        return _adaptive(problem, frequency, times, q, v, method, options)
+        if parameters:
+            raise CaseError(f"method {method} has no {', '.join(parameters)}", code="E-METHOD", key="method")
+        return _adaptive(problem, frequency, times, start, method, tolerance or _LOCAL, events)
     if events:
         raise CaseError(
             f"method {method} steps over contact changes", code="E-METHOD", key="events",
             limit=", ".join(adaptive.METHODS), remedy="take an adaptive method",
         )  # fmt: skip
-    rule = _rule(method, gamma, beta, radius)
-    number, step = _steps(problem, frequency, rule, times[-1] - times[0], step)
-    scheme = modal_scheme(problem, step, count=count) if rule is None else rule_scheme(problem, rule, step)
-    options = {"tolerance": tolerance or 1e-10, "max_iterations": max_iterations}
-    return _stepped(problem, scheme, frequency, times, (q, v), number, method, options)
+    scheme, number = step_scheme(problem, frequency, method, times[-1] - times[0], step, **parameters)
+    return _stepped(problem, scheme, frequency, times, start, number, method, tolerance or _COLUMNS)
 
 
-def fixed_step_scheme(
+def step_scheme(
     problem: NonlinearSystem,
     frequency,
     method: str,
-    step: float,
+    span: float,
+    step: float | None = None,
     *,
-    gamma=0.5,
-    beta=0.25,
-    radius=0.8,
-    count=None,
-):
-    """The rule of a fixed-step method, factorised; arguments as for `solve_transient`."""
-    rule = _rule(method, gamma, beta, radius)
-    _steps(problem, np.atleast_1d(frequency), rule, step, step)
-    return modal_scheme(problem, step, count=count) if rule is None else rule_scheme(problem, rule, step)
+    gamma: float = 0.5,
+    beta: float = 0.25,
+    radius: float = 0.8,
+    count: int | None = None,
+) -> tuple[Scheme, int]:
+    """Scheme of a fixed-step method with its matrices factorised, and how many of its steps make a span.
 
+    Parameters
+    ----------
+    problem, frequency, method, step
+        As for `solve_transient`.
+    span : float
+        Time that the steps divide evenly [s].
+    gamma, beta : float
+        Of "newmark".
+    radius : float
+        Spectral radius at infinite frequency of "generalised alpha".
+    count : int, optional
+        Modes of "modal"; all when not given.
 
-def start_state(scheme, start, theta, law):
-    """State and column forces of a scheme at displacement and velocity (n,), phases theta (1, n_bases)."""
-    return scheme.start(np.asarray(start[0], float), np.asarray(start[1], float), theta, law)
+    Raises
+    ------
+    CaseError
+        An unknown method (E-METHOD), a step that is not positive or beyond the stability limit (E-STEP).
+    """
+    made = {"newmark": lambda: StepRule(gamma, beta), "generalised alpha": lambda: generalised_alpha(radius)}
+    if method not in RULES and method not in made and method != "modal":
+        raise CaseError(f"no method {method}", code="E-METHOD", key="method", limit=", ".join(METHODS))
+    rule = RULES.get(method) or (made[method]() if method in made else None)
+    number, step = _steps(problem, np.atleast_1d(frequency), rule, span, step)
+    if rule is None:
+        return modal_scheme(problem, step, count=count), number
+    return rule_scheme(problem, rule, step), number
 
 
 def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
@@ -200,18 +204,6 @@ def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
             top = np.full((len(element.columns), 1), element.slopes.max())
         np.add.at(total, element.columns, top)
     return total
-
-
-def _rule(method, gamma, beta, radius) -> StepRule | None:
-    if method in RULES:
-        return RULES[method]
-    if method == "newmark":
-        return StepRule(gamma, beta)
-    if method == "generalised alpha":
-        return generalised_alpha(radius)
-    if method == "modal":
-        return None
-    raise CaseError(f"no method {method}", code="E-METHOD", key="method", limit=", ".join(METHODS))
 
 
 def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
@@ -238,11 +230,13 @@ def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
     return number, step
 
 
-def _stepped(problem, scheme, frequency, times, start, number, method, options) -> TransientResponse:
+def _stepped(
+    problem, scheme: Scheme, frequency, times, start, number, method, tolerance
+) -> TransientResponse:
     """March with a fixed step and interpolate at the instants."""
     begin, step = times[0], scheme.step
     first = begin * frequency[None]
-    state, g = start_state(scheme, start, first, tabulated_law(problem, first))
+    state, g = scheme.start(start[0], start[1], first, tabulated_law(problem, first))
     # where each instant lies: in which step, and where in it
     place = np.clip((times - begin) / step, 0.0, number)
     near = np.rint(place)
@@ -253,8 +247,9 @@ def _stepped(problem, scheme, frequency, times, start, number, method, options) 
     steps = iterations = 0
     residual = error = size = 0.0
     for done, block, theta in march_times(
-        problem, scheme, frequency, state, g, begin=begin, step=step, count=number, **options
-    ):
+        problem, scheme, frequency, state, g, begin=begin, step=step, count=number, tolerance=tolerance,
+        max_iterations=_ITERATIONS,
+    ):  # fmt: skip
         known = slice(0, block.steps + 1)
         states, excess, theta = block.states[known], block.excess[known], theta[known]
         inside = (index >= done) & (index < done + block.steps)
@@ -334,38 +329,18 @@ def _verdict(steps, number, time, error, step) -> tuple[bool, str]:
     return True, "every step converged"
 
 
-def _adaptive(problem, frequency, times, q, v, method, options) -> TransientResponse:
+def _adaptive(problem, frequency, times, start, method, tolerance, events) -> TransientResponse:
     motion = adaptive.flow(problem, frequency)
-    y = motion.state(q, v)
-    options["scale"] = options["scale"] or motion_scale(motion, (q, v))
-    found, steps = sampled(
-        adaptive.trajectory(motion, y, times[0], times[-1], method=method, **options), times, y
-    )
+    y = motion.state(*start)
+    options = {"tolerance": tolerance, "events": events, "scale": motion_scale(motion, start)}
+    pieces = adaptive.trajectory(motion, y, times[0], times[-1], method=method, **options)
+    found, steps = adaptive.sampled(pieces, times, y)
     q, v, x = (part.T for part in motion.split(found.T))
     force = element_forces(problem, x, times[:, None] * frequency)[0]
     return TransientResponse(
-        times, q, v, x, force, method, True, 0.0, options["tolerance"], steps, 0, 1,
-        f"{method} with a relative tolerance of {options['tolerance']:.3g}" + drift_note(problem),
+        times, q, v, x, force, method, True, 0.0, tolerance, steps, 0, 1,
+        f"{method} with a relative tolerance of {tolerance:.3g}" + drift_note(problem),
     )  # fmt: skip
-
-
-def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
-    """States (n_times, size) of an adaptive integration at ascending instants, and the number of its steps.
-
-    ``pieces`` comes from `adaptive.trajectory`; instants before its first step have the state ``start``.
-    """
-    found, filled, steps = np.empty((len(times), len(start))), 0, 0
-    for begin, end, dense in pieces:
-        early = int(np.searchsorted(times, begin, side="right")) if not steps else filled
-        found[filled:early] = start
-        last = int(np.searchsorted(times, end, side="right"))
-        if last > early:
-            found[early:last] = dense(times[early:last]).T
-        filled, steps = max(last, early), steps + 1
-    if filled < len(times):
-        # the end of the last step, but for rounding
-        found[filled:] = dense(times[filled:]).T if steps else start
-    return found, steps
 
 
 def _checked_times(times) -> np.ndarray:

@@ -37,7 +37,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.periodic.receptance import Reduction, reduce_problem, respond
+from femgear.solvers.linear.receptance import Reduction, reduce_problem, respond
 from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.series import FourierSeries, checked_lines, distinct_lines
 from femgear.trains.drivetrain.data import check_free_spin

@@ -31,7 +31,7 @@ from femgear.trains.drivetrain.time import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.solvers.linear.campbell import CampbellData
+    from femgear.solvers.linear.tracking import CampbellData
     from femgear.system.system import Modes
     from femgear.trains.drivetrain.data import TorqueHistory
     from femgear.trains.drivetrain.model import DrivetrainModel

@@ -60,8 +60,8 @@ GROWN, _WILD = 1e3, 100.0
 @one_blas_thread()
 def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
     """Natural frequencies and modes, and the Campbell diagram with the mesh lines."""
-    from femgear.solvers.linear.campbell import campbell_data
     from femgear.solvers.linear.modal import solve_modes
+    from femgear.solvers.linear.tracking import campbell_data
 
     model, speed = check_drivetrain(case), case.operation.speed
     modes = solve_modes(model.still, model.mean_stiffness)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
     from femgear.housing.sensor import HousingSignal, SensorLines
-    from femgear.solvers.stability.floquet import Stability
+    from femgear.solvers.stability.parametric import Stability
     from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
     from femgear.trains.elastic.model import ElasticSet, RingModel

@@ -205,8 +205,8 @@ def solve_dynamics(
         A carrier that runs around the ring faster than its waves (E-CRITICAL-SPEED).
     ConvergenceError
     """
-    from femgear.solvers.stability.floquet import decisive_harmonics
-    from femgear.solvers.stability.floquet import stability as floquet_verdict
+    from femgear.solvers.stability.parametric import decisive_harmonics
+    from femgear.solvers.stability.parametric import stability as floquet_verdict
 
     check_entries(static.entries, static_entries(case), "static solution")
     check_entries(modes.entries, modal_entries(case), "modal basis")

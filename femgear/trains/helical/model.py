@@ -742,7 +742,7 @@ def helical_motions(data: HelicalSet, shape) -> SetMotions:
 
 
 def helical_springs(data: HelicalSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the set by name, for `femgear.solvers.linear.tracking.strain_shares`.
+    """Springs of the set by name.
 
     Parameters
     ----------
@@ -816,7 +816,7 @@ def modal_error_response(
     flexibility of modes that were left out (Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 2.9;
     A. Kahraman, J. Mech. Des. 116, 1994, 713-720, sums all modes). Many cases share one gain. A transmission
     error does no work on rigid motions, so that these stay at rest.
-    `femgear.solvers.linear.frequency_response.mesh_error_response` is the direct solution.
+    `femgear.solvers.linear.receptance.direct_response` is the direct solution.
 
     Parameters
     ----------

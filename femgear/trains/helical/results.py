@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from femgear.gears.kinematics import Speeds
     from femgear.gears.planetary import PlanetarySet
-    from femgear.solvers.stability.floquet import Stability
+    from femgear.solvers.stability.parametric import Stability
     from femgear.system.system import MechanicalSystem, Modes, Response
     from femgear.trains.helical.model import HelicalSet
     from femgear.trains.helical.section import HelicalCase

@@ -128,7 +128,7 @@ def solve_helical_dynamics(
     """
     from femgear.gears.kinematics import speeds
     from femgear.solvers.periodic.spectral import solve_spectral
-    from femgear.solvers.stability.floquet import stability as floquet_verdict
+    from femgear.solvers.stability.parametric import stability as floquet_verdict
 
     operation, dynamics = case.operation, case.dynamics
     turning = tuple(

@@ -710,7 +710,7 @@ def stage_slices(data: MultistageSet) -> tuple[slice, ...]:
 
 
 def multistage_springs(data: MultistageSet) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the train at rest by name, for `femgear.solvers.linear.tracking.strain_shares`.
+    """Springs of the train at rest by name.
 
     Returns
     -------

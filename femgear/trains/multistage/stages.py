@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.frequency_response import MeshErrorResponse, modal_response
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
+from femgear.solvers.linear.receptance import MeshErrorResponse, modal_response
 from femgear.system.assembler import planar_meshes, planar_system
 from femgear.system.elements import GearMeshes
 from femgear.system.entries import checked_numbers

@@ -19,8 +19,8 @@ from femgear.errors import CaseError
 from femgear.solvers.continuation.arclength import StepOptions
 from femgear.solvers.continuation.branches import Branch, frequency_response_curve
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
+from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.solvers.periodic.harmonic_balance import displacements
-from femgear.solvers.periodic.receptance import Reduction, reduce_problem
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.assembler import (

@@ -76,7 +76,7 @@ class PhaseGrid:
         flat, other = self.flat
         spectrum[:, other] += half[:, flat].conj()
         axes = tuple(range(1, len(shape) + 1))
-        signal = irfftn(spectrum.reshape(-1, *shape), s=self.samples, axes=axes)
+        signal = np.asarray(irfftn(spectrum.reshape(-1, *shape), s=self.samples, axes=axes))
         return np.ascontiguousarray(signal.reshape(len(lines), -1).T)
 
     def transform(self, signals: np.ndarray) -> np.ndarray:
@@ -85,7 +85,7 @@ class PhaseGrid:
 
         grid = np.ascontiguousarray(signals.T).reshape(-1, *self.samples)
         axes = tuple(range(1, grid.ndim))
-        return rfftn(grid, axes=axes).reshape(len(grid), -1) / len(self.theta)
+        return np.asarray(rfftn(grid, axes=axes)).reshape(len(grid), -1) / len(self.theta)
 
     def amplitudes(self, coefficients: np.ndarray) -> np.ndarray:
         """One-sided lines (n, L) of the coefficients of `transform`."""
@@ -156,7 +156,7 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
             wanted = (degree + 1) * top + 2 * content + 1
         counts = np.maximum(counts, wanted)
     counts = np.maximum(counts, 2 * top + 1)
-    return tuple(int(next_fast_len(int(count), real=True)) for count in counts)
+    return tuple(int(next_fast_len(int(count), real=True)) for count in counts)  # type: ignore[arg-type]
 
 
 def on_grid(element: Element, theta: np.ndarray) -> Element:
@@ -218,7 +218,7 @@ def _places(orders: np.ndarray, samples: tuple[int, ...]) -> tuple[np.ndarray, n
     flipped = np.where(mirrored[..., None], -flipped, flipped)
     index = flipped % count
     shape = (*samples[:-1], samples[-1] // 2 + 1)
-    return np.ravel_multi_index(tuple(np.moveaxis(index, -1, 0)), shape), mirrored
+    return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(index, -1, 0)), shape)), mirrored
 
 
 def _pick(coefficients: np.ndarray, places: tuple[np.ndarray, np.ndarray]) -> np.ndarray:

@@ -1,30 +1,42 @@
-"""Steps in time: Newmark's family and the generalised-alpha method, with Newton iterations on the columns.
+"""Fixed time steps: Newmark's family, the generalised-alpha method and steps of the modes that are exact.
 
-Every rule is a linear map of the state and of the column forces: ``x_1 = x_free - A g_1`` with x the
+Every scheme is a linear map of the state and of the column forces: ``x_1 = x_free - A g_1`` with x the
 deflections of the columns at the end of the step, ``g = f - c x`` their forces beyond the reference stiffness
-and ``A`` a matrix of n_columns rows that does not change. The linear system is marched exactly or by a rule,
-and only these few equations are iterated (`march`).
+and ``A`` a matrix of n_columns rows that does not change. The linear system is stepped exactly or by a rule,
+and only these few equations are solved by Newton iterations (`march`).
 
-N. M. Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94; J. Chung and G. M. Hulbert, J. Appl. Mech. 60 (1993)
-371-375; forces that are not linear averaged as loads are: S. Erlicher, L. Bonaventura and O. S. Bursi,
-Comput. Mech. 28 (2002) 83-104.
+Rules on all coordinates: N. M. Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94; J. Chung and G. M. Hulbert,
+J. Appl. Mech. 60 (1993) 371-375; forces that are not linear averaged as loads are: S. Erlicher,
+L. Bonaventura and O. S. Bursi, Comput. Mech. 28 (2002) 83-104.
+
+Modal steps are exact for forces that are linear between the instants, so that a linear system has no period
+error and no damping of the step; the column forces beyond the reference stiffness are of second order. Modes
+that are left out count as static flexibility. N. C. Nigam and P. C. Jennings, Bull. Seism. Soc. Am. 59 (1969)
+909-922; A. K. Chopra, Dynamics of Structures, section 5.2. Their coefficients are taken from one matrix
+exponential (C. F. Van Loan, IEEE Trans. Autom. Control 23 (1978) 395-404), which also covers rigid,
+critically and overdamped modes without cancellation.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg.lapack import dgesv
+from numpy.typing import NDArray
+from scipy.linalg import get_lapack_funcs
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import mass_error
+from femgear.solvers.linear.modal import mass_error, output_load, residual_output, solve_modes
 from femgear.system.nonlinear import Law, NonlinearSystem, external_force, tabulated_law
 from femgear.system.series import phase_of
+from femgear.system.system import MechanicalSystem, Modes
 
 # Numbers held in the states of one block of steps.
 _BLOCK_NUMBERS = 2_000_000
+# LU solution of small systems without the checks of `scipy.linalg.solve`, which cost more than it.
+(_gesv,) = get_lapack_funcs(("gesv",), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -55,6 +67,14 @@ class StepRule:
                 limit=f"gamma of {0.5 - self.mass + self.force:.4g} or more", remedy="take gamma = 1/2",
             )  # fmt: skip
 
+    def predictor(self, h: float) -> np.ndarray:
+        """Rows (6, 3) on (q, v, a): q, v, a without ``a_1``; then q, v and inertia of the force balance."""
+        predict = np.array(
+            [[1.0, h, h * h * (0.5 - self.beta)], [0.0, 1.0, h * (1.0 - self.gamma)], [0.0] * 3]
+        )
+        mixed = (1.0 - self.force) * predict[:2] + self.force * np.eye(3)[:2]
+        return np.vstack([predict, mixed, [0.0, 0.0, self.mass]])
+
 
 AVERAGE_ACCELERATION = StepRule(0.5, 0.25)
 LINEAR_ACCELERATION = StepRule(0.5, 1.0 / 6.0)
@@ -81,11 +101,11 @@ def generalised_alpha(radius: float) -> StepRule:
     return StepRule(0.5 - mass + force, 0.25 * (1.0 - mass + force) ** 2, mass, force)
 
 
-def stability_limit(rule: StepRule, damping_ratio: float = 0.0) -> float:
-    """Largest ``h / T`` of a rule for a mode of period T; infinite for unconditionally stable ones.
+def stability_limit(rule: StepRule) -> float:
+    """Largest ``h / T`` of a rule for an undamped mode of period T; infinite for unconditionally stable ones.
 
-    T. J. R. Hughes, The Finite Element Method (2000), Eq. 9.1.22, for Newmark's family; without damping:
-    linear acceleration 0.5513, central difference 0.3183, Fox-Goodwin 0.3898.
+    T. J. R. Hughes, The Finite Element Method (2000), Eq. 9.1.22, for Newmark's family: linear acceleration
+    0.5513, central difference 0.3183, Fox-Goodwin 0.3898.
     """
     if rule.mass or rule.force:
         # the methods of Chung and Hulbert are made to be unconditionally stable
@@ -94,24 +114,7 @@ def stability_limit(rule: StepRule, damping_ratio: float = 0.0) -> float:
     short = 0.5 * rule.gamma - rule.beta
     if short <= 1e-15:
         return np.inf
-    lag = damping_ratio * (rule.gamma - 0.5)
-    return (lag + np.sqrt(short + lag * lag)) / short / (2.0 * np.pi)
-
-
-def period_error(rule: StepRule, ratio) -> np.ndarray:
-    """Relative error of the period of an undamped mode stepped with ``h / T = ratio``, below the limit.
-
-    From the eigenvalues of the step (Bathe, Finite Element Procedures, 2nd ed., section 9.4). Their damping
-    is `numerical_damping`.
-    """
-    ratio = np.asarray(ratio, float)
-    return 2.0 * np.pi * ratio / np.abs(np.angle(_principal(rule, ratio))) - 1.0
-
-
-def numerical_damping(rule: StepRule, ratio) -> np.ndarray:
-    """``-ln |z| / arg z`` of an undamped mode stepped with ``h / T = ratio`` (Hughes 2000, section 9.1)."""
-    value = _principal(rule, np.asarray(ratio, float))
-    return -np.log(np.abs(value)) / np.abs(np.angle(value))
+    return np.sqrt(short) / short / (2.0 * np.pi)
 
 
 @dataclass(frozen=True)
@@ -148,10 +151,9 @@ class RuleScheme:
 
     def table(self, theta):
         """Accelerations (n, dofs) that the loads give in n steps."""
-        wave = np.array([np.exp(1j * phase_of(theta, f.orders)) for f in self.problem.forces])
-        wave = np.vstack([np.ones((1, len(theta))), wave.reshape(-1, len(theta))])
+        wave = _load_waves(self.problem, theta)
         mixed = (1.0 - self.rule.force) * wave[:, 1:] + self.rule.force * wave[:, :-1]
-        return (mixed.T @ self.forces).real
+        return np.real(mixed.T @ self.forces)
 
     def free(self, state, g, load):
         """(q, v, a) at the end of the step without the column forces there."""
@@ -217,7 +219,7 @@ def rule_scheme(problem: NonlinearSystem, rule: StepRule, step: float) -> RuleSc
             remedy="give every degree of freedom some mass or condense it",
         )  # fmt: skip
     blocks = [stiffness, damping, system.M] if rule.mass else [stiffness, damping]
-    predictor = _predictor(rule, step)[: 3 + len(blocks)]
+    predictor = rule.predictor(step)[: 3 + len(blocks)]
     weights = np.array([rule.beta * step * step, rule.gamma * step, 1.0])[:, None]
     carried = linalg.lu_solve(factor, system.W)
     loads = np.stack([system.load.astype(complex), *(f.force for f in problem.forces)])
@@ -228,6 +230,155 @@ def rule_scheme(problem: NonlinearSystem, rule: StepRule, step: float) -> RuleSc
         part * rule.beta * step * step * (system.W.T @ carried), forces, problem, stiffness,
         np.ascontiguousarray(system.W.T),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ModalScheme:
+    """Exact modal steps; the state is (y, v) of the modes, (2, m). See `Scheme`."""
+
+    step: float
+    modes: Modes
+    transition: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    pushed: np.ndarray
+    drawn: np.ndarray
+    flexibility: np.ndarray
+    rows: np.ndarray
+    loads: np.ndarray
+    static: np.ndarray
+    static_columns: np.ndarray
+    residual: np.ndarray
+    problem: NonlinearSystem
+    factorisations: int = 1
+
+    def start(self, q, v, theta, law):
+        """Modal state of the motion; the part of modes that are left out is dropped."""
+        carried = self.problem.system.M @ self.modes.shape
+        state = np.stack([q @ carried, v @ carried])
+        x = self.rows @ state[0] + np.real(self._waves(theta[:1]) @ self.static_columns)[0]
+        g, _ = law(0, x)
+        return state, g
+
+    def _waves(self, theta) -> NDArray[np.complex128]:
+        return _load_waves(self.problem, theta).T
+
+    def table(self, theta):
+        """What the loads add in n steps, (n, 2 m + n_c): to y and v, then to the columns at the ends."""
+        wave = self._waves(theta)
+        modal = np.real(wave @ self.loads)
+        push = modal[:-1, None] * self.first + modal[1:, None] * self.last
+        static = np.real(wave[1:] @ self.static_columns)
+        return np.hstack([push.reshape(len(push), -1), static])
+
+    def free(self, state, g, load):
+        """(y, v) at the end of the step without the column forces there."""
+        out = (self.transition * state).sum(axis=1)
+        out -= (self.pushed @ g).reshape(out.shape)
+        out += load[: out.size].reshape(out.shape)
+        return out
+
+    def deflection(self, state, load):
+        """Columns (n_c,) but for the static flexibility under their own forces."""
+        return self.rows @ state[0] + load[state.size :]
+
+    def finish(self, state, g):
+        """(y, v) at the end of the step."""
+        return state - (self.drawn @ g).reshape(state.shape)
+
+    def columns(self, states, g, theta):
+        """(..., n_c)."""
+        own = self.problem.system.W.T @ self.residual
+        return states[..., 0, :] @ self.rows.T - g @ own + np.real(self._waves(theta) @ self.static_columns)
+
+    def motion(self, states, g, theta):
+        """Displacements and velocities (n, dofs); modes left out count in the displacements only."""
+        static = np.real(self._waves(theta) @ self.static) - g @ self.residual.T
+        return states[:, 0] @ self.modes.shape.T + static, states[:, 1] @ self.modes.shape.T, None
+
+    def local_error(self, states, g):
+        """Modal norm of what a parabola through three column forces would add: ``drawn d(dg) / 12``.
+
+        The linear interpolation misses ``g'' t (h - t) / 2``, whose mean is ``h^2 g'' / 12``.
+        """
+        if len(g) < 3:
+            return np.zeros(len(g) - 1)
+        bend = np.diff(g, n=2, axis=0)
+        bend = np.vstack([bend[:1], bend])
+        return np.linalg.norm(bend @ (self.drawn + self.pushed)[: len(self.rows.T)].T, axis=1) / 12.0
+
+
+def modal_scheme(problem: NonlinearSystem, step: float, *, count: int | None = None) -> ModalScheme:
+    """Modes with the reference stiffnesses of the columns and their exact steps.
+
+    Raises
+    ------
+    CaseError
+        Damping that couples the modes, gyroscopic terms, negative reference stiffnesses (see
+        `solve_modes`).
+    """
+    system = problem.system
+    if system.gyroscopic is not None and problem.speed and np.any(system.gyroscopic):
+        raise CaseError(
+            "modal steps cannot carry gyroscopic terms", code="E-GYROSCOPIC", key="method",
+            remedy='take method "average acceleration" or "generalised alpha"',
+        )  # fmt: skip
+    system = replace(system, gyroscopic=None)
+    modes = solve_modes(system, problem.reference, count=count)
+    natural, every = 2.0 * np.pi * modes.frequency, np.eye(len(system.M))
+    transition, first, last = step_matrices(natural, modes.damping_ratio, step)
+    rows = modes.mesh_deflection
+    pushed, drawn = ((part[:, :, None] * rows.T).reshape(-1, len(rows)) for part in (first.T, last.T))
+    residual = residual_output(system, modes, every)
+    loads, static = [modes.modal_load], [output_load(system, modes, every)]
+    for force in problem.forces:
+        loads.append(modes.shape.T @ force.force)
+        real, imaginary = (
+            _static_displacement(system, modes, part) for part in (np.real(force.force), np.imag(force.force))
+        )
+        static.append(real + 1j * imaginary)
+    elastic = np.where(natural > 0.0, natural, np.inf)
+    loads = np.array(loads, complex)
+    static = np.array(static) - (loads / elastic**2) @ modes.shape.T
+    return ModalScheme(
+        step, modes, np.ascontiguousarray(transition.transpose(1, 2, 0)), first.T, last.T, pushed, drawn,
+        rows @ drawn[: len(natural)] + system.W.T @ residual, rows, loads, static, static @ system.W,
+        residual, problem,
+    )  # fmt: skip
+
+
+def _static_displacement(system: MechanicalSystem, modes: Modes, force) -> np.ndarray:
+    """Elastic displacement (n,) under a force (n,), all modes."""
+    return output_load(replace(system, load=force), modes, np.eye(len(force)))
+
+
+def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Exact step of ``y'' + 2 zeta w y' + w^2 y = p`` with p linear in the step, state ``(y, v)``.
+
+    Parameters
+    ----------
+    natural, damping_ratio : (m,) arrays
+        ``w`` [rad/s], zero for rigid modes, and ``zeta``, above one too.
+    step : float
+        [s].
+
+    Returns
+    -------
+    transition (m, 2, 2), first (m, 2), last (m, 2) arrays
+        ``state_1 = transition state_0 + first p_0 + last p_1``.
+    """
+    from scipy.linalg import expm
+
+    natural = np.asarray(natural, float)
+    turn, scale = natural * step, np.array([1.0, 1.0 / step])
+    matrix = np.zeros((len(natural), 4, 4))
+    matrix[:, 0, 1] = matrix[:, 1, 2] = matrix[:, 2, 3] = 1.0
+    matrix[:, 1, 0], matrix[:, 1, 1] = -turn * turn, -2.0 * np.asarray(damping_ratio) * turn
+    # in (y, h v, h^2 p, h^2 change of p) and the time t / h
+    exact = expm(matrix)[:, :2]
+    transition = scale[:, None] * exact[:, :, :2] / scale
+    constant, ramp = exact[:, :, 2] * scale * step**2, exact[:, :, 3] * scale * step**2
+    return transition, constant - ramp, ramp
 
 
 def highest_frequency(problem: NonlinearSystem, mesh_stiffness) -> float:
@@ -244,7 +395,7 @@ def highest_frequency(problem: NonlinearSystem, mesh_stiffness) -> float:
 
 
 class Scheme(Protocol):
-    """A rule for one step of a given length.
+    """A rule for one step of a given length, with its matrices factorised.
 
     ``flexibility`` (n_c, n_c): ``A``. ``start(q, v, theta, law)``: first state and g. ``table(theta)``: from
     phases (n + 1, n_bases) what the loads do in n steps, first axis n. ``free(state, g, load)``: state after
@@ -254,23 +405,30 @@ class Scheme(Protocol):
     the displacements in the steps, in the norm of the mass matrix.
     """
 
-    flexibility: np.ndarray
+    @property
+    def step(self) -> float: ...
 
-    def start(self, q, v, theta, law): ...
+    @property
+    def factorisations(self) -> int: ...
 
-    def table(self, theta): ...
+    @property
+    def flexibility(self) -> np.ndarray: ...
 
-    def free(self, state, g, load): ...
+    def start(self, q, v, theta, law: Law) -> tuple[np.ndarray, np.ndarray]: ...
 
-    def deflection(self, state, load): ...
+    def table(self, theta) -> np.ndarray: ...
 
-    def finish(self, state, g): ...
+    def free(self, state, g, load) -> np.ndarray: ...
 
-    def columns(self, states, g, theta): ...
+    def deflection(self, state, load) -> np.ndarray: ...
 
-    def motion(self, states, g, theta): ...
+    def finish(self, state, g) -> np.ndarray: ...
 
-    def local_error(self, states, g): ...
+    def columns(self, states, g, theta) -> np.ndarray: ...
+
+    def motion(self, states, g, theta) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]: ...
+
+    def local_error(self, states, g) -> np.ndarray: ...
 
 
 @dataclass
@@ -288,19 +446,19 @@ class Marched:
     iterations: int
 
 
-def march(scheme, law: Law, loads, state, g, count, *, tolerance, max_iterations, size=0.0) -> Marched:
+def march(
+    scheme: Scheme, law: Law, loads, state, g, count, *, tolerance, max_iterations, size=0.0
+) -> Marched:
     """Take ``count`` steps; stops early where the columns do not converge or the numbers overflow.
 
     Parameters
     ----------
-    scheme : Scheme
     law : callable
         Of the instants 0 .. count, from `tabulated_law`; instant 0 is the start.
     loads : (count, ...) array
         From ``scheme.table``.
     state, g : arrays
         At the start.
-    count : int
     tolerance : float
         Of the column equations, relative to the largest free deflection so far.
     max_iterations : int
@@ -327,12 +485,15 @@ def march(scheme, law: Law, loads, state, g, count, *, tolerance, max_iterations
     return Marched(states, excess, count, float(np.sqrt(worst)), total)
 
 
-def march_times(problem: NonlinearSystem, scheme, frequency, state, g, *, begin, step, count, **options):
-    """Blocks of at most `block_length` steps from ``begin`` [s] on: yields (first step, Marched, phases)."""
+def march_times(
+    problem: NonlinearSystem, scheme: Scheme, frequency, state, g, *, begin, step, count, **options
+) -> Iterator[tuple[int, Marched, np.ndarray]]:
+    """March in blocks that fit in memory, from ``begin`` [s] on: yields (first step, Marched, phases)."""
     frequency = np.atleast_1d(np.asarray(frequency, float))
+    block_length = int(np.clip(_BLOCK_NUMBERS // state.size, 64, 8192))
     done, size = 0, 0.0
     while done < count:
-        number = min(block_length(state), count - done)
+        number = min(block_length, count - done)
         theta = (begin + step * np.arange(done, done + number + 1))[:, None] * frequency
         block = march(
             scheme, tabulated_law(problem, theta), scheme.table(theta), state, g, number, size=size, **options
@@ -341,38 +502,14 @@ def march_times(problem: NonlinearSystem, scheme, frequency, state, g, *, begin,
         if block.steps < number:
             return
         state, g, done = block.states[-1], block.excess[-1], done + number
-        size = max(size, largest_square(scheme.columns(block.states, block.excess, theta)))
+        x = scheme.columns(block.states, block.excess, theta)
+        size = max(size, float(np.square(x).sum(axis=1).max(initial=0.0)))
 
 
-def block_length(state) -> int:
-    """Steps that are kept in memory together."""
-    return int(np.clip(_BLOCK_NUMBERS // state.size, 64, 8192))
-
-
-def largest_square(x) -> float:
-    """Largest ``|x|^2`` over the instants of x (n, n_c)."""
-    return float(np.square(x).sum(axis=1).max(initial=0.0))
-
-
-def _principal(rule: StepRule, ratio) -> np.ndarray:
-    """Complex eigenvalue of the amplification matrix of ``a + w^2 q = 0`` in (q, h v, h^2 a)."""
-    square = (2.0 * np.pi * np.atleast_1d(ratio)) ** 2
-    predict, mix = _predictor(rule, 1.0)[:3], _predictor(rule, 1.0)[3:]
-    inertia = 1.0 - rule.mass + (1.0 - rule.force) * rule.beta * square
-    taken = -(mix[2] + square[:, None] * mix[0]) / inertia[:, None]
-    matrix = predict + np.array([rule.beta, rule.gamma, 1.0])[:, None] * taken[:, None, :]
-    values = np.linalg.eigvals(matrix)
-    best = np.argmax(np.where(np.abs(values.imag) > 1e-12, np.abs(values), -1.0), axis=1)
-    found = values[np.arange(len(values)), best]
-    return found.reshape(np.shape(ratio))
-
-
-def _predictor(rule: StepRule, h: float) -> np.ndarray:
-    """Rows on (q, v, a): q, v, a without ``a_1``; then q, v and inertia of the force balance."""
-    predict = np.array([[1.0, h, h * h * (0.5 - rule.beta)], [0.0, 1.0, h * (1.0 - rule.gamma)], [0.0] * 3])
-    weight = rule.force
-    mixed = (1.0 - weight) * predict[:2] + weight * np.eye(3)[:2]
-    return np.vstack([predict, mixed, [0.0, 0.0, rule.mass]])
+def _load_waves(problem: NonlinearSystem, theta) -> NDArray[np.complex128]:
+    """Amplitude one of the constant load and ``exp(i phase)`` of the harmonic forces, (1 + n_forces, n)."""
+    wave = np.array([np.exp(1j * phase_of(theta, f.orders)) for f in problem.forces])
+    return np.vstack([np.ones((1, len(theta)), np.complex128), wave.reshape(-1, len(theta))])
 
 
 def _solve_columns(law, i, flexibility, unit, aim, g, size, options):
@@ -397,7 +534,7 @@ def _solve_columns(law, i, flexibility, unit, aim, g, size, options):
             break
         before, last = square, x
         matrix = flexibility * slope if slope.ndim == 1 else flexibility @ slope
-        x = x + dgesv(matrix + unit, error)[2]
+        x = x + _gesv(matrix + unit, error)[2]
     return g, square / scale if scale else square, scale, iteration
 
 

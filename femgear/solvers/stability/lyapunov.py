@@ -19,10 +19,9 @@ from itertools import pairwise
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.chaos.poincare import PoincareSection
 from femgear.solvers.stability.floquet import Frame, frame_of
 from femgear.solvers.time.adaptive import checked_start, flow, motion_scale, trajectory
-from femgear.solvers.time.stroboscopic import common_period, strobe
+from femgear.solvers.time.stroboscopic import PoincareSection, common_period, stroboscopic_map
 from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
 from femgear.system.nonlinear import NonlinearSystem, element_forces
 
@@ -135,39 +134,19 @@ class LyapunovExponents:
         return False
 
 
-def lyapunov_exponents(
-    problem: NonlinearSystem,
-    frequency,
-    *,
-    count: int = 1,
-    directions: int = 3,
-    points: int = 300,
-    skip: int = 100,
-    start=None,
-    steps: int = 200,
-    periods: int = 1,
-    method: str = "average acceleration",
-    tolerance: float = 1e-10,
-    seed: int = 0,
-) -> LyapunovExponents:
-    """The largest exponents of the motion from a start, and its stroboscopic section.
+@dataclass(frozen=True)
+class LyapunovOptions:
+    """How `lyapunov_exponents` integrates the motion and takes its means.
 
     Parameters
     ----------
-    problem : NonlinearSystem
-    frequency : float or (n_bases,) array
-        Base frequencies [rad/s] with a common period, see `strobe`.
     count : int
         Exponents wanted, up to two a coordinate; their sum is then ``divergence``.
     directions : int
         Random sets of first directions; that they agree says that the run was long enough for them to turn
         into the directions of strongest growth.
-    points : int
-        Periods that count.
-    skip : int
-        Periods before them.
-    start : pair of (n,) arrays, optional
-        Displacement and velocity at phase zero; at rest when not given.
+    points, skip : int
+        Periods that count, and periods before them.
     steps : int
         Time steps in a period, of average acceleration; 8 or more.
     periods : int
@@ -180,6 +159,45 @@ def lyapunov_exponents(
         Of DOP853.
     seed : int
         Of the first directions.
+    """
+
+    count: int = 1
+    directions: int = 3
+    points: int = 300
+    skip: int = 100
+    steps: int = 200
+    periods: int = 1
+    method: str = "average acceleration"
+    tolerance: float = 1e-10
+    seed: int = 0
+
+    def __post_init__(self):
+        least = {"points": 2 * _PARTS, "skip": 0, "directions": 1, "count": 1, "seed": 0}
+        for name, lowest in least.items():
+            number = checked_count(getattr(self, name), name, code="E-LYAPUNOV", least=lowest)
+            object.__setattr__(self, name, number)
+        if self.method not in _COARSER:
+            raise CaseError(
+                f"exponents by {self.method!r}", code="E-METHOD", key="method",
+                limit="average acceleration or DOP853",
+            )  # fmt: skip
+        object.__setattr__(self, "steps", checked_count(self.steps, "steps", code="E-STEP", least=8))
+        object.__setattr__(self, "periods", checked_count(self.periods, "periods", code="E-FREQUENCY"))
+        object.__setattr__(self, "tolerance", checked_tolerance(self.tolerance))
+
+
+def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **options) -> LyapunovExponents:
+    """Find the largest Lyapunov exponents [1/s] of the motion from a start, and its stroboscopic section.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+    frequency : float or (n_bases,) array
+        Base frequencies [rad/s] with a common period, see `stroboscopic_map`.
+    start : pair of (n,) arrays, optional
+        Displacement and velocity at phase zero; at rest when not given.
+    options
+        Fields of `LyapunovOptions`.
 
     Raises
     ------
@@ -195,50 +213,42 @@ def lyapunov_exponents(
     Fixed steps leave out free motions that no element and no damping feels (rotation of a free train), whose
     exponents are zero; DOP853 has them among the exponents.
     """
-    least = {"points": 2 * _PARTS, "skip": 0, "directions": 1, "count": 1, "seed": 0}
-    given = {"points": points, "skip": skip, "directions": directions, "count": count, "seed": seed}
-    points, skip, directions, count, seed = (
-        checked_count(value, key, code="E-LYAPUNOV", least=least[key]) for key, value in given.items()
-    )
-    if method not in _COARSER:
-        raise CaseError(
-            f"exponents by {method!r}", code="E-METHOD", key="method", limit="average acceleration or DOP853"
-        )
-    steps = checked_count(steps, "steps", code="E-STEP", least=8)
+    chosen = LyapunovOptions(**options)
+    count, points = chosen.count, chosen.points
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
-    tolerance = checked_tolerance(tolerance)
     start = checked_start(problem, start)
-    finer, coarser = _both_runs(problem, frequency, method, steps, checked_count(
-        periods, "periods", code="E-FREQUENCY"), tolerance)  # fmt: skip
+    finer, coarser = _both_runs(problem, frequency, chosen)
     if count > finer.size:
         raise CaseError(
             f"{count} exponents", code="E-LYAPUNOV", key="count", limit=f"1 to {finer.size}, two a coordinate"
         )
-    frames = np.linalg.qr(np.random.default_rng(seed).standard_normal((directions, finer.size, count)))[0]
+    random = np.random.default_rng(chosen.seed)
+    frames = np.linalg.qr(random.standard_normal((chosen.directions, finer.size, count)))[0]
     passages = finer.passages(start)
-    for _, (_, matrices) in zip(range(skip), passages):
+    for _, (_, matrices) in zip(range(chosen.skip), passages):
         frames, _ = _turned(frames, matrices)
     growth, rows, same = _followed(passages, frames, points, problem)
     q, v, x, low, high = (np.array(part) for part in zip(*rows))
     # the same attractor and the same directions, so that only the steps differ
-    beside = points if method != "DOP853" else max(2 * _PARTS, points // 4)
+    beside = points if chosen.method != "DOP853" else max(2 * _PARTS, points // 4)
     other, _, _ = _followed(coarser.passages((q[0], v[0])), frames, beside, problem)
     exponents, scatter = _means(growth / finer.period)
     step_error = np.abs(_means((other - growth[:beside]) / finer.period)[0])
     _check_sum(exponents, scatter, finer)
-    time = finer.period * (skip + np.arange(points))
+    time = finer.period * (chosen.skip + np.arange(points))
     return LyapunovExponents(
         exponents, scatter, step_error, growth, finer.period, PoincareSection(time, q, v, x), low.min(axis=0),
         high.max(axis=0), finer.divergence, same,
     )  # fmt: skip
 
 
-def _both_runs(problem, frequency, method, steps, periods, tolerance):
+def _both_runs(problem: NonlinearSystem, frequency: np.ndarray, chosen: LyapunovOptions):
     """The run, and the coarser one beside it."""
-    if method == "DOP853":
-        loose = min(tolerance * _COARSER[method], 1e-2)
-        return tuple(_Adaptive(problem, frequency, steps, periods, one) for one in (tolerance, loose))
-    return tuple(_Stepped(problem, frequency, n, periods) for n in (steps, steps // _COARSER[method]))
+    steps, periods, coarser = chosen.steps, chosen.periods, _COARSER[chosen.method]
+    if chosen.method == "DOP853":
+        tolerances = chosen.tolerance, min(chosen.tolerance * coarser, 1e-2)
+        return tuple(_Adaptive(problem, frequency, steps, periods, one) for one in tolerances)
+    return tuple(_Stepped(problem, frequency, n, periods) for n in (steps, int(steps // coarser)))
 
 
 def _turned(frames, matrices):
@@ -310,9 +320,9 @@ class _Stepped:
     """Periods of fixed steps and the derivatives of their maps in modal coordinates."""
 
     def __init__(self, problem, frequency, steps, periods):
-        self._strobe = strobe(problem, frequency, steps=steps, periods=periods)
+        self._once = stroboscopic_map(problem, frequency, steps=steps, periods=periods)
         self._frame: Frame = frame_of(problem, modes=len(problem.system.M))
-        self.period = self._strobe.period
+        self.period = self._once.period
         self.size = 2 * len(self._frame.square)
         self.divergence = -float(np.trace(self._frame.damping))
         natural = self._frame.fastest or 2.0 * np.pi / self.period
@@ -321,7 +331,7 @@ class _Stepped:
 
     def passages(self, start):
         """Motion at the start of every period, deflections and phases in it, derivatives of its parts."""
-        once = self._strobe
+        once = self._once
         state, g = once.enter(start)
         while True:
             block = once.run(state, g)
@@ -331,9 +341,9 @@ class _Stepped:
             yield (q[0], v[0], x, once.theta), self._map(x)
             state, g = block.states[-1], block.excess[-1]
 
-    def _map(self, x):
+    def _map(self, x) -> list[np.ndarray]:
         """Products over parts of the period of the steps ``(1 - h/2 A_{i+1})^-1 (1 + h/2 A_i)``."""
-        once, scale = self._strobe, self._scale
+        once, scale = self._once, self._scale
         kappa = self._frame.kappa(element_forces(once.problem, x, once.theta)[1])
         half = 0.5 * self.period / (len(x) - 1) * self._frame.state_matrices(kappa) * scale / scale[:, None]
         unit = np.eye(self.size)

@@ -1,57 +1,24 @@
-"""Frequency response by direct solution and by superposition of modes, and the resonances in it.
+"""Frequency response to mesh errors and by complex modes; resonances and damping read from a response.
 
-The excitation is forces, or transmission errors of the meshes. Resonance frequencies and damping are read
-from a response with a verdict whether its modes overlap (`resonance_peaks`).
+Of one viscously damped mode ``1 / |H|^2`` is a parabola in ``x = f^2`` (D. J. Ewins, Modal Testing, 2nd ed.,
+2000, section 4.2), which makes parabolic interpolation exact; a verdict says whether modes overlap.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import (
-    ComplexModes,
-    damping_matrix,
-    modal_damping,
-    pseudo_solve,
-    rigid_basis,
-    total_stiffness,
-)
-from femgear.system.system import MechanicalSystem, Modes
+from femgear.errors import CaseError
+from femgear.solvers.linear.modal import ComplexModes
+from femgear.solvers.linear.receptance import MeshErrorResponse, direct_response
+from femgear.system.system import MechanicalSystem
 
-# Bytes of dynamic stiffness that are solved in one batch.
-_BATCH = 2**26
-# Distance to an undamped pole, relative to it, below which the response is infinite.
-_RESONANT = 1e-12
 # Shift of the half-power band against the peak, relative to the band, of a mode that stands alone.
 _ALONE = 0.05
 # Samples inside the half-power band that its interpolation needs.
 _SAMPLES = 5
-
-
-@dataclass(frozen=True)
-class MeshErrorResponse:
-    """Response to transmission errors on harmonics of the mesh frequency.
-
-    Parameters
-    ----------
-    mesh_frequency : (F,) array
-        [Hz]
-    harmonics : (H,) int array
-    deflection : (F, H, n_meshes) complex array
-        ``W^T q`` [m]: the dynamic transmission error of every mesh.
-    force : (F, H, n_meshes) complex array
-        Dynamic mesh force ``k (W^T q - e)`` [N].
-    output : (F, H, n_outputs) complex array
-    """
-
-    mesh_frequency: np.ndarray
-    harmonics: np.ndarray
-    deflection: np.ndarray
-    force: np.ndarray
-    output: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -86,136 +53,6 @@ class ResonancePeak:
     band: tuple[float, float]
     asymmetry: float
     verdict: str
-
-
-def direct_response(
-    system: MechanicalSystem,
-    frequency,
-    inputs,
-    outputs,
-    *,
-    mesh_stiffness,
-    speed: float = 0.0,
-    damping_ratio=None,
-) -> np.ndarray:
-    """``L (K' + i omega D - omega^2 M)^-1 B`` by one dense solution a frequency, many in a batch.
-
-    Parameters
-    ----------
-    system : MechanicalSystem
-    frequency : (F,) array
-        [Hz], positive or zero.
-    inputs : (n, n_inputs) array
-        ``B``, one column a force; `unit_force` makes them from names.
-    outputs : (n_outputs, n) array
-        ``L``.
-    mesh_stiffness : (n_meshes,) array
-        [N/m]
-    speed : float
-        That multiplies the gyroscopic matrix [rad/s].
-    damping_ratio : float or (n,) array, optional
-        Modal damping that is added to ``C``; see `modal.modal_damping`.
-
-    Returns
-    -------
-    (F, n_outputs, n_inputs) complex array
-        Receptances [m/N and the like].
-
-    Raises
-    ------
-    CaseError
-        Arrays that do not fit (E-SHAPE), frequencies that are none (E-FREQUENCY).
-    ConvergenceError
-        An undamped resonance, or rigid motions at frequency zero (E-RESONANCE).
-    """
-    omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
-    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
-    damping = damping_matrix(system, speed)
-    if damping_ratio is not None:
-        bare = replace(system, gyroscopic=None, C=np.zeros_like(system.C))
-        damping = damping + modal_damping(bare, mesh_stiffness, damping_ratio)
-    result = np.empty((len(omega), len(outputs), inputs.shape[1]), complex)
-    step = max(1, _BATCH // (16 * len(stiffness) ** 2))
-    for start in range(0, len(omega), step):
-        w = omega[start : start + step, None, None]
-        dynamic = stiffness - w**2 * system.M + 1j * w * damping
-        try:
-            result[start : start + step] = outputs @ np.linalg.solve(dynamic, inputs.astype(complex))
-        except np.linalg.LinAlgError as error:
-            f = w.ravel() / (2.0 * np.pi)
-            raise _resonance(f"between {f[0]:.6g} and {f[-1]:.6g} Hz") from error
-    if not np.all(np.isfinite(result)):
-        bad = np.flatnonzero(~np.isfinite(result).all(axis=(1, 2)))[0]
-        raise _resonance(f"at {omega[bad] / (2.0 * np.pi):.6g} Hz")
-    return result
-
-
-def modal_response(
-    system: MechanicalSystem, modes: Modes, frequency, inputs, outputs, *, residual: bool = True
-) -> np.ndarray:
-    """The same as a sum over real modes, with the static flexibility of those left out.
-
-    ``sum (L phi) (phi^T B) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega) + R``, R = ``L K^+ B`` less the
-    static part of the sum (D. J. Ewins, Modal Testing, 2nd ed., 2000, section 2.4; Geradin and Rixen,
-    Mechanical Vibrations, 3rd ed., 2.9). Exact with all modes; without some, good below their frequencies.
-
-    Parameters
-    ----------
-    system : MechanicalSystem
-    modes : Modes
-        Of that system.
-    frequency, inputs, outputs
-        See `direct_response`.
-    residual : bool
-        False leaves R out.
-
-    Returns
-    -------
-    (F, n_outputs, n_inputs) complex array
-    """
-    omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
-    natural = 2.0 * np.pi * modes.frequency
-    w = omega[:, None]
-    gain = _gain(
-        natural**2 - w**2 + 2j * modes.damping_ratio * natural * w, np.maximum(natural**2, w**2), modes
-    )
-    left, right = outputs @ modes.shape, modes.shape.T @ inputs
-    result = _superposed(gain, left, right)
-    if residual and len(natural) < len(system.M):
-        elastic = natural > 0.0
-        static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
-        result += static - (left[:, elastic] / natural[elastic] ** 2) @ right[elastic]
-    return result
-
-
-def complex_modal_response(modes: ComplexModes, frequency, inputs, outputs) -> np.ndarray:
-    """The same as a sum over complex modes, for any viscous damping and gyroscopic terms.
-
-    ``sum (L x)(y^H B) / (i omega - lambda)`` over all poles (Ewins, section 2.7), with the displacement of
-    rigid motions as their velocity over ``i omega``.
-
-    Parameters
-    ----------
-    modes : ComplexModes
-    frequency, inputs, outputs
-        See `direct_response`.
-
-    Returns
-    -------
-    (F, n_outputs, n_inputs) complex array
-    """
-    omega, inputs, outputs = _checked(frequency, inputs, outputs, len(modes.shape))
-    poles = np.concatenate([modes.eigenvalue, modes.eigenvalue[modes.paired].conj()])
-    w = omega[:, None]
-    gain = _gain(1j * w - poles, np.maximum(np.abs(poles), w), modes)
-    shape, drift, left = (_both(array, modes.paired) for array in (modes.shape, modes.drift, modes.left))
-    force = left.conj().T @ inputs
-    result = _superposed(gain, outputs @ shape, force)
-    if np.any(drift):
-        if not np.all(omega):
-            raise _resonance("of a rigid motion at 0 Hz")
-        result += _superposed(gain / (1j * w), outputs @ drift, force)
-    return result
 
 
 def mesh_error_response(
@@ -278,6 +115,31 @@ def mesh_error_response(
     )  # fmt: skip
 
 
+def complex_modal_response(modes: ComplexModes, frequency, inputs, outputs) -> np.ndarray:
+    """Receptance (F, n_outputs, n_inputs) as a sum over complex modes, with any viscous and gyroscopic terms.
+
+    ``sum (L x)(y^H B) / (i omega - lambda)`` over all poles (Ewins, section 2.7), with the displacement of
+    rigid motions as their velocity over ``i omega``.
+
+    Parameters
+    ----------
+    modes : ComplexModes
+    frequency, inputs, outputs
+        See `direct_response`.
+    """
+    omega = 2.0 * np.pi * np.asarray(frequency, float)[:, None]
+    poles = np.concatenate([modes.eigenvalue, modes.eigenvalue[modes.paired].conj()])
+    gain = 1.0 / (1j * omega - poles)
+    shape, drift, left = (
+        np.hstack([array, array[:, modes.paired].conj()]) for array in (modes.shape, modes.drift, modes.left)
+    )
+    force = left.conj().T @ inputs
+    result = np.einsum("ok,fk,ki->foi", outputs @ shape, gain, force)
+    if np.any(drift):
+        result += np.einsum("ok,fk,ki->foi", outputs @ drift, gain / (1j * omega), force)
+    return result
+
+
 def unit_force(system: MechanicalSystem, *names: str) -> np.ndarray:
     """One column (n, len(names)) a name of a degree of freedom; its transpose reads displacements.
 
@@ -330,55 +192,6 @@ def resonance_peaks(frequency, response, *, prominence: float = 0.05) -> tuple[R
     places, found = find_peaks(size, prominence=0.0)
     places = places[found["prominences"] >= prominence * size[places]]
     return tuple(_peak(f**2, size, int(i)) for i in places)
-
-
-def _checked(frequency, inputs, outputs, n: int):
-    """Angular frequencies, and inputs and outputs as matrices that fit."""
-    frequency = np.atleast_1d(np.asarray(frequency, float))
-    inputs, outputs = np.asarray(inputs), np.atleast_2d(np.asarray(outputs))
-    inputs = inputs[:, None] if inputs.ndim == 1 else inputs
-    if inputs.ndim != 2 or len(inputs) != n or outputs.ndim != 2 or outputs.shape[1] != n:
-        raise CaseError(
-            f"inputs of shape {inputs.shape} and outputs of shape {outputs.shape}", code="E-SHAPE",
-            limit=f"({n}, inputs) and (outputs, {n})",
-        )  # fmt: skip
-    if (
-        frequency.ndim != 1
-        or not len(frequency)
-        or not np.all(np.isfinite(frequency))
-        or np.any(frequency < 0.0)
-    ):
-        raise CaseError(
-            f"frequencies of shape {frequency.shape} must be finite and not negative", code="E-FREQUENCY",
-            key="frequency", limit="a list of one or more numbers >= 0 Hz",
-            remedy="list the frequencies of the response",
-        )  # fmt: skip
-    return 2.0 * np.pi * frequency, inputs, outputs
-
-
-def _gain(below: np.ndarray, size: np.ndarray, modes) -> np.ndarray:
-    bad = np.abs(below) <= _RESONANT * size
-    if np.any(bad):
-        mode = int(np.argwhere(bad)[0, 1]) % len(modes.frequency)
-        raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")
-    return 1.0 / below
-
-
-def _superposed(gain: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """``sum_k left_ok gain_fk right_ki`` as one matrix product."""
-    pairs = left.T[:, :, None] * right[:, None, :]
-    return (gain @ pairs.reshape(len(right), -1)).reshape(len(gain), len(left), right.shape[1])
-
-
-def _both(array: np.ndarray, paired: np.ndarray) -> np.ndarray:
-    return np.hstack([array, array[:, paired].conj()])
-
-
-def _resonance(where: str) -> ConvergenceError:
-    return ConvergenceError(
-        f"undamped resonance {where}: infinite response", code="E-RESONANCE",
-        remedy="give the motion some damping or move the frequency",
-    )  # fmt: skip
 
 
 def _peak(x: np.ndarray, size: np.ndarray, i: int) -> ResonancePeak:

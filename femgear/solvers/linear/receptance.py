@@ -1,7 +1,8 @@
-"""Receptance of the element deflections: one reduction to modes, then any number of frequencies.
+"""Receptances: by direct solution, as sums over modes, and reduced to the deflections of the elements.
 
-``T(omega) = W^T Z^-1 [W, loads]`` with ``Z = K' + i omega (C + speed G) - omega^2 M`` and
-``K' = K + W diag(reference) W^T``, as a sum over poles.
+Forces excite a linear system (`direct_response`, `modal_response`). Of a problem with nonlinear elements one
+reduction to modes serves any number of frequencies (`reduce_problem`), ``T(omega) = W^T Z^-1 [W, loads]`` of
+``Z = K' + i omega (C + speed G) - omega^2 M`` and ``K' = K + W diag(reference) W^T``, as a sum over poles.
 """
 
 from __future__ import annotations
@@ -11,16 +12,151 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import residual_output, solve_modes
+from femgear.solvers.linear.modal import (
+    damping_matrix,
+    modal_damping,
+    pseudo_solve,
+    residual_output,
+    rigid_basis,
+    solve_modes,
+    total_stiffness,
+)
 from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.system import MechanicalSystem, Modes
 
+# Bytes of dynamic stiffness that are solved in one batch.
+_BATCH = 2**26
+# Distance to an undamped pole, relative to it, below which the response is infinite.
+_RESONANT = 1e-12
 # Modal damping off the diagonal, relative to the largest entry, above which the modes are coupled.
 _COUPLED = 1e-9
-# Distance to an undamped resonance, relative to the eigenvalue, below which the response is infinite.
-_RESONANT = 1e-12
+# Size of a pole, relative to the largest one, that is none: a motion without stiffness.
+_STILL = 1e-9
 # Error of the sum over complex modes, relative, that is accepted.
 _POLES = 1e-8
+
+
+@dataclass(frozen=True)
+class MeshErrorResponse:
+    """Response to transmission errors on harmonics of the mesh frequency.
+
+    Parameters
+    ----------
+    mesh_frequency : (F,) array
+        [Hz]
+    harmonics : (H,) int array
+    deflection : (F, H, n_meshes) complex array
+        ``W^T q`` [m]: the dynamic transmission error of every mesh.
+    force : (F, H, n_meshes) complex array
+        Dynamic mesh force ``k (W^T q - e)`` [N].
+    output : (F, H, n_outputs) complex array
+    """
+
+    mesh_frequency: np.ndarray
+    harmonics: np.ndarray
+    deflection: np.ndarray
+    force: np.ndarray
+    output: np.ndarray
+
+
+def direct_response(
+    system: MechanicalSystem,
+    frequency,
+    inputs,
+    outputs,
+    *,
+    mesh_stiffness,
+    speed: float = 0.0,
+    damping_ratio=None,
+) -> np.ndarray:
+    """``L (K' + i omega D - omega^2 M)^-1 B`` by one dense solution a frequency, many in a batch.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    frequency : (F,) array
+        [Hz], positive or zero.
+    inputs : (n, n_inputs) array
+        ``B``, one column a force; `unit_force` makes them from names.
+    outputs : (n_outputs, n) array
+        ``L``.
+    mesh_stiffness : (n_meshes,) array
+        [N/m]
+    speed : float
+        That multiplies the gyroscopic matrix [rad/s].
+    damping_ratio : float or (n,) array, optional
+        Modal damping that is added to ``C``; see `modal.modal_damping`.
+
+    Returns
+    -------
+    (F, n_outputs, n_inputs) complex array
+        Receptances [m/N and the like].
+
+    Raises
+    ------
+    CaseError
+        Arrays that do not fit (E-SHAPE), frequencies that are none (E-FREQUENCY).
+    ConvergenceError
+        An undamped resonance, or rigid motions at frequency zero (E-RESONANCE).
+    """
+    omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
+    stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
+    damping = damping_matrix(system, speed)
+    if damping_ratio is not None:
+        bare = replace(system, gyroscopic=None, C=np.zeros_like(system.C))
+        damping = damping + modal_damping(bare, mesh_stiffness, damping_ratio)
+    result = np.empty((len(omega), len(outputs), inputs.shape[1]), complex)
+    step = max(1, _BATCH // (16 * len(stiffness) ** 2))
+    for start in range(0, len(omega), step):
+        w = omega[start : start + step, None, None]
+        dynamic = stiffness - w**2 * system.M + 1j * w * damping
+        try:
+            result[start : start + step] = outputs @ np.linalg.solve(dynamic, inputs.astype(complex))
+        except np.linalg.LinAlgError as error:
+            f = w.ravel() / (2.0 * np.pi)
+            raise _resonance(f"between {f[0]:.6g} and {f[-1]:.6g} Hz") from error
+    if not np.all(np.isfinite(result)):
+        bad = np.flatnonzero(~np.isfinite(result).all(axis=(1, 2)))[0]
+        raise _resonance(f"at {omega[bad] / (2.0 * np.pi):.6g} Hz")
+    return result
+
+
+def modal_response(
+    system: MechanicalSystem, modes: Modes, frequency, inputs, outputs, *, residual: bool = True
+) -> np.ndarray:
+    """The same as a sum over real modes, with the static flexibility of those left out.
+
+    ``sum (L phi) (phi^T B) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega) + R``, R = ``L K^+ B`` less the
+    static part of the sum (D. J. Ewins, Modal Testing, 2nd ed., 2000, section 2.4; Geradin and Rixen,
+    Mechanical Vibrations, 3rd ed., 2.9). Exact with all modes; without some, good below their frequencies.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+    modes : Modes
+        Of that system.
+    frequency, inputs, outputs
+        See `direct_response`.
+    residual : bool
+        False leaves R out.
+
+    Returns
+    -------
+    (F, n_outputs, n_inputs) complex array
+    """
+    omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
+    natural = 2.0 * np.pi * modes.frequency
+    w = omega[:, None]
+    gain = _gain(
+        natural**2 - w**2 + 2j * modes.damping_ratio * natural * w, np.maximum(natural**2, w**2), modes
+    )
+    left, right = outputs @ modes.shape, modes.shape.T @ inputs
+    result = _superposed(gain, left, right)
+    if residual and len(natural) < len(system.M):
+        elastic = natural > 0.0
+        static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
+        result += static - (left[:, elastic] / natural[elastic] ** 2) @ right[elastic]
+    return result
 
 
 @dataclass(frozen=True)
@@ -28,14 +164,16 @@ class Reduction:
     """``[W^T; L] Z^-1 [W, loads]`` as ``sum_k left_k right_k h_k(omega) + residual``.
 
     Real modes have ``h = 1 / (omega_k^2 - omega^2 + i omega d_k)``; complex ones, of the state form,
-    ``h = 1 / (i omega - lambda_k)``.
+    ``h = 1 / (i omega - lambda_k)``. Both are ``1 / (constant + i omega linear - square omega^2)``.
 
     Parameters
     ----------
     reference : (n_columns,) array
         Stiffness of the columns that Z contains [N/m].
-    squared, damping : (m,) arrays, or poles : (p,) complex array
-        ``omega_k^2`` [1/s^2] and ``d_k`` [1/s], or ``lambda_k`` [1/s].
+    constant, linear : (m or p,) arrays
+        ``omega_k^2`` [1/s^2] and ``d_k`` [1/s], or ``-lambda_k`` [1/s] and one.
+    square : float
+        One for real modes, zero for complex ones.
     inputs : (m or p, n_columns + n_loads) array
         ``right_k``.
     pairs : (m or p, n_columns (n_columns + n_loads)) array
@@ -53,6 +191,9 @@ class Reduction:
     """
 
     reference: np.ndarray
+    constant: np.ndarray
+    linear: np.ndarray
+    square: float
     inputs: np.ndarray
     pairs: np.ndarray
     static: np.ndarray
@@ -60,9 +201,6 @@ class Reduction:
     system: MechanicalSystem
     modes: Modes
     shape: np.ndarray
-    squared: np.ndarray | None = None
-    damping: np.ndarray | None = None
-    poles: np.ndarray | None = None
     drift: np.ndarray | None = None
 
     def gain(self, omega) -> tuple[np.ndarray, np.ndarray]:
@@ -76,15 +214,17 @@ class Reduction:
             At the undamped resonance of a mode.
         """
         omega = np.asarray(omega, float)[..., None]
-        if self.poles is None:
-            size, below = self.squared, self.squared - omega * omega + 1j * omega * self.damping
-            change = 2.0 * omega - 1j * self.damping
-        else:
-            size, below = np.abs(self.poles), 1j * omega - self.poles
-            change = -1j
-        still = (omega == 0.0) & (size <= (0.0 if self.poles is None else 1e-9 * size.max()))
+        size = np.abs(self.constant)
+        below = self.constant - self.square * omega * omega + 1j * omega * self.linear
+        change = 2.0 * self.square * omega - 1j * self.linear
+        still = (omega == 0.0) & (size <= (0.0 if self.square else _STILL * size.max()))
         if np.any(bad := (np.abs(below) <= _RESONANT * size) & ~still):
-            _refuse_resonance(self, int(np.argwhere(bad)[0][-1]))
+            mode = int(np.argwhere(bad)[0][-1])
+            natural = np.sqrt(size[mode]) if self.square else size[mode]
+            raise _resonance(
+                f"of mode {mode + 1} at {natural / (2.0 * np.pi):.6g} Hz",
+                "give the mode some damping, or move the frequency or the reference",
+            )
         gain = np.where(still, 0.0, 1.0 / np.where(still, 1.0, below))
         return gain, change * gain * gain
 
@@ -142,8 +282,8 @@ def reduce_problem(
     if off > _COUPLED * np.abs(modal).max(initial=0.0):
         return _complex_modes(modal, modes, common)
     return Reduction(
-        **common, inputs=np.ascontiguousarray(rows.T), pairs=_pairs(rows[:columns], rows.T),
-        shape=modes.shape, squared=(2.0 * np.pi * modes.frequency) ** 2, damping=np.diag(modal).copy(),
+        **common, constant=(2.0 * np.pi * modes.frequency) ** 2, linear=np.diag(modal).copy(), square=1.0,
+        inputs=np.ascontiguousarray(rows.T), pairs=_pairs(rows[:columns], rows.T), shape=modes.shape,
     )  # fmt: skip
 
 
@@ -182,21 +322,11 @@ def _tell_of_the_speed(problem: NonlinearSystem, error: ConvergenceError) -> Non
 
 
 def respond(reduction: Reduction, outputs, omega, inputs) -> np.ndarray:
-    """``L Z^-1 [W, loads] inputs`` at every line.
+    """Outputs ``L Z^-1 [W, loads] inputs`` (n_outputs, L) complex at every line, ``outputs`` (n_outputs, n) =
+    ``L``.
 
-    Parameters
-    ----------
-    reduction : Reduction
-    outputs : (n_outputs, n) array
-        ``L``.
-    omega : (L,) array
-        [rad/s].
-    inputs : (n_columns + n_loads, L) complex array
-        Forces on the columns [N] and amplitudes of the loads.
-
-    Returns
-    -------
-    (n_outputs, L) complex array
+    ``omega`` (L,) [rad/s]; ``inputs`` (n_columns + n_loads, L) are forces on the columns [N] and amplitudes
+    of the loads.
     """
     gain, _ = reduction.gain(omega)
     coordinates = (reduction.inputs @ inputs) * gain.T
@@ -246,7 +376,8 @@ def _complex_modes(modal, modes: Modes, common) -> Reduction:
     inputs = np.linalg.solve(vectors, drive.astype(complex))
     columns = len(common["reference"])
     reduction = Reduction(
-        **common, inputs=inputs, pairs=_pairs(rows[:columns, elastic] @ vectors[:m], inputs), poles=poles,
+        **common, constant=-poles, linear=np.ones(len(poles)), square=0.0, inputs=inputs,
+        pairs=_pairs(rows[:columns, elastic] @ vectors[:m], inputs),
         shape=modes.shape[:, elastic] @ vectors[:m], drift=modes.shape[:, rigid] @ vectors[2 * m :] * scale,
     )  # fmt: skip
     _check_poles(reduction, modal, natural, scale)
@@ -266,33 +397,18 @@ def _check_poles(reduction: Reduction, modal, natural, omega: float) -> None:
         )  # fmt: skip
 
 
-def _refuse_resonance(reduction: Reduction, mode: int):
-    if reduction.poles is None:
-        frequency = np.sqrt(reduction.squared[mode]) / (2.0 * np.pi)
-    else:
-        frequency = np.abs(reduction.poles[mode]) / (2.0 * np.pi)
-    raise ConvergenceError(
-        f"undamped resonance of mode {mode + 1} at {frequency:.6g} Hz: infinite response",
-        code="E-RESONANCE", remedy="give the mode some damping, or move the frequency or the reference",
-    )  # fmt: skip
-
-
 def _times(gain: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     """``gain @ pairs``; two real products where the pairs are real."""
     if np.iscomplexobj(pairs):
         return gain @ pairs
-    return gain.real @ pairs + 1j * (gain.imag @ pairs)
+    return np.real(gain) @ pairs + 1j * (np.imag(gain) @ pairs)
 
 
 def source_columns(problem: NonlinearSystem, orders: np.ndarray) -> np.ndarray:
     """Amplitudes (1 + 2 n_forces, L) of the load columns of a reduction on the lines ``orders``.
 
-    The first column holds the constant load with the forces of order zero.
-
-    Raises
-    ------
-    CaseError
-        A harmonic force on a line that is not there.
+    The first column holds the constant load with the forces of order zero. A harmonic force on a line that is
+    not there is refused (E-LINES).
     """
     out = np.zeros((1 + 2 * len(problem.forces), len(orders)), complex)
     out[0, 0] = 1.0
@@ -310,3 +426,49 @@ def source_columns(problem: NonlinearSystem, orders: np.ndarray) -> np.ndarray:
         line, sign = (same[0], 1.0) if len(same) else (mirror[0], -1.0)
         out[1 + 2 * number : 3 + 2 * number, line] = 1.0, 1j * sign
     return out
+
+
+def _checked(frequency, inputs, outputs, n: int):
+    """Angular frequencies, and inputs and outputs as matrices that fit."""
+    frequency = np.atleast_1d(np.asarray(frequency, float))
+    inputs, outputs = np.asarray(inputs), np.atleast_2d(np.asarray(outputs))
+    inputs = inputs[:, None] if inputs.ndim == 1 else inputs
+    if inputs.ndim != 2 or len(inputs) != n or outputs.ndim != 2 or outputs.shape[1] != n:
+        raise CaseError(
+            f"inputs of shape {inputs.shape} and outputs of shape {outputs.shape}", code="E-SHAPE",
+            limit=f"({n}, inputs) and (outputs, {n})",
+        )  # fmt: skip
+    if (
+        frequency.ndim != 1
+        or not len(frequency)
+        or not np.all(np.isfinite(frequency))
+        or np.any(frequency < 0.0)
+    ):
+        raise CaseError(
+            f"frequencies of shape {frequency.shape} must be finite and not negative", code="E-FREQUENCY",
+            key="frequency", limit="a list of one or more numbers >= 0 Hz",
+            remedy="list the frequencies of the response",
+        )  # fmt: skip
+    return 2.0 * np.pi * frequency, inputs, outputs
+
+
+def _gain(below: np.ndarray, size: np.ndarray, modes) -> np.ndarray:
+    bad = np.abs(below) <= _RESONANT * size
+    if np.any(bad):
+        mode = int(np.argwhere(bad)[0, 1]) % len(modes.frequency)
+        raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")
+    return 1.0 / below
+
+
+def _superposed(gain: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """``sum_k left_ok gain_fk right_ki`` as one matrix product."""
+    pairs = left.T[:, :, None] * right[:, None, :]
+    return (gain @ pairs.reshape(len(right), -1)).reshape(len(gain), len(left), right.shape[1])
+
+
+def _resonance(
+    where: str, remedy: str = "give the motion some damping or move the frequency"
+) -> ConvergenceError:
+    return ConvergenceError(
+        f"undamped resonance {where}: infinite response", code="E-RESONANCE", remedy=remedy
+    )

@@ -1,0 +1,423 @@
+"""Parametric stability of linear systems with a periodic stiffness: at many speeds, charts, boundaries.
+
+``M q'' + C q' + K q + W k(t) W^T q = 0`` is stable where no Floquet multiplier lies outside the unit circle.
+Gear meshes are judged beside a periodic response at all its speeds (`stability`); a chart over frequency and
+depth of the stiffness (`stability_chart`) and its boundary (`stability_boundary`) show the resonances.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.periodic.solution import CIRCLE, loss_of
+from femgear.solvers.stability.floquet import Frame, frame_of, frame_of_modes, passage, stiffness_in_series
+from femgear.system.elements import tangent_jumps
+from femgear.system.entries import checked_numbers, checked_tolerance
+from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.series import FourierSeries, StepSeries, mesh_harmonics, sample, series_of
+from femgear.system.system import MeshExcitation, Modes
+
+# Angle [rad] that the fastest mode turns in one step, and steps in a period of the highest harmonic.
+_STEP_ANGLE, _STEPS_PER_HARMONIC = 1.0, 8
+# Modes that exchange less than this share of their stiffness move independently.
+_UNCOUPLED = 1e-9
+# Speeds, and cells of a chart, treated together.
+_SPEEDS_TOGETHER, _CELLS_TOGETHER = 64, 64
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Floquet verdict beside a periodic response; it does not depend on the load, only on k(t).
+
+    Parameters
+    ----------
+    mesh_frequency : (n_speeds,) array
+        [Hz].
+    multiplier : (n_speeds,) complex array
+        Multiplier of largest modulus over one period of the excitation record, rigid modes left out.
+    modes_kept : (n_speeds,) int array
+        Modes that were followed in time; the others counted as static flexibility.
+    steps : (n_speeds,) int array
+        Time steps a period.
+    """
+
+    mesh_frequency: np.ndarray
+    multiplier: np.ndarray
+    modes_kept: np.ndarray
+    steps: np.ndarray
+
+    @property
+    def modulus(self) -> np.ndarray:
+        """Largest modulus of the multipliers (n_speeds,)."""
+        return np.abs(self.multiplier)
+
+    @property
+    def stable(self) -> np.ndarray:
+        """(n_speeds,) bool: no perturbation grows (largest modulus at most 1 within 1e-6)."""
+        return self.modulus <= 1.0 + CIRCLE
+
+
+def stability(
+    modes: Modes,
+    excitation: MeshExcitation,
+    mesh_frequency,
+    *,
+    excitation_harmonics: int = 6,
+    steps: int | None = None,
+    frequency_ratio: float = 2.0,
+) -> Stability:
+    """Judge the stability of the linear system with mesh stiffnesses k(t) at many speeds, by its multipliers.
+
+    Parameters
+    ----------
+    modes, excitation
+        As given to ``solve_spectral``.
+    mesh_frequency : float or (n_speeds,) array
+        [Hz], positive.
+    excitation_harmonics : int
+        Mesh harmonics of the stiffness that are kept.
+    steps : int, optional
+        Time steps a period. By default 8 in a period of the highest harmonic and one for every radian of
+        the fastest mode that is followed.
+    frequency_ratio : float
+        Modes above this many times the highest excitation frequency are counted as static flexibility:
+        parametric resonances need ``h f = f_i + f_j``, their first order a ratio of one, their second order
+        two. Their own multipliers ``exp(-zeta omega T)`` still count. The static flexibility costs up to
+        1e-3 of a modulus below one and less of a growing one; a ratio of 5 or 20 follows nearly every mode.
+
+    Raises
+    ------
+    CaseError
+        Frequencies that are not positive, data that cannot be used, too few steps.
+    ConvergenceError
+        A mesh stiffness so negative that the static flexibility cannot carry it.
+
+    Notes
+    -----
+    ``q'' + 2 zeta w q' + w^2 q + R^T kappa(t) R q = 0`` with ``kappa = k~ (I + T_res k~)^-1``. Between
+    the kicks that the meshes give, a matrix of rank n_meshes, the damped modes move exactly: algorithm 4A of
+    Chin (Phys. Lett. A 226, 1997), fourth order with positive steps; its corrected kick
+    ``kappa - dt^2/24 kappa R R^T kappa`` holds with damping too, because ``[B, [A, B]]`` does not contain the
+    damping. Modes that no stiffness couples are separate eigenvalue problems.
+    """
+    frequency = np.atleast_1d(np.array(mesh_frequency, dtype=float))
+    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)) or np.any(frequency <= 0.0):
+        raise CaseError(
+            "a period needs finite, positive mesh frequencies", code="E-FREQUENCY", key="mesh_frequency",
+            value=frequency.tolist(), limit="> 0 Hz",
+        )  # fmt: skip
+    if not frequency_ratio >= 1.0:
+        raise CaseError(
+            "modes up to the highest excitation frequency must be followed", code="E-MODES",
+            key="frequency_ratio", value=frequency_ratio, limit=">= 1",
+        )  # fmt: skip
+    stiffness = mesh_harmonics(excitation, excitation_harmonics)[0]
+    stiffness[:, 0] -= modes.mesh_stiffness
+    lines = excitation_harmonics * excitation.periods
+    cut = frequency * excitation_harmonics * frequency_ratio
+    kept = np.searchsorted(modes.frequency, cut, side="right")
+    multiplier = np.empty(len(frequency), dtype=complex)
+    taken = np.empty(len(frequency), dtype=int)
+    for number in np.unique(kept):
+        chosen = np.flatnonzero(kept == number)
+        for part in np.array_split(chosen, -(-len(chosen) // _SPEEDS_TOGETHER)):
+            period = excitation.periods / frequency[part]
+            fastest = 2.0 * np.pi * modes.frequency[:number].max(initial=0.0) * period.max()
+            taken[part] = steps or int(np.ceil(max(fastest / _STEP_ANGLE, _STEPS_PER_HARMONIC * lines)))
+            multiplier[part] = _largest_at_speeds(modes, stiffness, number, period, int(taken[part[0]]))
+    moving = kept - np.searchsorted(modes.frequency, 0.0, side="right")
+    return Stability(frequency, multiplier, np.maximum(moving, 0), taken)
+
+
+def decisive_harmonics(modes: Modes, excitation: MeshExcitation, kept: int) -> int:
+    """Highest mesh harmonic of the stiffness that could by itself make the response unstable.
+
+    ``q'' + 2 zeta w q' + w^2 (1 + eps cos 2 w t) q = 0`` is stable below ``eps = 4 zeta`` (Nayfeh and Mook,
+    Nonlinear Oscillations, 1979, section 5.3), and a mode whose strain is all in the mesh has
+    ``eps = |k_h|/k_0``; half of that is taken.
+
+    Parameters
+    ----------
+    modes, excitation
+        As given to `stability`.
+    kept : int
+        Mesh harmonics of the response.
+
+    Returns
+    -------
+    int
+        Six or more, as far as there are so many; at most 64: the amplitudes fall as one over the harmonic.
+    """
+    most = min(kept, 64)
+    stiffness = np.abs(mesh_harmonics(excitation, most)[0])
+    damped = modes.damping_ratio[modes.frequency > 0.0].min(initial=1.0)
+    large = np.flatnonzero((stiffness[:, 1:] > 2.0 * damped * stiffness[:, :1]).any(axis=0))
+    # lines of a record of several periods
+    highest = 0 if not len(large) else -(-(int(large[-1]) + 1) // excitation.periods)
+    return min(most, max(6, highest))
+
+
+@dataclass(frozen=True)
+class StabilityChart:
+    """Largest Floquet multipliers over frequency and depth.
+
+    Parameters
+    ----------
+    frequency : (n_f,) array
+        Base frequency of the stiffness [rad/s].
+    depth : (n_d,) array
+        Factor of the fluctuation about the mean.
+    multiplier : (n_f, n_d) complex array
+        Multiplier of largest modulus over one period.
+    loss : (n_f, n_d) str array
+        ``""`` where stable, otherwise ``"fold"``, ``"flip"`` or ``"Neimark-Sacker"`` (combination resonance).
+    error : (n_f, n_d) array
+        Estimated relative error of the monodromy matrices.
+    """
+
+    frequency: np.ndarray
+    depth: np.ndarray
+    multiplier: np.ndarray
+    loss: np.ndarray
+    error: np.ndarray
+
+    @property
+    def stable(self) -> np.ndarray:
+        """(n_f, n_d) bool: no perturbation grows (modulus at most 1 within 1e-6)."""
+        return np.abs(self.multiplier) <= 1.0 + CIRCLE
+
+
+def stability_chart(
+    system: Modes | NonlinearSystem,
+    stiffness: FourierSeries | StepSeries | MeshExcitation,
+    frequency,
+    depth,
+    *,
+    harmonics: int = 6,
+    tolerance: float = 1e-8,
+) -> StabilityChart:
+    """Judge the stability of ``M q'' + C q' + K q + W (mean + depth (k(t) - mean)) W^T q = 0`` on a grid.
+
+    Parameters
+    ----------
+    system : Modes or NonlinearSystem
+        Of the latter the linear part; the stiffness stands for its elements.
+    stiffness : FourierSeries, StepSeries or MeshExcitation
+        ``k`` of every column [N/m]. Of an excitation the stiffness, cut to ``harmonics`` mesh harmonics; its
+        base frequency is the mesh frequency over ``periods``.
+    frequency : (n_f,) array
+        Base frequencies [rad/s], positive.
+    depth : (n_d,) array
+        Factors of the fluctuation, 1 for the stiffness as given.
+    harmonics : int
+    tolerance : float
+        Relative error of the monodromy matrices.
+
+    Raises
+    ------
+    CaseError
+        Frequencies that are not positive, a stiffness that does not fit the columns.
+    ConvergenceError
+        Modes left out of a modal basis are too flexible.
+    """
+    tolerance = checked_tolerance(tolerance)
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    depth = np.atleast_1d(checked_numbers(depth, "depth", code="E-CHART", unit=""))
+    frame, series, breaks = _prepared(system, stiffness, harmonics)
+    f, d = (grid.ravel() for grid in np.meshgrid(frequency, depth, indexing="ij"))
+    multiplier, error = _largest_of_cells(frame, series, breaks, f, d, tolerance)
+    shape = (len(frequency), len(depth))
+    loss = [loss_of(value) if abs(value) > 1.0 + CIRCLE else "" for value in multiplier]
+    return StabilityChart(
+        frequency, depth, multiplier.reshape(shape), np.array(loss).reshape(shape), error.reshape(shape)
+    )
+
+
+def stability_boundary(
+    system: Modes | NonlinearSystem,
+    stiffness: FourierSeries | StepSeries | MeshExcitation,
+    between: tuple[float, float],
+    *,
+    frequency: float | None = None,
+    depth: float | None = None,
+    harmonics: int = 6,
+    tolerance: float = 1e-11,
+) -> float:
+    """Find where the stability changes along a line of the chart.
+
+    The root of ``log |multiplier|``. Without damping the stable side has the modulus one throughout, so there
+    the line is halved to 1e-13 of its end; next to the boundary the modulus leaves one like a square root.
+
+    Parameters
+    ----------
+    system, stiffness, harmonics, tolerance
+        As for :func:`stability_chart`.
+    between : (a, b)
+        Frequencies [rad/s], or depths, one stable and the other not.
+    frequency, depth : float
+        The one that is held; the other one varies.
+
+    Raises
+    ------
+    CaseError
+        Not exactly one of frequency and depth, or no change between the two ends.
+    """
+    from scipy.optimize import root_scalar
+
+    if (frequency is None) == (depth is None):
+        raise CaseError("hold the frequency or the depth", code="E-CHART", limit="exactly one of the two")
+    tolerance = checked_tolerance(tolerance)
+    frame, series, breaks = _prepared(system, stiffness, harmonics)
+
+    def growth(value: float) -> float:
+        f, d = (value, depth) if frequency is None else (frequency, value)
+        largest, _ = _largest_of_cells(frame, series, breaks, np.array([f]), np.array([d]), tolerance)
+        return float(np.log(np.abs(largest[0])))
+
+    ends = np.array([growth(value) for value in between])
+    if np.count_nonzero(ends > CIRCLE) != 1:
+        raise CaseError(
+            f"largest multipliers {np.exp(ends).tolist()} at {list(between)}", code="E-CHART", key="between",
+            limit="one end stable, the other one not",
+        )  # fmt: skip
+    if ends.min() < -CIRCLE:
+        return root_scalar(growth, bracket=between, method="brentq", xtol=1e-14, rtol=1e-13).root
+    low, high = between
+    unstable_low = ends[0] > CIRCLE
+    while abs(high - low) > 1e-13 * abs(high):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if (growth(middle) > CIRCLE) == unstable_low else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _prepared(system, stiffness, harmonics: int) -> tuple[Frame, FourierSeries | StepSeries, np.ndarray]:
+    """Modes, the stiffness as a series, and the fractions of the period at which it jumps."""
+    frame = frame_of_modes(system) if isinstance(system, Modes) else frame_of(system)
+    if isinstance(stiffness, MeshExcitation):
+        stiffness = series_of(stiffness.stiffness, harmonics * stiffness.periods)
+    if len(stiffness.mean) != len(frame.rows):
+        raise CaseError(
+            f"stiffness of {len(stiffness.mean)} meshes for {len(frame.rows)} columns", code="E-SHAPE",
+            limit="one series a column",
+        )  # fmt: skip
+    breaks = np.zeros(0)
+    if isinstance(stiffness, StepSeries):
+        fluctuation, eye = _fluctuation(stiffness), np.eye(len(frame.rows))
+        breaks = tangent_jumps(lambda f, states: fluctuation(f)[..., None] * eye, np.arange(1))[0]
+    return frame, stiffness, breaks
+
+
+def _largest_of_cells(
+    frame: Frame, series, breaks, frequency, depth, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Multiplier of largest modulus and error (p,) of pairs of frequency and depth."""
+    if not np.all(np.isfinite(depth)) or not np.all(np.isfinite(frequency)) or np.any(frequency <= 0.0):
+        raise CaseError(
+            "a chart needs positive frequencies and finite depths", code="E-FREQUENCY", limit="> 0 rad/s"
+        )
+    eye, mean, fluctuation = np.eye(len(frame.rows)), series.mean, _fluctuation(series)
+    multiplier, error = np.empty(len(frequency), complex), np.zeros(len(frequency))
+    # cells of similar period take similar steps
+    order = np.argsort(frequency, kind="stable")
+    for part in np.array_split(order, -(-len(order) // _CELLS_TOGETHER)):
+
+        def tangents(f, states, part=part):
+            k = mean + depth[part[states], None, None] * fluctuation(f)
+            return k[..., None] * eye
+
+        period = 2.0 * np.pi / frequency[part]
+        if isinstance(series, StepSeries):
+            ends = np.concatenate([[0.0], breaks, [1.0]])
+            middle = np.broadcast_to(0.5 * (ends[1:] + ends[:-1]), (len(period), len(ends) - 1))
+            pieces = tangents(middle, np.arange(len(period)))
+            matrix = frame.exact_monodromy(pieces, period[:, None] * np.diff(ends))
+        else:
+            matrix, error[part] = passage(frame, period, tangents, [breaks] * len(part), tolerance=tolerance)
+        values = np.linalg.eigvals(matrix)
+        multiplier[part] = values[np.arange(len(part)), np.abs(values).argmax(axis=1)]
+    if np.any(error > 1e3 * tolerance):
+        raise ConvergenceError(
+            f"the monodromy matrix has an error of {error.max():.1e}, aimed at {tolerance:.1e}",
+            code="E-MONODROMY", remedy="take a looser tolerance or fewer harmonics",
+        )  # fmt: skip
+    return multiplier, error
+
+
+def _fluctuation(series):
+    """Function: fluctuation (..., n_c) of the stiffness about its mean at fractions (...) of the period."""
+    return lambda fraction: series.at(2.0 * np.pi * np.asarray(fraction)[..., None]) - series.mean
+
+
+def _largest_at_speeds(modes: Modes, stiffness, number: int, period: np.ndarray, steps: int) -> np.ndarray:
+    """Multiplier of largest modulus (n_speeds,) with the first `number` modes followed in time."""
+    natural = 2.0 * np.pi * modes.frequency
+    static = natural > 0.0
+    static[:number] = False
+    rows = modes.mesh_deflection
+    flexibility = modes.residual + (rows[:, static] / natural[static] ** 2) @ rows[:, static].T
+    kicks = _kicks(stiffness, flexibility, steps)
+    moving = np.flatnonzero(natural[:number] > 0.0)
+    best = np.zeros(len(period), dtype=complex)
+    for group in _coupled(rows[:, moving] / natural[moving], kicks):
+        index = moving[group]
+        found = _multipliers(natural[index], modes.damping_ratio[index], rows[:, index], kicks, period)
+        best = np.where(np.abs(found) > np.abs(best), found, best)
+    if np.any(static):
+        slowest = np.exp(-np.min(modes.damping_ratio[static] * natural[static]) * period)
+        best = np.where(slowest > np.abs(best), slowest, best)
+    return best
+
+
+def _kicks(stiffness: np.ndarray, flexibility: np.ndarray, steps: int) -> np.ndarray:
+    """``kappa = k~ (I + T_res k~)^-1`` (2 steps, n, n) at the ends and middles of the steps [N/m]."""
+    lines = stiffness.shape[-1] - 1
+    if steps <= lines:
+        raise CaseError(
+            f"{steps} steps cannot follow {lines} harmonics", code="E-HARMONICS", key="steps",
+            value=steps, limit=f">= {lines + 1}", remedy="take more steps",
+        )  # fmt: skip
+    change = sample(stiffness, 2 * steps).T
+    return stiffness_in_series(change[:, :, None] * np.eye(len(stiffness)), flexibility)
+
+
+def _coupled(rows: np.ndarray, kicks: np.ndarray) -> list[np.ndarray]:
+    """Groups of modes that the kicks couple, from the rows (n_meshes, m) divided by the frequencies."""
+    from scipy.sparse.csgraph import connected_components
+
+    if not rows.shape[1]:
+        return []
+    strength = np.abs(rows.T @ kicks @ rows).max(axis=0)
+    number, label = connected_components(strength > _UNCOUPLED, directed=False)
+    return [np.flatnonzero(label == g) for g in range(number)]
+
+
+def _multipliers(natural, damping_ratio, rows, kicks, period) -> np.ndarray:
+    """Largest multiplier (n_speeds,) of one group of modes, followed through one period."""
+    speeds, m, steps = len(period), len(natural), len(kicks) // 2
+    dt = (period / steps)[:, None, None]
+    stay, turn, back, keep = _half_step(natural, damping_ratio, 0.5 * dt)
+    gyration = rows @ rows.T
+    velocity_rows = (rows / natural).T
+    q = np.zeros((speeds, m, 2 * m))
+    q[:, range(m), range(m)] = 1.0
+    u = np.roll(q, m, axis=-1)
+    for step in range(steps):
+        first, middle = kicks[2 * step], kicks[2 * step + 1]
+        corrected = middle - dt**2 / 24.0 * (middle @ gyration @ middle)
+        for kick in (first * (dt / 3.0), corrected * (2.0 * dt / 3.0)):
+            u -= velocity_rows @ (kick @ (rows @ q))
+            q, u = stay * q + turn * u, back * q + keep * u
+    values = np.linalg.eigvals(np.concatenate([q, u], axis=1))
+    return values[np.arange(speeds), np.abs(values).argmax(axis=1)]
+
+
+def _half_step(natural, damping_ratio, duration):
+    """Exact motion of damped modes, ``u = q' / w``: ``q <- stay q + turn u``, ``u <- back q + keep u``."""
+    w, zeta = natural[:, None], damping_ratio[:, None]
+    angle = np.sqrt((1.0 - zeta**2).astype(complex)) * w * duration
+    sine = (np.sinc(angle / np.pi) * (w * duration)).real
+    cosine, decay = np.cos(angle).real, np.exp(-zeta * w * duration)
+    return decay * (cosine + zeta * sine), decay * sine, -decay * sine, decay * (cosine - zeta * sine)
