@@ -191,7 +191,7 @@ def test_solution_with_verdict(benchmark):
 @question_group
 def test_two_base_frequencies(benchmark):
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-    from femgear.system.series import side_bands
+    from femgear.system.fourier import side_bands
 
     set_, orders = train.two_base_train(0.05), side_bands(2, 8, 2)
     omega = [train.OMEGA / 108.0, train.OMEGA]

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import harmonics_of
+from femgear.system.fourier import harmonics_of
+from femgear.system.system import NonlinearSystem
 
 PHASES = np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])
 FLUCTUATION = 0.15 * np.array([1.0, 0.3, 0.15])
@@ -33,7 +33,7 @@ def planet_train(damping: float) -> NonlinearSystem:
     from published.planetary_sets import lin_parker_set
 
     from femgear.system.assembler import planar_meshes
-    from femgear.system.lumped import PlanarTorque
+    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.planar.model import planar_problem
 
     data = lin_parker_set(3)
@@ -46,7 +46,7 @@ def two_base_train(damping: float) -> NonlinearSystem:
     from published.planetary_sets import lin_parker_set
 
     from femgear.system.assembler import planar_meshes
-    from femgear.system.lumped import PlanarTorque
+    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.planar.model import Gravity, planar_problem
 
     data, stiffness = lin_parker_set(3), replace(mesh_stiffness(), orders=(0, 1))

@@ -225,7 +225,7 @@ def eccentric_set(eccentricity: float, floating: bool):
     from published.planetary_sets import lin_parker_set
 
     from femgear.system.assembler import planar_meshes
-    from femgear.system.lumped import PlanarTorque
+    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.system.transmission_errors import (
         Eccentricity,
         TransmissionErrors,
@@ -287,7 +287,7 @@ def eccentric_response(eccentricity: float, floating: bool, hertz):
     """Force of mesh 1 and convergence (3, F); path of the sun, lines of the force at the first frequency."""
     from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
     from femgear.solvers.periodic.receptance import reduce_problem
-    from femgear.system.nonlinear import element_forces
+    from femgear.system.system import element_forces
 
     errors, build = eccentric_set(eccentricity, floating)
     orders, start, rows = errors.lines(mesh=3, member=3, bands=2), None, []

@@ -9,7 +9,7 @@ from published.wind_turbine import gravity_problem_b, wind_turbine_a, wind_turbi
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.checks import check_set
-from femgear.system.lumped import PlanarSet
+from femgear.system.rigid_bodies import PlanarSet
 from femgear.trains.planar.checks import check_planar_case, check_smoothing, mean_compression
 from femgear.trains.planar.stages import PLANAR, planar_data, planar_model
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value

@@ -13,7 +13,7 @@ from random_sets import RandomSet, equal_planets, random_set, symmetry
 
 from femgear.gears.kinematics import torques
 from femgear.housing.orders import OrderSpectrum, symmetry_leakage
-from femgear.system.series import harmonics_of, sample
+from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import with_value

@@ -18,7 +18,7 @@ from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.solvers.time.transient import solve_transient
 from femgear.storage.results import run_folder
 from femgear.system.assembler import planar_system
-from femgear.system.lumped import PlanarTorque
+from femgear.system.rigid_bodies import PlanarTorque
 from femgear.trains import registry
 from femgear.trains.planar.figures import (
     branch_figures,

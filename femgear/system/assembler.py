@@ -21,8 +21,9 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.elements import GearMeshes, gear_meshes
-from femgear.system.lumped import (
+from femgear.system.elements import GearMeshes
+from femgear.system.fourier import FourierSeries, StepSeries, constant
+from femgear.system.rigid_bodies import (
     CENTRAL,
     PlanarSet,
     PlanarTorque,
@@ -31,8 +32,7 @@ from femgear.system.lumped import (
     member_radius,
     torque_load,
 )
-from femgear.system.series import FourierSeries, StepSeries, constant
-from femgear.system.system import MechanicalSystem, MeshExcitation
+from femgear.system.system import MechanicalSystem, MeshExcitation, gear_meshes
 
 
 def planar_dofs(n_planets: int) -> tuple[str, ...]:
@@ -149,7 +149,7 @@ def planar_meshes(
     stiffness : FourierSeries, StepSeries or MeshExcitation, optional
         Of the meshes [N/m], or their static record; the constant stiffnesses of the set when not given.
     harmonics, orders
-        Of a static record, see `elements.gear_meshes`.
+        Of a static record, see `femgear.system.system.gear_meshes`.
     backlash : float or (2N,) array, optional
         Play along the line of action [m]. None takes that of the static record; without one, or where it
         is zero there, the meshes have no back side.

@@ -15,7 +15,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.system.assembler import free_motions
-from femgear.system.lumped import PlanarSet, RigidSet, body_masses
+from femgear.system.rigid_bodies import PlanarSet, RigidSet, body_masses
 
 PURE = 0.99
 CLASSES = ("rotational", "translational", "planet")

@@ -21,13 +21,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_numbers
 from femgear.system.assembler import free_motions, mesh_directions, pin_directions
 from femgear.system.elements import GearMeshes
-from femgear.system.entries import checked_numbers
-from femgear.system.lumped import CENTRAL, PlanarSet, body_masses, member_radius
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, SummedSeries, distinct_lines
+from femgear.system.fourier import FourierSeries, SummedSeries, distinct_lines
+from femgear.system.rigid_bodies import CENTRAL, PlanarSet, body_masses, member_radius
+from femgear.system.system import HarmonicForce, NonlinearSystem
 
 # sense of the rotation relative to the carrier where the sun turns counter-clockwise in its frame
 SENSE = {"sun": 1, "planet": -1, "ring": -1}

@@ -22,8 +22,8 @@ from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.system.assembler import planar_meshes
 from femgear.system.elements import GearMeshes
-from femgear.system.lumped import PlanarBody, PlanarSet, torsional_of_reduced, torsional_set
-from femgear.system.series import harmonics_of, sample
+from femgear.system.fourier import harmonics_of, sample
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet, torsional_of_reduced, torsional_set
 from femgear.trains.multistage.model import (
     MultistageSet,
     Stage,

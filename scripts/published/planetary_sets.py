@@ -7,12 +7,7 @@ import math
 import numpy as np
 
 from femgear.gears.phasing import MeshPhasing, standard_lag
-from femgear.system.lumped import (
-    PlanarBody,
-    PlanarSet,
-    inertia_of_reduced,
-    torsional_of_reduced,
-)
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet, inertia_of_reduced, torsional_of_reduced
 from femgear.trains.helical.model import (
     HelicalSet,
     reduced_body,

@@ -17,8 +17,8 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.solvers.periodic.receptance import Reduction, reduce_problem
 from femgear.system.assembler import planar_meshes
-from femgear.system.lumped import PlanarBody, PlanarSet, PlanarTorque, inertia_of_reduced
-from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque, inertia_of_reduced
+from femgear.system.system import NonlinearSystem
 from femgear.trains.planar.model import (
     Gravity,
     MemberBearing,

@@ -6,7 +6,7 @@ import pytest
 from femgear.gears.checks import feasible_angles
 from femgear.gears.phasing import MEMBERS, mesh_loads, mesh_phasing, phasing_table
 from femgear.gears.planetary import equal_planet_angles
-from femgear.system.lumped import HelicalBody, HelicalSupport
+from femgear.system.rigid_bodies import HelicalBody, HelicalSupport
 from femgear.trains.helical.model import (
     HelicalSet,
     helical_modes,

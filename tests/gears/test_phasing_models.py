@@ -15,8 +15,8 @@ from femgear.gears.phasing import (
 from femgear.gears.planetary import equal_planet_angles
 from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.system.assembler import mesh_directions, pin_directions, planar_system
-from femgear.system.lumped import PlanarBody, PlanarSet
 from femgear.system.mode_kinds import equally_spaced, phase_basis, phase_shares, planar_motions
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.trains.planar.model import planar_modes
 
 ALPHA = np.radians(21.0), np.radians(20.0)

@@ -18,7 +18,7 @@ from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet, equal_planet_angles
 from femgear.solvers.linear.modal import complex_modes, solve_modes
 from femgear.system.assembler import planar_system
-from femgear.system.lumped import PlanarBody, planar_from_set
+from femgear.system.rigid_bodies import PlanarBody, planar_from_set
 from femgear.trains.elastic.model import (
     RADIAL,
     TANGENTIAL,

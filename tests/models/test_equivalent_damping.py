@@ -9,7 +9,7 @@ from scipy import linalg
 
 from femgear.errors import CaseError
 from femgear.system.assembler import planar_system
-from femgear.system.lumped import torsional_set
+from femgear.system.rigid_bodies import torsional_set
 from femgear.system.transmission_errors import (
     equivalent_damping,
     mesh_dampers,

@@ -16,7 +16,7 @@ from validation.planetary import nrel_set
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.assembler import planar_system
-from femgear.system.lumped import HelicalBody, HelicalSupport, PlanarTorque
+from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque
 from femgear.trains.helical.model import (
     HelicalSet,
     body_masses,

@@ -8,7 +8,7 @@ import pytest
 from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
-from femgear.system.lumped import CENTRAL, HelicalBody, HelicalSupport, PlanarTorque
+from femgear.system.rigid_bodies import CENTRAL, HelicalBody, HelicalSupport, PlanarTorque
 from femgear.trains.helical.model import helical_system
 
 

@@ -8,8 +8,8 @@ from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.tracking import stiffness_of, strain_shares
-from femgear.system.lumped import HelicalSupport
 from femgear.system.mode_kinds import phase_basis, phasing
+from femgear.system.rigid_bodies import HelicalSupport
 from femgear.trains.helical.model import (
     helical_kinds,
     helical_modes,

@@ -14,9 +14,8 @@ from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.system.assembler import planar_meshes, planar_system
-from femgear.system.lumped import HelicalBody, HelicalSupport, PlanarTorque
-from femgear.system.nonlinear import element_forces
-from femgear.system.system import MeshExcitation
+from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque
+from femgear.system.system import MeshExcitation, element_forces
 from femgear.trains.helical.model import (
     HelicalSet,
     helical_excitation,

@@ -15,7 +15,7 @@ from trains import closed_set, stage, two_stages
 from femgear.errors import CaseError
 from femgear.solvers.linear.tracking import stiffness_of, strain_shares
 from femgear.system.assembler import planar_meshes, planar_system
-from femgear.system.lumped import CENTRAL
+from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,

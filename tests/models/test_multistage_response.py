@@ -12,8 +12,8 @@ from femgear.solvers.linear.frequency_response import mesh_error_response
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import planar_meshes
-from femgear.system.lumped import PlanarTorque
-from femgear.system.series import FourierSeries, distinct_lines, harmonic_lines
+from femgear.system.fourier import FourierSeries, distinct_lines, harmonic_lines
+from femgear.system.rigid_bodies import PlanarTorque
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,

@@ -21,7 +21,7 @@ from femgear.system.assembler import (
     planar_dofs,
     planar_system,
 )
-from femgear.system.lumped import (
+from femgear.system.rigid_bodies import (
     CENTRAL,
     PlanarBody,
     PlanarTorque,

@@ -17,10 +17,9 @@ from femgear.system.assembler import (
     planar_meshes,
     planar_system,
 )
-from femgear.system.lumped import PlanarTorque, torque_shares
-from femgear.system.nonlinear import element_forces, external_force
-from femgear.system.series import FourierSeries, StepSeries, constant
-from femgear.system.system import MeshExcitation
+from femgear.system.fourier import FourierSeries, StepSeries, constant
+from femgear.system.rigid_bodies import PlanarTorque, torque_shares
+from femgear.system.system import MeshExcitation, element_forces, external_force
 from femgear.trains.planar.model import Clearances, Gravity, phased_series, pin_deflections, planar_problem
 
 ANGLES = np.array([0.3, 1.9, 4.1])

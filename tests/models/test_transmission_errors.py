@@ -10,8 +10,8 @@ from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import planar_meshes, planar_system
-from femgear.system.lumped import PlanarTorque
-from femgear.system.series import series_spectrum
+from femgear.system.fourier import series_spectrum
+from femgear.system.rigid_bodies import PlanarTorque
 from femgear.system.transmission_errors import (
     Eccentricity,
     TransmissionErrors,

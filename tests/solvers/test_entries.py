@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.chaos.lyapunov import lyapunov_exponents
 from femgear.solvers.chaos.poincare import bifurcation_diagram, stroboscopic_section, surface_section
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
@@ -19,10 +19,8 @@ from femgear.solvers.stability.chart import stability_boundary, stability_chart
 from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
-from femgear.system.entries import checked_numbers, checked_tolerance
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries, StepSeries
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 from femgear.trains.gear_pair.model import gear_pair
 
 SYSTEM = gear_pair((1.2e-3, 4.5e-3), (0.04, 0.07), torque=120.0, mesh_damping=900.0)

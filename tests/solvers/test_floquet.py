@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.stability.floquet import floquet_multipliers, monodromy, stability
-from femgear.system.series import harmonics_of
+from femgear.system.fourier import harmonics_of
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 

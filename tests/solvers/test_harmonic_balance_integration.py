@@ -11,10 +11,15 @@ from scipy.integrate import solve_ivp
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.system.assembler import planar_meshes
 from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
-from femgear.system.lumped import PlanarTorque
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces, external_force
-from femgear.system.series import FourierSeries, harmonic_lines, harmonics_of
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries, harmonic_lines, harmonics_of
+from femgear.system.rigid_bodies import PlanarTorque
+from femgear.system.system import (
+    HarmonicForce,
+    MechanicalSystem,
+    NonlinearSystem,
+    element_forces,
+    external_force,
+)
 from femgear.trains.planar.model import Clearances, planar_problem
 
 

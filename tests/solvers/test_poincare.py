@@ -6,8 +6,7 @@ import pytest
 from femgear.errors import CaseError
 from femgear.solvers.chaos.poincare import bifurcation_diagram, stroboscopic_section, surface_section
 from femgear.system.elements import PiecewiseSprings, PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.system import MechanicalSystem
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 
 def oscillator(c, k, *elements, force=None):

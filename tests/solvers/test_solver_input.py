@@ -14,8 +14,7 @@ from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_free_vibration, solve_shooting
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.system import MechanicalSystem
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 STARTS = (([np.nan], [0.0]), ([0.0, 0.0], [0.0]), ([0.0],), (0.0, 0.0), "ab")
 

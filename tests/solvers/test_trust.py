@@ -23,8 +23,7 @@ from femgear.solvers.stability import floquet
 from femgear.solvers.stability.floquet import floquet_verdict, stability
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import (
+from femgear.system.fourier import (
     FourierSeries,
     StepSeries,
     coinciding_lines,
@@ -34,7 +33,7 @@ from femgear.system.series import (
     line_tail,
     side_bands,
 )
-from femgear.system.system import MechanicalSystem
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 ONE = np.ones((1, 1))
 

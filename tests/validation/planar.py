@@ -11,7 +11,7 @@ from published.wind_turbine import wind_turbine_b
 
 from femgear.errors import ConvergenceError
 from femgear.system.assembler import planar_meshes
-from femgear.system.lumped import (
+from femgear.system.rigid_bodies import (
     PlanarBody,
     PlanarSet,
     PlanarTorque,
@@ -19,7 +19,7 @@ from femgear.system.lumped import (
     torsional_of_reduced,
     torsional_set,
 )
-from femgear.system.nonlinear import NonlinearSystem, element_forces
+from femgear.system.system import NonlinearSystem, element_forces
 from femgear.trains.planar.model import planar_modes, planar_problem
 from validation import independent
 from validation.planetary import nrel_set

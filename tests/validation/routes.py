@@ -19,9 +19,9 @@ from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import planar_meshes
 from femgear.system.elements import GearMeshes
-from femgear.system.lumped import PlanarTorque
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, harmonics_of
+from femgear.system.fourier import FourierSeries, harmonics_of
+from femgear.system.rigid_bodies import PlanarTorque
+from femgear.system.system import NonlinearSystem
 from femgear.trains.planar.model import phased_series, planar_problem
 from validation.nonlinear import duffing, one_harmonic, oscillator, shooting_motion
 from validation.rows import Row, at_most, counted, information

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_numbers, checked_tolerance
 from femgear.solvers.time.adaptive import checked_start, flow, motion_scale, trajectory
 from femgear.solvers.time.stroboscopic import strobe
-from femgear.system.entries import checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem, checked_bases
+from femgear.system.system import NonlinearSystem, checked_bases
 
 # Instants inside a step of the integrator at which crossings are looked for.
 _SAMPLES = 8

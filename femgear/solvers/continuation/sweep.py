@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_count, checked_numbers, checked_tolerance
 from femgear.solvers.time.stroboscopic import Strobe, strobe
-from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import harmonics_of
+from femgear.system.fourier import harmonics_of
+from femgear.system.system import NonlinearSystem
 
 
 @dataclass(frozen=True)

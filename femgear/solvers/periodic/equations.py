@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_count
 from femgear.solvers.periodic.aft import (
     PhaseGrid,
     coupled_pairs,
@@ -34,9 +34,8 @@ from femgear.solvers.periodic.aft import (
 from femgear.solvers.periodic.receptance import Reduction, reduce_problem, source_columns
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.system.elements import Element
-from femgear.system.entries import checked_count
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import checked_lines, harmonic_lines, line_tail
+from femgear.system.fourier import checked_lines, harmonic_lines, line_tail
+from femgear.system.system import NonlinearSystem
 
 # Mean deflection, over the typical one and over the lengths of the elements, beyond which it is far away.
 _FAR, _LENGTHS = 1e6, 10.0

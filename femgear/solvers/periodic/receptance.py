@@ -12,8 +12,7 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import residual_output, solve_modes
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.system import MechanicalSystem, Modes
+from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 
 # Modal damping off the diagonal, relative to the largest entry, above which the modes are coupled.
 _COUPLED = 1e-9

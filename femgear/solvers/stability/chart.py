@@ -6,14 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.periodic.solution import CIRCLE, loss_of
 from femgear.solvers.stability.floquet import Frame, frame_of, frame_of_modes, passage
 from femgear.system.elements import tangent_jumps
-from femgear.system.entries import checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries, series_of
-from femgear.system.system import MeshExcitation, Modes
+from femgear.system.fourier import FourierSeries, StepSeries, series_of
+from femgear.system.system import MeshExcitation, Modes, NonlinearSystem
 
 # Cells of a chart treated together.
 _BATCH = 64

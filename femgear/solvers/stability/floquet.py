@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.periodic.solution import (
     CIRCLE,
     FloquetVerdict,
@@ -25,10 +25,8 @@ from femgear.solvers.periodic.solution import (
     verdict_of,
 )
 from femgear.system.elements import tangent_jumps
-from femgear.system.entries import checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem, element_forces
-from femgear.system.series import mesh_harmonics, sample
-from femgear.system.system import MeshExcitation, Modes
+from femgear.system.fourier import sample
+from femgear.system.system import MeshExcitation, Modes, NonlinearSystem, element_forces, mesh_harmonics
 
 # Angle [rad] that the fastest mode turns in one step, and steps in a period of the highest harmonic.
 _MESH_STEP_ANGLE = 1.0

@@ -14,9 +14,8 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import output_load, residual_output, solve_modes
 from femgear.solvers.time.convolution import step_matrices
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import phase_of
-from femgear.system.system import Modes
+from femgear.system.fourier import phase_of
+from femgear.system.system import Modes, NonlinearSystem
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ from scipy.linalg.lapack import dgesv
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error
-from femgear.system.nonlinear import Law, NonlinearSystem, external_force, tabulated_law
-from femgear.system.series import phase_of
+from femgear.system.fourier import phase_of
+from femgear.system.system import Law, NonlinearSystem, external_force, tabulated_law
 
 # Numbers held in the states of one block of steps.
 _BLOCK_NUMBERS = 2_000_000

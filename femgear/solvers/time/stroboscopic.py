@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_count, checked_numbers
 from femgear.solvers.time.adaptive import checked_start
 from femgear.solvers.time.newmark import Marched, march
 from femgear.solvers.time.transient import fixed_step_scheme, start_state
-from femgear.system.entries import checked_count, checked_numbers
-from femgear.system.nonlinear import Law, NonlinearSystem, tabulated_law
+from femgear.system.system import Law, NonlinearSystem, tabulated_law
 
 # Largest number of steps in a period, and so the memory of its states.
 _MOST_STEPS = 100_000

@@ -39,8 +39,8 @@ from femgear.report.style import (
     periodic,
     rpm,
 )
-from femgear.system.lumped import CENTRAL
 from femgear.system.mode_kinds import phasing
+from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.helical.model import helical_motions
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC

@@ -35,7 +35,9 @@ from femgear.gears import involute
 from femgear.solvers.linear.modal import residual_output, solve_modes, viscous_damping
 from femgear.system.assembler import mesh_elements
 from femgear.system.elements import GearMeshes
-from femgear.system.lumped import (
+from femgear.system.fourier import FourierSeries, StepSeries
+from femgear.system.mode_kinds import SetMotions, body_motions, energy_shares, named_kinds, phase_basis
+from femgear.system.rigid_bodies import (
     CENTRAL,
     HelicalBody,
     HelicalSupport,
@@ -51,10 +53,7 @@ from femgear.system.lumped import (
     refuse_helical,
     torque_load,
 )
-from femgear.system.mode_kinds import SetMotions, body_motions, energy_shares, named_kinds, phase_basis
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries
-from femgear.system.system import MechanicalSystem, MeshExcitation, Modes
+from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -475,7 +474,7 @@ def helical_meshes(
         `helical_excitation`; the constant stiffnesses of the set when not
         given.
     harmonics, orders
-        Of a record, see `femgear.system.elements.gear_meshes`.
+        Of a record, see `femgear.system.system.gear_meshes`.
     backlash : float or (2N S,) array, optional
         Play along the tooth normal [m]. None takes that of the record; without one, or where it is zero
         there, the meshes have no back side.

@@ -88,7 +88,7 @@ def solve_helical_modes(
     CaseError
         What `check_helical_case` refuses.
     """
-    from femgear.system.lumped import flank_sign
+    from femgear.system.rigid_bodies import flank_sign
     from femgear.trains.helical.model import helical_excitation, helical_system
 
     gears = planetary_set(case)
@@ -178,7 +178,7 @@ def _named_modes(data: HelicalSet, system: MechanicalSystem, stiffness, ratio: f
 def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:
     """Loads of pins on planets and of supports on central members, harmonics (speeds, ..., 6, H + 1)."""
     from femgear.solvers.linear.modal import output_load, output_response, residual_output
-    from femgear.system.lumped import CENTRAL, member_radius
+    from femgear.system.rigid_bodies import CENTRAL, member_radius
     from femgear.trains.helical.model import free_motions, mesh_directions, pin_directions
 
     data, system, basis = result.data, result.system, result.modes

@@ -21,7 +21,7 @@ from femgear.trains.helical.section import HelicalCase
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
-    from femgear.system.lumped import PlanarTorque
+    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.helical.model import HelicalSet
 
 # both sections are solved on the same grid, and only the ratio of their stiffnesses counts
@@ -39,7 +39,7 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
     mesh_stiffness : (2N,) array, optional
         Mean stiffnesses along the tooth normals [N/m] where the case gives none.
     """
-    from femgear.system.lumped import HelicalBody, HelicalSupport
+    from femgear.system.rigid_bodies import HelicalBody, HelicalSupport
     from femgear.trains.helical.model import helical_from_set
 
     helical, N = case.helical, gears.n_planets
@@ -96,7 +96,7 @@ def rotation_sense(case: HelicalCase, gears: PlanetarySet) -> int:
 
 def torque_of(case: HelicalCase) -> PlanarTorque:
     """The driving torque, which the member that is neither driven nor held takes up."""
-    from femgear.system.lumped import PlanarTorque
+    from femgear.system.rigid_bodies import PlanarTorque
 
     return PlanarTorque(case.operation.torque, case.operation.input, output_member(case))
 

@@ -24,10 +24,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_count, checked_numbers
 from femgear.system.assembler import free_motions, mesh_directions, planar_dofs, planar_springs, planar_system
-from femgear.system.entries import checked_count, checked_numbers
-from femgear.system.lumped import (
+from femgear.system.fourier import FourierSeries
+from femgear.system.rigid_bodies import (
     CENTRAL,
     PlanarSet,
     PlanarTorque,
@@ -36,7 +36,6 @@ from femgear.system.lumped import (
     planar_from_set,
     torque_shares,
 )
-from femgear.system.series import FourierSeries
 from femgear.system.system import MechanicalSystem
 
 if TYPE_CHECKING:
@@ -274,7 +273,7 @@ def stage_of_set(planetary_set: PlanetarySet, *, fixed: str | None = "ring", ang
     fixed, angle
         See `Stage`.
     lumped
-        Bodies and stiffnesses, see `femgear.system.lumped.planar_from_set`.
+        Bodies and stiffnesses, see `femgear.system.rigid_bodies.planar_from_set`.
     """
     s = planetary_set
     return Stage(

@@ -13,15 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_numbers
 from femgear.solvers.linear.frequency_response import MeshErrorResponse, modal_response
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
 from femgear.system.assembler import planar_meshes, planar_system
 from femgear.system.elements import GearMeshes
-from femgear.system.entries import checked_numbers
 from femgear.system.mode_kinds import class_energies, named_kinds, planar_motions
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.system import MechanicalSystem, Modes
+from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 from femgear.trains.multistage.model import (
     MultistageSet,
     Stage,
@@ -314,7 +312,7 @@ def multistage_problem(
     -------
     NonlinearSystem
         Its base frequencies are those of `base_frequencies`, its lines those of
-        `femgear.system.series.harmonic_lines` with as many bases, or any combination of their orders.
+        `femgear.system.fourier.harmonic_lines` with as many bases, or any combination of their orders.
 
     Raises
     ------

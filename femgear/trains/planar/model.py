@@ -32,11 +32,10 @@ from femgear.system.assembler import (
     planar_system,
 )
 from femgear.system.elements import GearMeshes, RadialBearings
-from femgear.system.lumped import CENTRAL, PlanarSet, PlanarTorque, flank_sign
+from femgear.system.fourier import FourierSeries, StepSeries, line_tail, series_of
 from femgear.system.mode_kinds import energy_shares, named_kinds, planar_motions
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces
-from femgear.system.series import FourierSeries, StepSeries, line_tail, series_of
-from femgear.system.system import Modes
+from femgear.system.rigid_bodies import CENTRAL, PlanarSet, PlanarTorque, flank_sign
+from femgear.system.system import HarmonicForce, Modes, NonlinearSystem, element_forces
 
 # natural frequencies closer than this, relative to the frequency, count as one
 _SAME = 1e-3
@@ -549,7 +548,7 @@ class MotionLines:
         Largest deflection of a mesh [m].
     force_tail : float
         Share of the fluctuating force in the upper half of the lines, of the kind of mesh, sun-planet or
-        planet-ring with both flanks, that has more of it; see `femgear.system.series.line_tail`.
+        planet-ring with both flanks, that has more of it; see `femgear.system.fourier.line_tail`.
     """
 
     member: np.ndarray

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from femgear.solvers.continuation.branches import Branch
     from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
     from femgear.storage.results import Results
-    from femgear.system.lumped import PlanarSet
+    from femgear.system.rigid_bodies import PlanarSet
     from femgear.system.system import Modes
     from femgear.trains.planar.model import MotionLines, PlanarModel
     from femgear.trains.planar.section import PlanarCase

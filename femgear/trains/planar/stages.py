@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from femgear.report.tables import Block
     from femgear.storage.results import Results
     from femgear.system.elements import GearMeshes
-    from femgear.system.lumped import PlanarSet
+    from femgear.system.rigid_bodies import PlanarSet
     from femgear.trains.planar.model import PlanarModel
 
 BODIES = ("carrier", "ring", "sun")
@@ -180,7 +180,7 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
     static : StaticResult, optional
         Its mean stiffnesses are taken where the case gives none.
     """
-    from femgear.system.lumped import PlanarBody, planar_from_set
+    from femgear.system.rigid_bodies import PlanarBody, planar_from_set
 
     planar, N = case.planar, gears.n_planets
     held = {name: getattr(planar.torsion, name) for name in BODIES}
@@ -228,7 +228,7 @@ def planar_model(
     carrier_speed : float
         Of the gyroscopic terms [rad/s].
     """
-    from femgear.system.lumped import PlanarTorque
+    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.planar.model import (
         Clearances,
         MemberBearing,
@@ -283,7 +283,7 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
     from femgear.gears.kinematics import speeds
     from femgear.system.assembler import planar_meshes
     from femgear.system.elements import GearMeshes
-    from femgear.system.series import constant
+    from femgear.system.fourier import constant
     from femgear.system.system import MeshExcitation
 
     planar, N = case.planar, gears.n_planets
@@ -336,7 +336,7 @@ def _pin_errors(case: PlanarCase, n_planets: int) -> np.ndarray:
 def _response_lines(case: PlanarCase, gears: PlanetarySet, static: StaticResult | None) -> np.ndarray:
     """Lines of weight and mesh frequency; none of the weight where it does not turn, none of the mesh
     frequency where the mesh stiffness is constant."""
-    from femgear.system.series import side_bands
+    from femgear.system.fourier import side_bands
 
     wanted = case.planar.response
     turns = case.planar.gravity is not None and carrier_sense(case, gears) != 0
