@@ -224,7 +224,7 @@ def eccentric_set(eccentricity: float, floating: bool):
 
     from published.planetary_sets import lin_parker_set
 
-    from femgear.system.assembler import planar_meshes
+    from femgear.system.assembler import mesh_elements
     from femgear.system.rigid_bodies import PlanarTorque
     from femgear.system.transmission_errors import (
         Eccentricity,
@@ -245,7 +245,7 @@ def eccentric_set(eccentricity: float, floating: bool):
     )  # fmt: skip
     C = equivalent_damping(data, mesh_ratio=0.05, support_ratio=0.03)
     stiffness = phased_series([0.1], [0.1], phases, mean=data.mesh_stiffness)
-    meshes = planar_meshes(data, stiffness=stiffness, backlash=60e-6)
+    meshes = mesh_elements(data, stiffness=stiffness, backlash=60e-6)
     plain = planar_problem(data, meshes=meshes, torque=PlanarTorque(15.0), damping=C)
     dampers = planar_mesh_dampers(data, 0.05)
     return errors, lambda omega: with_errors(plain, errors, dampers=dampers, mesh_frequency=omega)

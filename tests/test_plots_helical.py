@@ -8,19 +8,14 @@ from published.planetary_sets import cases, kahraman_set
 
 from femgear.errors import CaseError
 from femgear.report.style import png_bytes
+from femgear.system.assembler import free_motions, gear_set_system
 from femgear.trains.helical.figures import helical_mode_shapes, mesh_force_spectra
-from femgear.trains.helical.model import (
-    free_motions,
-    helical_modes,
-    helical_system,
-    modal_error_response,
-    phased_errors,
-)
+from femgear.trains.helical.model import helical_modes, modal_error_response, phased_errors
 
 
 def with_shape(data, dof, value):
     """Modes of the set whose first shape moves one coordinate alone."""
-    system, modes = helical_system(data), helical_modes(data)
+    system, modes = gear_set_system(data), helical_modes(data)
     shape = modes.shape.copy()
     shape[:, 1] = value * (np.array(system.dofs) == dof)
     return replace(modes, shape=shape)
@@ -90,7 +85,7 @@ def test_spectra_lie_over_the_frequency_of_their_harmonic():
     data = kahraman_set()
     hertz = np.array([100.0, 200.0, 300.0])
     error = np.array([phased_errors(np.full(2, 1e-6), case.phases) for case in cases().values()][:3])
-    found = modal_error_response(helical_system(data), helical_modes(data, damping_ratio=0.05), hertz, error)
+    found = modal_error_response(gear_set_system(data), helical_modes(data, damping_ratio=0.05), hertz, error)
     meshes = [("sun-planet 1", 0), ("planet 1-ring", 4)]
     figure = mesh_force_spectra(found, ["a", "b", "c"], meshes=meshes, marks=[("IP modes", [250.0, 3116.0])])
     lines = figure.axes[1].get_lines()

@@ -340,7 +340,7 @@ def planar_mesh_dampers(data: PlanarSet, ratio) -> np.ndarray:
 
 
 def equivalent_damping(data: PlanarSet, *, mesh_ratio, support_ratio, flank: int = 1) -> np.ndarray:
-    """Damping matrix of a lumped set in the coordinates of `planar_system`, for ``planar_problem(damping=)``.
+    """Damping matrix of a set in the coordinates of `gear_set_system`, for ``planar_problem(damping=)``.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from published.wind_turbine_drivetrain import (
 )
 
 from femgear.solvers.linear.modal import solve_modes
-from femgear.system.assembler import planar_system
+from femgear.system.assembler import gear_set_system
 from femgear.system.shaft import Disc, ShaftSection, Support, shaft_system
 from femgear.trains.drivetrain.data import (
     ChainBearing,
@@ -184,7 +184,7 @@ def reductions() -> tuple[Row, ...]:
     lumped = replace(lumped, carrier=carrier, sun=sun)
     ours = drivetrain_model(alone)
     ours = solve_modes(ours.still, ours.mean_stiffness).frequency[1:]
-    theirs = solve_modes(planar_system(lumped), lumped.mesh_stiffness).frequency[1:]
+    theirs = solve_modes(gear_set_system(lumped), lumped.mesh_stiffness).frequency[1:]
     planar = np.abs(ours / theirs - 1.0).max()
     return (
         at_most("reductions", "torsional matrices", "chain with held axes, error of M, K and W", 1e-9, error),

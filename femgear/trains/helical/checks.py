@@ -93,10 +93,10 @@ def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
 def _balanced(case: HelicalCase, data: HelicalSet) -> bool:
     """Whether supports take up what the torque asks of them."""
     from femgear.solvers.linear.modal import solve_modes
-    from femgear.trains.helical.model import helical_system
+    from femgear.system.assembler import gear_set_system
 
     try:
-        solve_modes(helical_system(data, torque=torque_of(case)), data.column_stiffness)
+        solve_modes(gear_set_system(data, torque=torque_of(case)), data.column_stiffness)
     except CaseError as error:
         if error.code != "E-LOAD-BALANCE":
             raise

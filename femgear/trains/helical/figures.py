@@ -39,9 +39,8 @@ from femgear.report.style import (
     periodic,
     rpm,
 )
-from femgear.system.mode_kinds import phasing
+from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import CENTRAL
-from femgear.trains.helical.model import helical_motions
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 
@@ -98,7 +97,7 @@ def helical_mode_shapes(
     shown = [int(mode) for mode in shown]
     if not shown or min(shown) < 0 or max(shown) >= len(modes.frequency):
         raise CaseError(f"modes {shown} to draw", code="E-MODES", limit=f"0 to {len(modes.frequency) - 1}")
-    motions, names = _motions(data, modes.shape), phasing(helical_motions(data, modes.shape))
+    motions, names = _motions(data, modes.shape), phasing(gear_set_motions(data, modes.shape))
     columns = min(_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
     figure, axes = new_figure(rows=2 * rows, columns=columns, width=2.7 * columns, height=4.3 * rows + 0.6)
@@ -130,7 +129,7 @@ def draw_mode(front, side, data: HelicalSet, moved: np.ndarray, scale: float) ->
 
 def _motions(data: HelicalSet, shape) -> np.ndarray:
     """x, y, z, tilts and rotation (N + 3, 6, m) of all bodies in the axes of the set."""
-    found = helical_motions(data, shape)
+    found = gear_set_motions(data, shape)
     plane, space, planets = found.central[:3], found.central[3:], found.planets
     central = np.stack(
         [*plane.swapaxes(0, 1)[:2], space[:, 2], space[:, 0], space[:, 1], plane[:, 2]], axis=1

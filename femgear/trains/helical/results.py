@@ -93,7 +93,7 @@ class HelicalDynamicsResult:
 
 def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
     """Contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
-    from femgear.trains.helical.model import free_motions
+    from femgear.system.assembler import free_motions
 
     modes, data = result.modes, result.data
     shape, dofs = in_space(data, free_motions(data) @ modes.shape, AXES)

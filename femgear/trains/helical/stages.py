@@ -88,8 +88,9 @@ def solve_helical_modes(
     CaseError
         What `check_helical_case` refuses.
     """
+    from femgear.system.assembler import gear_set_system
     from femgear.system.rigid_bodies import flank_sign
-    from femgear.trains.helical.model import helical_excitation, helical_system
+    from femgear.trains.helical.model import helical_excitation
 
     gears = planetary_set(case)
     check_helical_case(case, gears)
@@ -110,7 +111,7 @@ def solve_helical_modes(
         excitation = helical_excitation(record, overlap, slices=case.helical.slices, hand=hand)
     data = helical_data(case, gears, None if whole is None else whole.stiffness.mean(axis=1))
     torque = torque_of(case)
-    system, flank = helical_system(data, torque=torque), flank_sign(data, torque)
+    system, flank = gear_set_system(data, torque=torque), flank_sign(data, torque)
     stiffness = data.column_stiffness if excitation is None else excitation.stiffness.mean(axis=1)
     modes, phases = _named_modes(data, system, stiffness, case.dynamics.damping_ratio)
     return HelicalModesResult(gears, data, system, modes, phases, flank, section, excitation, whole)
@@ -159,27 +160,26 @@ def solve_helical_dynamics(
 def _named_modes(data: HelicalSet, system: MechanicalSystem, stiffness, ratio: float):
     """All modes, those of one frequency with one phasing each, and the phasing."""
     from femgear.solvers.linear.modal import solve_modes
-    from femgear.system.mode_kinds import phase_basis, phasing
-    from femgear.trains.helical.model import helical_kinds, helical_motions
+    from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis, phasing
 
     modes = solve_modes(system, stiffness, damping_ratio=ratio)
-    Q = phase_basis(helical_motions(data, modes.shape), modes.frequency, tolerance=1e-9)
+    Q = phase_basis(gear_set_motions(data, modes.shape), modes.frequency, tolerance=1e-9)
     shape = modes.shape @ Q
     named = replace(
         modes,
         shape=shape,
         mesh_deflection=modes.mesh_deflection @ Q,
         modal_load=Q.T @ modes.modal_load,
-        kind=helical_kinds(data, shape, frequency=modes.frequency),
+        kind=gear_set_kinds(data, shape, frequency=modes.frequency),
     )
-    return named, phasing(helical_motions(data, shape))
+    return named, phasing(gear_set_motions(data, shape))
 
 
 def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:
     """Loads of pins on planets and of supports on central members, harmonics (speeds, ..., 6, H + 1)."""
     from femgear.solvers.linear.modal import output_load, output_response, residual_output
+    from femgear.system.assembler import free_motions, mesh_directions, pin_directions
     from femgear.system.rigid_bodies import CENTRAL, member_radius
-    from femgear.trains.helical.model import free_motions, mesh_directions, pin_directions
 
     data, system, basis = result.data, result.system, result.modes
     T, pins, N = free_motions(data), pin_directions(data), data.n_planets

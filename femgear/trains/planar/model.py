@@ -26,14 +26,14 @@ from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.assembler import (
     column_groups,
     free_motions,
+    gear_set_system,
     mesh_directions,
+    mesh_elements,
     pin_directions,
-    planar_meshes,
-    planar_system,
 )
 from femgear.system.elements import GearMeshes, RadialBearings
 from femgear.system.fourier import FourierSeries, StepSeries, line_tail, series_of
-from femgear.system.mode_kinds import energy_shares, named_kinds, planar_motions
+from femgear.system.mode_kinds import gear_set_kinds
 from femgear.system.rigid_bodies import CENTRAL, PlanarSet, PlanarTorque, flank_sign
 from femgear.system.system import HarmonicForce, Modes, NonlinearSystem, element_forces
 
@@ -124,7 +124,7 @@ def planar_problem(
     ----------
     data : PlanarSet
     meshes : GearMeshes, optional
-        From `planar_meshes`; constant stiffnesses without back side when not given.
+        From `mesh_elements`; constant stiffnesses without back side when not given.
     back_flanks : bool
         The back flanks act on their own lines of action, with the stiffness of the drive side, so that teeth
         can wedge; otherwise they act on the line of the drive flanks.
@@ -136,7 +136,7 @@ def planar_problem(
         Radial (outwards) and tangential (counter-clockwise) displacement of the pins [m], from which the
         coordinates of the planets then count. Not to be given again when the static record holds them.
     carrier_speed : float
-        See `planar_system`.
+        See `gear_set_system`.
     damping : float, (n_modes,) array or (n, n) array, optional
         Damping ratio of all modes, or one a mode, at standstill with mean stiffnesses and closed bearings;
         or the matrix ``C``.
@@ -150,22 +150,22 @@ def planar_problem(
     bearings = clearances.bearings if clearances else ()
     pins = np.zeros((data.n_planets, 2)) if pin_errors is None else _pins(data, pin_errors)
     groups = column_groups(data, back_flanks=back_flanks, bearings=bearings)
-    meshes = planar_meshes(data) if meshes is None else meshes
+    meshes = mesh_elements(data) if meshes is None else meshes
     if not np.array_equal(meshes.columns[:, 0], groups["meshes"]):
         raise CaseError(
             f"meshes on columns {meshes.columns[:, 0].tolist()}", code="E-SHAPE", key="meshes",
-            limit=f"columns 0 to {2 * data.n_planets - 1} in order", remedy="make them with planar_meshes",
+            limit=f"columns 0 to {2 * data.n_planets - 1} in order", remedy="make them with mesh_elements",
         )  # fmt: skip
     elements = _mesh_elements(data, meshes, pins, flank_sign(data, torque), groups)
     elements += _bearing_elements(data, clearances, groups)
     options = {"torque": torque, "back_flanks": back_flanks, "bearings": bearings}
-    still = planar_system(data, **options)
+    still = gear_set_system(data, **options)
     reference = NonlinearSystem(still, elements).reference
     # teeth in the middle of the drive flanks do not touch their back flanks
     reference[groups.get("back flanks", np.arange(0))] = 0.0
     # refuses a load that nothing takes up before a solver drifts away with it
     solve_modes(still, reference)
-    system = planar_system(data, carrier_speed=carrier_speed, **options)
+    system = gear_set_system(data, carrier_speed=carrier_speed, **options)
     steady, forces = _weight(data, gravity)
     load = system.load + steady + _pin_inertia(data, pins, carrier_speed)
     system = replace(system, load=load, C=viscous_damping(still, reference, damping))
@@ -444,44 +444,11 @@ def planar_modes(data: PlanarSet, *, mesh_stiffness=None, damping_ratio: float =
     Returns
     -------
     Modes
-        ``kind`` from `planar_kinds`.
+        ``kind`` from `gear_set_kinds`.
     """
     stiffness = data.mesh_stiffness if mesh_stiffness is None else mesh_stiffness
-    modes = solve_modes(planar_system(data), stiffness, damping_ratio=damping_ratio)
-    return replace(modes, kind=planar_kinds(data, modes.shape, frequency=modes.frequency))
-
-
-def planar_kinds(data: PlanarSet, shape, *, frequency) -> tuple[str, ...]:
-    """Kind of every mode from its shape.
-
-    Parameters
-    ----------
-    data : PlanarSet
-    shape : (n, m) array
-        In the coordinates of `planar_system`.
-    frequency : (m,) array
-        Zero for rigid-body modes.
-
-    Returns
-    -------
-    tuple of str
-        ``rigid``; ``rotational``, ``translational`` or ``planet`` where at least 99 % of the kinetic energy
-        belongs to that class; else ``mixed``, as for most modes of unequally spaced planets.
-
-    Raises
-    ------
-    CaseError
-        Shapes of another system (E-SHAPE).
-    """
-    return named_kinds(class_shares(data, shape), frequency)
-
-
-def class_shares(data: PlanarSet, shape) -> np.ndarray:
-    """Shares (3, m) of rotational, translational and planet motion in the kinetic energy.
-
-    See `femgear.system.mode_kinds.class_energies`, also for unequal spacing.
-    """
-    return energy_shares(planar_motions(data, shape))
+    modes = solve_modes(gear_set_system(data), stiffness, damping_ratio=damping_ratio)
+    return replace(modes, kind=gear_set_kinds(data, modes.shape, frequency=modes.frequency))
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,7 +70,8 @@ def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> 
         What `check_planar_case` refuses, a load that accelerates the set.
     """
     from femgear.solvers.linear.modal import solve_modes
-    from femgear.trains.planar.model import mode_ratios, planar_kinds
+    from femgear.system.mode_kinds import gear_set_kinds
+    from femgear.trains.planar.model import mode_ratios
 
     gears = planetary_set(case)
     check_planar_case(case, gears)
@@ -78,7 +79,7 @@ def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> 
     bare = replace(model.problem.system, C=np.zeros_like(model.problem.system.C))
     modes = solve_modes(bare, model.springs)
     ratios = np.where(modes.frequency > 0.0, mode_ratios(modes.frequency, _ratios(case)), 0.0)
-    kinds = planar_kinds(model.data, modes.shape, frequency=modes.frequency)
+    kinds = gear_set_kinds(model.data, modes.shape, frequency=modes.frequency)
     return PlanarModesResult(gears, model.data, replace(modes, kind=kinds, damping_ratio=ratios))
 
 
@@ -281,7 +282,7 @@ def _ratios(case: PlanarCase):
 def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
     """Mesh elements: constant, or along the static record over the mesh phase."""
     from femgear.gears.kinematics import speeds
-    from femgear.system.assembler import planar_meshes
+    from femgear.system.assembler import mesh_elements
     from femgear.system.elements import GearMeshes
     from femgear.system.fourier import constant
     from femgear.system.system import MeshExcitation
@@ -292,7 +293,7 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
         play = np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], N)
         backlash = np.where(play > 0.0, play, np.inf)
     if planar.mesh_stiffness is not None:
-        return planar_meshes(data, backlash=backlash, smoothing=planar.smoothing)
+        return mesh_elements(data, backlash=backlash, smoothing=planar.smoothing)
     cycle = static.cycle
     if not varying:
         stiffness, deflection, force = (
@@ -306,7 +307,7 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
     # positions of the record run with the sun against the carrier
     sense = 1 if turning.sun > turning.carrier else -1
     record = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, np.zeros(2 * N))
-    return planar_meshes(
+    return mesh_elements(
         data,
         stiffness=record,
         harmonics=case.mesh_harmonics,
