@@ -22,12 +22,12 @@ from femgear.storage.dataset import (
     RPM,
     complex_entries,
     dataset,
-    in_space,
     response_entries,
 )
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import contact_ratios
-from femgear.trains.helical.virtual_gears import SectionStiffness
+from femgear.trains.helical.setup import SectionStiffness
+from femgear.trains.rigid import modes_entries, stiffness_text, torsion_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,16 +96,10 @@ def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
     from femgear.system.assembler import free_motions
 
     modes, data = result.modes, result.data
-    shape, dofs = in_space(data, free_motions(data) @ modes.shape, AXES)
     meshes = (2 * data.n_planets, data.slices)
     deflection = modes.mesh_deflection.reshape(*meshes, -1).mean(axis=1)
-    variables = {
-        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
-        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
-        "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
-        "phasing": (("mode",), list(result.phasing), "1", "phasing of the planets in the mode"),
-        "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
-        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
+    variables, coords = modes_entries(data, modes, free_motions(data), AXES, result.phasing)
+    variables |= {
         "mesh_stiffness": (
             ("mesh",), modes.mesh_stiffness.reshape(meshes).sum(axis=1), "N/m",
             "mean mesh stiffness along the tooth normals",
@@ -114,10 +108,7 @@ def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
             ("mesh", "mode"), deflection, "kg^-1/2", "mesh deflection of the mode along the tooth normals",
         ),
     }  # fmt: skip
-    coords = _coordinates(result) | {
-        "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-        "dof": (("dof",), dofs, "1", "degree of freedom"),
-    }
+    coords = _coordinates(result) | coords
     if result.whole is not None:
         along, whole = np.cos(data.base_helix_angle), result.whole
         where = ("mesh", "position")
@@ -263,24 +254,19 @@ def _bodies(case: HelicalCase) -> Iterator[tuple[str, ...]]:
         ("planet (pin)", planet, planet.bearing_stiffness),
     ):
         space = getattr(helical, name.partition(" ")[0])
-        torsional = space.torsional_stiffness
-        held = "held" if name == case.operation.fixed else "0"
         yield (
             name,
             f"{one.mass:.6g}",
             f"{one.inertia:.6g}, {space.diametral_inertia:.6g}",
             f"{radial:.6g}, {space.axial_stiffness:.6g}",
-            f"{space.tilt_stiffness:.6g}, {held if torsional is None else f'{torsional:.6g}'}",
+            f"{space.tilt_stiffness:.6g}, {torsion_text(case, name, space.torsional_stiffness)}",
         )
 
 
 def _model(case: HelicalCase, s: PlanetarySet) -> tuple[str, ...]:
     helical, given = case.helical, case.helical.mesh_stiffness
     if given is not None:
-        text = (
-            f"mesh stiffness along the tooth normals: sun-planet {given.sun_planet:.6g}, planet-ring "
-            f"{given.planet_ring:.6g} N/m, as given"
-        )
+        text = f"mesh stiffness along the tooth normals: {stiffness_text(given)}"
     elif helical.section == "normal":
         teeth = "/".join(str(z) for z in virtual_teeth(s, helical.helix_angle))
         text = f"mesh stiffness: of the static solution, teeth as stiff as those of virtual gears {teeth}"

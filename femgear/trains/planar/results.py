@@ -16,7 +16,8 @@ import numpy as np
 
 from femgear.case.sections import output_member
 from femgear.report.tables import Block
-from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset, in_space
+from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset
+from femgear.trains.rigid import modes_entries, stiffness_text, torsion_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -110,14 +111,9 @@ def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
     from femgear.system.assembler import free_motions
 
     modes, gears = result.modes, result.planetary_set
-    shape, dofs = in_space(result.data, free_motions(result.data) @ modes.shape, ("x", "y", "rotation"))
-    n = 2 * gears.n_planets
-    variables = {
-        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
-        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
-        "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
-        "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
-        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
+    n, axes = 2 * gears.n_planets, ("x", "y", "rotation")
+    variables, coords = modes_entries(result.data, modes, free_motions(result.data), axes)
+    variables |= {
         "mesh_stiffness": (("mesh",), modes.mesh_stiffness[:n], "N/m", "mean mesh stiffness"),
         "mesh_deflection": (
             ("mesh", "mode"), modes.mesh_deflection[:n], "kg^-1/2", "mesh deflection of the mode",
@@ -125,11 +121,7 @@ def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
     }  # fmt: skip
     return dataset(
         variables,
-        coords={
-            "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-            "dof": (("dof",), dofs, "1", "degree of freedom"),
-            "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
-        },
+        coords=coords | {"mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh")},
         attrs={
             "title": "modes of the planar set at standstill, bearings closed, back flanks open",
             "unknowns": len(modes.shape),
@@ -346,9 +338,7 @@ def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
 def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
     planar = case.planar
     for name, one in (("sun", case.sun), ("ring", planar.ring), ("carrier", case.carrier)):
-        given = getattr(planar.torsion, name)
-        held = "held" if name == case.operation.fixed else "0"
-        torsion = held if given is None else f"{given:.6g}"
+        torsion = torsion_text(case, name, getattr(planar.torsion, name))
         yield name, f"{one.mass:.6g}", f"{one.inertia:.6g}", f"{one.support_stiffness:.6g}", torsion
     planet = case.planet
     bearing = f"{planet.bearing_stiffness:.6g} (bearing)"
@@ -357,10 +347,7 @@ def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
 
 def _stiffness(case: PlanarCase) -> str:
     given = case.planar.mesh_stiffness
-    if given is None:
-        return "mesh stiffness: of the static solution"
-    values = f"sun-planet {given.sun_planet:.6g}, planet-ring {given.planet_ring:.6g} N/m"
-    return f"mesh stiffness: {values}, as given"
+    return f"mesh stiffness: {'of the static solution' if given is None else stiffness_text(given)}"
 
 
 def _play(case: PlanarCase, planetary: PlanetarySet) -> str:

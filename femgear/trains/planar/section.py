@@ -20,6 +20,13 @@ from femgear.case.fields import Count, Number, Quantity, Title, described, refus
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
 from femgear.case.units import ACCELERATION, ANGLE, FREQUENCY, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
 from femgear.errors import CaseError
+from femgear.trains.rigid import (
+    entries_without_effect,
+    flank_entries,
+    listed,
+    rigid_refusals,
+    unheld_member,
+)
 
 SMOOTHING = 0.3e-6
 """Length over which tooth contact sets in [m], of the examples of NREL/CP-5000-55355."""
@@ -168,17 +175,14 @@ def planar_notices(data: dict) -> Iterator[str]:
         Tables of a case file that was checked, with a section planar.
     """
     planar = data["planar"]
-    unused = [name for name in ("motor", "brake", "housing") if name in data]
     keys = ["tolerance"]
     if "response" not in planar:
         keys += ["mesh_harmonics", "response_harmonics"]
-    unused += [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
-    foundations = ("foundation_radial", "foundation_tangential")
-    unused += [f"ring.{key}" for key in foundations if key in data["ring"]]
-    if unused:
-        yield f"{_listed(unused)} no effect in this planar case"
+    dynamics = [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
+    if unused := entries_without_effect(data, dynamics):
+        yield f"{listed(unused)} no effect in this planar case"
     if "mesh_stiffness" in planar and (unused := _without_static(data)):
-        yield f"{_listed(unused)} no effect while planar.mesh_stiffness is given"
+        yield f"{listed(unused)} no effect while planar.mesh_stiffness is given"
     if "response" in planar and "mesh_stiffness" in planar:
         still = "no weight acts" if "gravity" not in planar else ""
         if data["operation"].get("fixed", "ring") == "carrier":
@@ -192,10 +196,6 @@ def planar_notices(data: dict) -> Iterator[str]:
         yield "planet.bearing_clearance has no effect without planar.branch or planar.response"
 
 
-def _listed(names: list[str]) -> str:
-    return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
-
-
 def _without_static(data: dict) -> list[str]:
     """Entries that act on the static solution alone, which a given mesh stiffness replaces."""
     unused = ["static"] if "static" in data else []
@@ -205,10 +205,7 @@ def _without_static(data: dict) -> list[str]:
         unused += ["planar.response.side_bands"] if "side_bands" in data["planar"]["response"] else []
     if data["planar"].get("line_backlash") is not None and "backlash" in data["set"]:
         unused.append("set.backlash")
-    for name in ("sun", "planet", "ring", "carrier"):
-        keys = ("modifications", "errors", "individual")
-        unused += [f"{name}.{key}" for key in keys if data.get(name, {}).get(key)]
-    return unused
+    return unused + flank_entries(data)
 
 
 class PlanarCase(RigidCase):
@@ -220,22 +217,7 @@ class PlanarCase(RigidCase):
 def check_planar(case: PlanarCase) -> Iterator[CaseError]:
     """Refusals of what a planar section does not go with."""
     planar = case.planar
-    if case.static.members == "elastic":
-        yield CaseError(
-            "the supports belong to the planar model: the static solution is that of the gears alone",
-            code="E-CHOICE",
-            key="static.members",
-            value="elastic",
-            limit='"fixed" in a planar case',
-            remedy="leave static.members out",
-        )
-    if case.operation.torque == 0.0:
-        yield CaseError(
-            "without torque no tooth carries load: the planar set would rattle in its play",
-            code="E-NO-LOAD",
-            key="operation.torque",
-            limit="not zero in a planar case",
-        )
+    yield from rigid_refusals(case, "planar", without_torque=": the planar set would rattle in its play")
     if planar.back_flanks and planar.line_backlash == 0.0:
         yield CaseError(
             "back flanks need play",
@@ -254,13 +236,8 @@ def _check_torsion(case: PlanarCase) -> Iterator[CaseError]:
     planar, operation = case.planar, case.operation
     output = output_member(case)
     if getattr(planar.torsion, operation.fixed) == 0.0:
-        yield CaseError(
-            f"the {operation.fixed} is the fixed member but nothing keeps it from turning",
-            code="E-MECHANISM",
-            key=f"planar.torsion.{operation.fixed}",
-            value="0 N m/rad",
-            limit="above 0 N m/rad",
-            remedy="leave it out: the fixed member is then held",
+        yield unheld_member(
+            case, f"planar.torsion.{operation.fixed}", "leave it out: the fixed member is then held"
         )
     if planar.reaction == "supports" and not getattr(planar.torsion, output):
         yield CaseError(

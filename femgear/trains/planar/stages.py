@@ -13,7 +13,6 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
-from femgear.case.sections import output_member
 from femgear.report.tables import describe_modes
 from femgear.threads import one_blas_thread
 from femgear.trains.planar.checks import (
@@ -38,6 +37,15 @@ from femgear.trains.planar.results import (
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
 from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.rigid import (
+    driving_torque,
+    member_speeds,
+    mesh_stiffnesses,
+    modes_verdict,
+    needed_static,
+    rotation_sense,
+    torsional_support,
+)
 from femgear.trains.static.description import describe_case, set_warnings
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, STRESS
@@ -49,8 +57,6 @@ if TYPE_CHECKING:
     from femgear.system.elements import GearMeshes
     from femgear.system.rigid_bodies import PlanarSet
     from femgear.trains.planar.model import PlanarModel
-
-BODIES = ("carrier", "ring", "sun")
 
 
 @one_blas_thread()
@@ -139,16 +145,13 @@ def solve_planar_response(
     ConvergenceError
         Speeds without a solution, or with one that moves too far (E-MOTION).
     """
-    from femgear.gears.kinematics import speeds
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
     from femgear.trains.planar.model import motion_lines
 
     gears = planetary_set(case)
     check_planar_case(case, gears)
     operation, orders = case.operation, _response_lines(case, gears, static)
-    turning = tuple(
-        speeds(gears, input=operation.input, fixed=operation.fixed, speed=speed) for speed in operation.speeds
-    )
+    turning = tuple(member_speeds(case, gears, speed) for speed in operation.speeds)
     solutions, lines, model = [], [], None
     for number, speed in enumerate(turning):
         if model is None or case.planar.gyroscopic:
@@ -183,26 +186,17 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
     """
     from femgear.system.rigid_bodies import PlanarBody, planar_from_set
 
-    planar, N = case.planar, gears.n_planets
-    held = {name: getattr(planar.torsion, name) for name in BODIES}
-    # the fixed member is held where it has no torsional support, the others are free
-    torsion = {
-        name: (np.inf if name == case.operation.fixed else 0.0) if value is None else value
-        for name, value in held.items()
-    }
-    sections = {"carrier": case.carrier, "ring": planar.ring, "sun": case.sun}
-    bodies = {
-        name: PlanarBody(one.mass, one.inertia, one.support_stiffness, torsion[name])
-        for name, one in sections.items()
-    }
+    planar, bodies = case.planar, {}
+    for name, one in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
+        torsional = torsional_support(case, name, getattr(planar.torsion, name))
+        bodies[name] = PlanarBody(one.mass, one.inertia, one.support_stiffness, torsional)
     given = planar.mesh_stiffness
-    mean = static.cycle.stiffness.mean(axis=1) if given is None else None
+    mean = needed_static(static).cycle.stiffness.mean(axis=1) if given is None else None
     return planar_from_set(
         gears,
         **bodies,
         planet=PlanarBody(case.planet.mass, case.planet.inertia),
-        stiffness_sun_planet=mean[:N] if given is None else given.sun_planet,
-        stiffness_planet_ring=mean[N:] if given is None else given.planet_ring,
+        **mesh_stiffnesses(given, mean),
         planet_bearing=case.planet.bearing_stiffness,
     )
 
@@ -229,7 +223,6 @@ def planar_model(
     carrier_speed : float
         Of the gyroscopic terms [rad/s].
     """
-    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.planar.model import (
         Clearances,
         MemberBearing,
@@ -242,14 +235,13 @@ def planar_model(
 
     if static is not None:
         check_entries(static.entries, static_entries(case), "static solution")
-    planar, operation = case.planar, case.operation
+    planar = case.planar
     data = planar_data(case, gears, static)
-    output = None if planar.reaction == "supports" else output_member(case)
     clearance = case.planet.bearing_clearance or None
     options = {
         "meshes": _meshes(case, gears, data, static, mesh_frequency),
         "back_flanks": planar.back_flanks,
-        "torque": PlanarTorque(operation.torque, operation.input, output),
+        "torque": driving_torque(case, reacts=planar.reaction == "output"),
         "clearances": None if clearance is None else Clearances(planets=clearance),
         "gravity": _gravity(case, gears, mesh_frequency),
         "pin_errors": _pin_errors(case, gears.n_planets) if planar.mesh_stiffness else None,
@@ -269,10 +261,7 @@ def planar_model(
 
 def carrier_sense(case: PlanarCase, gears: PlanetarySet) -> int:
     """1 where the carrier turns counter-clockwise, -1 where clockwise, 0 where it stands."""
-    from femgear.gears.kinematics import speeds
-
-    found = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=1.0)
-    return int(np.sign(found.carrier))
+    return int(np.sign(member_speeds(case, gears).carrier))
 
 
 def _ratios(case: PlanarCase):
@@ -281,7 +270,6 @@ def _ratios(case: PlanarCase):
 
 def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
     """Mesh elements: constant, or along the static record over the mesh phase."""
-    from femgear.gears.kinematics import speeds
     from femgear.system.assembler import mesh_elements
     from femgear.system.elements import GearMeshes
     from femgear.system.fourier import constant
@@ -294,7 +282,7 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
         backlash = np.where(play > 0.0, play, np.inf)
     if planar.mesh_stiffness is not None:
         return mesh_elements(data, backlash=backlash, smoothing=planar.smoothing)
-    cycle = static.cycle
+    cycle = needed_static(static).cycle
     if not varying:
         stiffness, deflection, force = (
             getattr(cycle, name).mean(axis=1) for name in ("stiffness", "deflection", "force")
@@ -303,15 +291,13 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
         return GearMeshes(
             np.arange(2 * N), constant(stiffness), unloaded, backlash=backlash, smoothing=planar.smoothing
         )
-    turning = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=1.0)
-    # positions of the record run with the sun against the carrier
-    sense = 1 if turning.sun > turning.carrier else -1
     record = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, np.zeros(2 * N))
     return mesh_elements(
         data,
         stiffness=record,
         harmonics=case.mesh_harmonics,
-        orders=(0, sense),
+        # positions of the record run with the sun against the carrier
+        orders=(0, rotation_sense(case, gears)),
         backlash=backlash,
         smoothing=planar.smoothing,
     )
@@ -413,9 +399,7 @@ PLANAR = Train(
             name="modes",
             title="Modes",
             solve=lambda case, results, _: solve_planar_modes(case, results.get("static")),
-            verdict=lambda result: {
-                "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
-            },
+            verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=_needs_static,
             check=lambda case: check_planar_case(case, planetary_set(case)),
