@@ -191,7 +191,7 @@ def column_groups(
         In the order in which their columns follow.
     """
     n = 2 * data.n_planets
-    groups = {"meshes": np.arange(n)}
+    groups: dict[str, np.ndarray] = {"meshes": np.arange(n)}
     if back_flanks:
         groups["back flanks"] = np.arange(n, 2 * n)
     start = n * len(groups)
@@ -246,6 +246,16 @@ def mesh_elements(
         made = gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
     backlash = made.backlash if backlash is None else backlash
     return replace(made, backlash=backlash, separates=separates, smoothing=smoothing)
+
+
+def check_mesh_columns(data: RigidSet, meshes: GearMeshes) -> None:
+    """Refuse meshes that do not act on the first columns of ``W``, one a column (E-SHAPE)."""
+    count = len(data.column_stiffness)
+    if not np.array_equal(meshes.columns[:, 0], np.arange(count)):
+        raise CaseError(
+            f"meshes on columns {meshes.columns[:, 0].tolist()}", code="E-SHAPE", key="meshes",
+            limit=f"columns 0 to {count - 1} in order", remedy="make them with mesh_elements",
+        )  # fmt: skip
 
 
 def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
@@ -337,6 +347,13 @@ def gear_set_springs(data: RigidSet, *, mesh_stiffness=None) -> dict[str, tuple[
     return springs
 
 
+def support_diagonal(data: RigidSet) -> np.ndarray:
+    """Finite stiffnesses (N + 3, axes) of the supports in all coordinates, zero of the planets [N/m]."""
+    diagonal = np.zeros((data.n_planets + 3, len(data.axes)))
+    diagonal[:3] = data.support_stiffness / _arcs(data)[:3] ** 2
+    return np.where(np.isfinite(diagonal), diagonal, 0.0)
+
+
 def _by_direction(data: RigidSet, name: str, columns: np.ndarray, stiffness: np.ndarray) -> dict:
     """Springs by the directions of the kind of set that are finite and not zero."""
     there = np.isfinite(stiffness) & (stiffness > 0.0)
@@ -420,11 +437,10 @@ def _gyroscopic(along: np.ndarray) -> np.ndarray:
 
 def _linear_stiffness(data: RigidSet, bearings: Sequence[str]) -> np.ndarray:
     """Supports and planet bearings that are finite and not columns."""
-    diagonal = np.zeros((data.n_planets + 3, len(data.axes)))
-    diagonal[:3] = data.support_stiffness / _arcs(data)[:3] ** 2
+    diagonal = support_diagonal(data)
     for name in set(bearings) & set(CENTRAL):
         diagonal[CENTRAL.index(name), :2] = 0.0
-    K = np.diag(np.where(np.isfinite(diagonal), diagonal, 0.0).ravel())
+    K = np.diag(diagonal.ravel())
     if "planets" not in bearings:
         pins = pin_directions(data)
         K += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())

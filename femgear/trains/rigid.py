@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
     from femgear.system.rigid_bodies import PlanarTorque, RigidSet
     from femgear.system.system import Modes
-    from femgear.trains.static.results import StaticResult
+
+Entry = TypeVar("Entry")
 
 
 def listed(names: list[str]) -> str:
@@ -111,14 +112,11 @@ def check_one_period(case: RigidCase, gears: PlanetarySet, kind: str) -> None:
         )
 
 
-def needed_static(static: StaticResult | None) -> StaticResult:
-    """The static solution, which a case without given mesh stiffness cannot do without (E-STAGE)."""
-    if static is None:
-        raise CaseError(
-            "the mesh stiffness of this case is that of its static solution", code="E-STAGE",
-            remedy="solve the static stage first, or give mesh_stiffness",
-        )  # fmt: skip
-    return static
+def needed(entry: Entry | None, name: str) -> Entry:
+    """What a stage cannot do without: an entry, or the result of a stage before it (E-KEY-MISSING)."""
+    if entry is None:
+        raise CaseError(f"{name} is needed here", code="E-KEY-MISSING", key=name)
+    return entry
 
 
 def torsional_support(case: RigidCase, member: str, given: float | None) -> float:

@@ -363,7 +363,7 @@ FIGURES = {
     "": STATIC[""],
     # static.nc holds the spur gears of the transverse section: nobody makes them, their set is not drawn
     "static": Figures(
-        STATIC["static"].captions
+        dict(STATIC["static"].captions)
         | {
             "helical_mesh_stiffness": (
                 "Stiffness and static transmission error of the meshes of planet 1 along the transverse "

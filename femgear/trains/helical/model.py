@@ -27,8 +27,9 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears import involute
+from femgear.solvers.linear.frequency_response import MeshErrorResponse
 from femgear.solvers.linear.modal import residual_output, solve_modes, viscous_damping
-from femgear.system.assembler import gear_set_system, mesh_elements
+from femgear.system.assembler import check_mesh_columns, gear_set_system, mesh_elements
 from femgear.system.elements import GearMeshes
 from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis
 from femgear.system.rigid_bodies import (
@@ -277,27 +278,12 @@ def helical_problem(
         A load that accelerates the set (E-LOAD-BALANCE), arrays that do not fit (E-SHAPE).
     """
     meshes = mesh_elements(data) if meshes is None else meshes
-    columns = np.arange(2 * data.n_planets * data.slices)
-    if not np.array_equal(meshes.columns[:, 0], columns):
-        raise CaseError(
-            f"meshes on columns {meshes.columns[:, 0].tolist()}", code="E-SHAPE", key="meshes",
-            limit=f"columns 0 to {len(columns) - 1} in order", remedy="make them with mesh_elements",
-        )  # fmt: skip
+    check_mesh_columns(data, meshes)
     system = gear_set_system(data, torque=torque)
     reference = NonlinearSystem(system, (meshes,)).reference
     # refuses a load that nothing takes up before a solver drifts away with it
     solve_modes(system, reference)
     return NonlinearSystem(replace(system, C=viscous_damping(system, reference, damping)), (meshes,))
-
-
-def contact_line_width(face_width: float, base_helix_angle: float) -> float:
-    """``b / cos beta_b`` [m]: face width of the spur gear of the normal section whose record is sliced.
-
-    Its teeth are as long as the contact lines of the helical gear. With the stiffness c' per length along
-    the tooth normals, the mesh has ``c' b / cos beta_b`` along the normal, hence ``c' b cos beta_b`` in the
-    transverse section, as ISO 6336-1, method B, has it.
-    """
-    return face_width / math.cos(base_helix_angle)
 
 
 def helical_excitation(
@@ -316,9 +302,11 @@ def helical_excitation(
     Parameters
     ----------
     record : MeshExcitation or MeshCycle
-        Of the spur gears of the normal section with the face width `contact_line_width`, all of it loaded as
-        the whole helical mesh; stiffnesses and deflections along the tooth normals. Mesh phases are those at
-        mid-face. A `femgear.contact.cycle.MeshCycle` knows no backlash, which is then zero.
+        Of the spur gears of the normal section, all of it loaded as the whole helical mesh; stiffnesses and
+        deflections along the tooth normals. Their teeth are as long as the contact lines, so that the face
+        width is ``b / cos beta_b`` (ISO 6336-1, method B: ``c' b cos beta_b`` in the transverse section).
+        Mesh phases are those at mid-face. A `femgear.contact.cycle.MeshCycle` knows no backlash, which is
+        then zero.
     overlap_ratio : float or (n_meshes,) array
         eps_beta, 0 or more.
     slices : int
@@ -445,32 +433,9 @@ def helical_modes(
     )
 
 
-@dataclass(frozen=True)
-class ErrorResponse:
-    """Response of several cases to transmission errors on harmonics of the mesh frequency.
-
-    Parameters
-    ----------
-    mesh_frequency : (F,) array
-        [Hz]
-    harmonics : (H,) int array
-    deflection : (n_cases, F, H, n_columns) complex array
-        ``W^T q`` [m]: the dynamic transmission error of every mesh or slice.
-    force : (n_cases, F, H, n_columns) complex array
-        Dynamic mesh force ``k (W^T q - e)`` [N].
-    output : (n_cases, F, H, n_outputs) complex array
-    """
-
-    mesh_frequency: np.ndarray
-    harmonics: np.ndarray
-    deflection: np.ndarray
-    force: np.ndarray
-    output: np.ndarray
-
-
 def modal_error_response(
     system: MechanicalSystem, modes: Modes, mesh_frequency, error, *, harmonics=None, outputs=None
-) -> ErrorResponse:
+) -> MeshErrorResponse:
     """Response to transmission errors ``e_j(t) = Re sum_h error_jh exp(i h omega_m t)`` by summing modes.
 
     ``q = sum phi (phi^T W k e) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega)``, with the static
@@ -493,6 +458,12 @@ def modal_error_response(
         Whole numbers from 1; 1 to H when not given.
     outputs : (n_outputs, n) array, optional
         ``L``, such as the rows of `spring_loads`; none when not given.
+
+    Returns
+    -------
+    MeshErrorResponse
+        With a first axis of the cases: deflection and force (n_cases, F, H, n_columns), output (n_cases, F,
+        H, n_outputs).
 
     Raises
     ------
@@ -521,7 +492,7 @@ def modal_error_response(
         answer[:, :, h] = (gain[:, h] * modal[:, None, h]) @ left.T + static[:, None, h]
     deflection, output = answer[..., : len(k)], answer[..., len(k) :]
     force = k * (deflection - error.transpose(0, 2, 1)[:, None])
-    return ErrorResponse(frequency, harmonics, deflection, force, output)
+    return MeshErrorResponse(frequency, harmonics, deflection, force, output)
 
 
 def phased_errors(amplitudes, phases) -> np.ndarray:
@@ -546,7 +517,7 @@ def spring_loads(springs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[
     ----------
     springs : mapping of str to (columns (n, g), stiffness (g,))
         From `femgear.system.assembler.gear_set_springs`; those of meshes give ``k W^T q``
-        without the transmission error, whose force is in `ErrorResponse.force`.
+        without the transmission error, whose force is in `MeshErrorResponse.force`.
 
     Returns
     -------

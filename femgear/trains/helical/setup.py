@@ -18,7 +18,7 @@ from femgear.errors import CaseError, ConvergenceError, GeometryError
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
 from femgear.trains.helical.section import HelicalCase
-from femgear.trains.rigid import check_one_period, driving_torque, mesh_stiffnesses, torsional_support
+from femgear.trains.rigid import check_one_period, driving_torque, mesh_stiffnesses, needed, torsional_support
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -53,9 +53,8 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
     for name, one in (("sun", case.sun), ("ring", helical.ring), ("carrier", case.carrier)):
         space = getattr(helical, name)
         torsional = torsional_support(case, name, space.torsional_stiffness)
-        support = HelicalSupport(
-            one.support_stiffness, space.axial_stiffness, space.tilt_stiffness, torsional
-        )
+        radial = needed(one.support_stiffness, f"{name}.support_stiffness")
+        support = HelicalSupport(radial, space.axial_stiffness, space.tilt_stiffness, torsional)
         bodies[name] = HelicalBody(one.mass, one.inertia, space.diametral_inertia, support)
     pin = helical.planet
     return helical_from_set(

@@ -39,7 +39,7 @@ from femgear.trains.rigid import (
     driving_torque,
     member_speeds,
     modes_verdict,
-    needed_static,
+    needed,
     rotation_sense,
 )
 from femgear.trains.static import stages as static_stages
@@ -102,7 +102,7 @@ def solve_helical_modes(
     check_helical_case(case, gears)
     excitation, whole = None, None
     if case.helical.mesh_stiffness is None:
-        static = needed_static(static)
+        static = needed(static, "static")
         check_entries(static.entries, static_entries(_drive_flanks(case)), "static solution")
         factor = np.ones(2)
         if case.helical.section == "normal":

@@ -11,7 +11,7 @@ import numpy as np
 from femgear.errors import CaseError, ConvergenceError
 from femgear.storage.dataset import RPM
 from femgear.trains.planar.section import PlanarCase
-from femgear.trains.rigid import check_one_period
+from femgear.trains.rigid import check_one_period, needed
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -101,7 +101,7 @@ def check_branch_damping(case: PlanarCase, model: PlanarModel) -> None:
     CaseError
         E-RESONANCE.
     """
-    wanted = case.planar.branch
+    wanted = needed(case.planar.branch, "planar.branch")
     bare = _undamped(case, model)
     bare = bare[(bare >= wanted.start) & (bare <= wanted.to)]
     if len(bare):

@@ -286,7 +286,7 @@ def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
     turn, wave = _carrier_turn(response, speed)
     mesh, carrier = float(response["mesh_frequency"][speed]), _carrier_frequency(response, speed)
     near = turn * mesh / carrier <= 6.0 if carrier else np.ones(len(turn), bool)
-    panels = [(slice(None), "one turn of the carrier")]
+    panels: list[tuple] = [(slice(None), "one turn of the carrier")]
     if response.attrs["mesh_lines"]:
         panels.append((near, "six mesh periods"))
     pair = (0, len(names) // 2)

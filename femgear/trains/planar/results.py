@@ -557,19 +557,18 @@ def _kind_of_lines(data: xr.Dataset) -> str:
 
 def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
     """Natural frequencies that the case calls published, beside the nearest mode of the kind."""
-    planar = case.planar
-    entries = [one for one in planar.published if one.frequency is not None] if planar else []
+    entries = [(one, one.frequency) for one in case.planar.published if one.frequency is not None]
     if not entries:
         return None
     kinds, found = np.array([str(kind) for kind in data["kind"].values]), data["frequency"].values
     rows = []
-    for one in entries:
+    for one, hertz in entries:
         same = found[kinds == one.kind]
-        near = same[np.argmin(np.abs(same - one.frequency))] if len(same) else np.nan
-        difference = f"{100 * (near / one.frequency - 1):+.2f}" if len(same) else "-"
-        rows.append(
-            (one.kind, f"{one.frequency:.6g}", f"{near:.6g}" if len(same) else "none", difference, one.source)
-        )
+        near, difference = "none", "-"
+        if len(same):
+            nearest = same[np.argmin(np.abs(same - hertz))]
+            near, difference = f"{nearest:.6g}", f"{100 * (nearest / hertz - 1):+.2f}"
+        rows.append((one.kind, f"{hertz:.6g}", near, difference, one.source))
     header = ("kind", "published [Hz]", "nearest here [Hz]", "difference [%]", "source")
     return Block("Published natural frequencies", header, tuple(rows))
 

@@ -42,7 +42,7 @@ from femgear.trains.rigid import (
     member_speeds,
     mesh_stiffnesses,
     modes_verdict,
-    needed_static,
+    needed,
     rotation_sense,
     torsional_support,
 )
@@ -107,7 +107,7 @@ def solve_branch(
     """
     from femgear.trains.planar.model import judged_branch, motion_lines, weight_curve
 
-    gears, wanted = planetary_set(case), case.planar.branch
+    gears, wanted = planetary_set(case), needed(case.planar.branch, "planar.branch")
     check_planar_case(case, gears)
     model = planar_model(case, gears, static)
     check_smoothing(case, gears, model)
@@ -122,12 +122,10 @@ def solve_branch(
     )
     branch, lines = bounded_branch(branch, (motion_lines(model, one) for one in branch.solutions), gears)
     if wanted.stability:
-        steps = (
-            None
-            if progress is None
-            else lambda done, total: progress("branch", 0.3 * total + 0.7 * done, total)
+        tell = progress or (lambda stage, done, total: None)
+        branch = judged_branch(
+            model.problem, branch, lambda done, total: tell("branch", 0.3 * total + 0.7 * done, total)
         )
-        branch = judged_branch(model.problem, branch, progress=steps)
     ending = end_of_branch(branch, wanted)
     return BranchResult(gears, model, branch, lines, carrier_sense(case, gears), ending)
 
@@ -189,9 +187,10 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
     planar, bodies = case.planar, {}
     for name, one in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
         torsional = torsional_support(case, name, getattr(planar.torsion, name))
-        bodies[name] = PlanarBody(one.mass, one.inertia, one.support_stiffness, torsional)
+        support = needed(one.support_stiffness, f"{name}.support_stiffness")
+        bodies[name] = PlanarBody(one.mass, one.inertia, support, torsional)
     given = planar.mesh_stiffness
-    mean = needed_static(static).cycle.stiffness.mean(axis=1) if given is None else None
+    mean = needed(static, "static").cycle.stiffness.mean(axis=1) if given is None else None
     return planar_from_set(
         gears,
         **bodies,
@@ -282,7 +281,7 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
         backlash = np.where(play > 0.0, play, np.inf)
     if planar.mesh_stiffness is not None:
         return mesh_elements(data, backlash=backlash, smoothing=planar.smoothing)
-    cycle = needed_static(static).cycle
+    cycle = needed(static, "static").cycle
     if not varying:
         stiffness, deflection, force = (
             getattr(cycle, name).mean(axis=1) for name in ("stiffness", "deflection", "force")
@@ -325,7 +324,7 @@ def _response_lines(case: PlanarCase, gears: PlanetarySet, static: StaticResult 
     frequency where the mesh stiffness is constant."""
     from femgear.system.fourier import side_bands
 
-    wanted = case.planar.response
+    wanted = needed(case.planar.response, "planar.response")
     turns = case.planar.gravity is not None and carrier_sense(case, gears) != 0
     carrier, bands = (wanted.carrier_harmonics, wanted.side_bands) if turns else (0, 0)
     mesh = case.response_harmonics if case.planar.mesh_stiffness is None else 0
