@@ -350,35 +350,16 @@ class HelicalBody:
         return [self.mass, self.mass, self.mass, diametral, diametral, polar]
 
 
-def planar_from_set(
-    planetary_set: PlanetarySet,
-    *,
-    sun: PlanarBody,
-    ring: PlanarBody,
-    carrier: PlanarBody,
-    planet: PlanarBody,
-    stiffness_sun_planet,
-    stiffness_planet_ring,
-    planet_bearing,
-) -> PlanarSet:
-    """Lumped set with the base radii, working pressure angles and planet angles of a geared one.
+def planar_from_set(planetary_set: PlanetarySet, **data: Any) -> PlanarSet:
+    """Make a planar set with the base radii, working pressure angles and planet angles of a geared one.
 
     Parameters
     ----------
     planetary_set : PlanetarySet
-    sun, ring, carrier, planet, stiffness_sun_planet, stiffness_planet_ring, planet_bearing
-        See `PlanarSet`.
+    **data
+        Bodies, mesh stiffnesses and planet bearing of `PlanarSet`.
     """
-    return PlanarSet(
-        sun=sun,
-        ring=ring,
-        carrier=carrier,
-        planet=planet,
-        stiffness_sun_planet=stiffness_sun_planet,
-        stiffness_planet_ring=stiffness_planet_ring,
-        planet_bearing=planet_bearing,
-        **gear_geometry(planetary_set),
-    )
+    return PlanarSet(**data, **gear_geometry(planetary_set))
 
 
 def gear_geometry(s: PlanetarySet) -> dict[str, Any]:

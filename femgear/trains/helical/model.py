@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -34,7 +34,6 @@ from femgear.system.elements import GearMeshes
 from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis
 from femgear.system.rigid_bodies import (
     ContactLines,
-    HelicalBody,
     HelicalSupport,
     PlanarTorque,
     RigidSet,
@@ -140,47 +139,8 @@ class HelicalSet(RigidSet):
         return np.repeat(np.asarray(values), self.slices, axis=0)
 
 
-def reduced_body(
-    radius: float, *, mass: float, polar: float, diametral: float, support: HelicalSupport | None = None
-) -> HelicalBody:
-    """Body from data on ``u = r theta`` and ``w = r phi``, as Kahraman (1994, Table 3) prints them.
-
-    Parameters
-    ----------
-    radius : float
-        r [m]: base radius of a gear, radius of the circle of planet centres for the carrier.
-    mass, polar, diametral : float
-        m, J / r^2 and I / r^2 [kg].
-    support : HelicalSupport, optional
-        In SI, see `reduced_support`.
-    """
-    support = HelicalSupport() if support is None else support
-    return HelicalBody(mass, polar * radius**2, diametral * radius**2, support)
-
-
-def reduced_support(
-    radius: float, *, radial: float = 0.0, axial: float = 0.0, tilt: float = 0.0, torsional: float = 0.0
-) -> HelicalSupport:
-    """Support from stiffnesses on translations, ``w = r phi`` and ``u = r theta``, all [N/m]."""
-    return HelicalSupport(radial, axial, tilt * radius**2, torsional * radius**2)
-
-
-def helical_from_set(
-    planetary_set: PlanetarySet,
-    *,
-    helix_angle: float,
-    sun: HelicalBody,
-    ring: HelicalBody,
-    carrier: HelicalBody,
-    planet: HelicalBody,
-    stiffness_sun_planet,
-    stiffness_planet_ring,
-    planet_bearing: HelicalSupport,
-    contact_points: str = "pitch_point",
-    slices: int = 1,
-    face_width: float = 0.0,
-) -> HelicalSet:
-    """Helical set with the radii and angles of a geared one.
+def helical_from_set(planetary_set: PlanetarySet, *, helix_angle: float, **data: Any) -> HelicalSet:
+    """Make a helical set with the radii and angles of a geared one.
 
     Parameters
     ----------
@@ -189,25 +149,11 @@ def helical_from_set(
     helix_angle : float
         beta at the reference circle [rad], positive for a right-handed sun; ``tan beta_b = tan beta cos
         alpha_t`` (ISO 21771, section 4.2.6).
-    sun, ring, carrier, planet, stiffness_sun_planet, stiffness_planet_ring, planet_bearing
-        See `HelicalSet`.
-    contact_points, slices, face_width
-        See `HelicalSet`.
+    **data
+        Bodies, stiffnesses, bearing, contact points and slices of `HelicalSet`.
     """
-    return HelicalSet(
-        sun=sun,
-        ring=ring,
-        carrier=carrier,
-        planet=planet,
-        base_helix_angle=math.atan(math.tan(helix_angle) * math.cos(planetary_set.sun.pressure_angle)),
-        stiffness_sun_planet=stiffness_sun_planet,
-        stiffness_planet_ring=stiffness_planet_ring,
-        planet_bearing=planet_bearing,
-        contact_points=contact_points,
-        slices=slices,
-        face_width=face_width,
-        **gear_geometry(planetary_set),
-    )
+    base = math.atan(math.tan(helix_angle) * math.cos(planetary_set.sun.pressure_angle))
+    return HelicalSet(base_helix_angle=base, **data, **gear_geometry(planetary_set))
 
 
 def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_width: float) -> np.ndarray:

@@ -65,9 +65,43 @@ class HelicalModesResult:
     whole: MeshExcitation | None = None
 
     def dataset(self) -> xr.Dataset:
-        """Contents of modes.nc."""
+        """Contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
+        from femgear.system.assembler import free_motions
 
-        return helical_modes_dataset(self)
+        modes, data = self.modes, self.data
+        meshes = (2 * data.n_planets, data.slices)
+        deflection = modes.mesh_deflection.reshape(*meshes, -1).mean(axis=1)
+        variables, coords = modes_entries(data, modes, free_motions(data), AXES, self.phasing)
+        variables |= {
+            "mesh_stiffness": (
+                ("mesh",), modes.mesh_stiffness.reshape(meshes).sum(axis=1), "N/m",
+                "mean mesh stiffness along the tooth normals",
+            ),
+            "mesh_deflection": (
+                ("mesh", "mode"), deflection, "kg^-1/2",
+                "mesh deflection of the mode along the tooth normals",
+            ),
+        }  # fmt: skip
+        coords = _coordinates(self) | coords
+        if self.whole is not None:
+            along, whole = np.cos(data.base_helix_angle), self.whole
+            where = ("mesh", "position")
+            variables["helical_stiffness"] = (
+                where, whole.stiffness * along**2, "N/m",
+                "mesh stiffness along the transverse line of action",
+            )  # fmt: skip
+            variables["helical_ste"] = (
+                where, whole.deflection / along, "m",
+                "static transmission error along the transverse line of action, centres fixed",
+            )  # fmt: skip
+            position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
+            coords["position"] = (("position",), position, "1", "position in mesh periods")
+        return dataset(
+            variables,
+            coords=coords,
+            attrs={"title": "modes of the helical set at standstill", "unknowns": len(modes.shape)}
+            | _attributes(self),
+        )
 
 
 @dataclass(frozen=True)
@@ -86,91 +120,47 @@ class HelicalDynamicsResult:
     loads: dict[str, np.ndarray]
 
     def dataset(self) -> xr.Dataset:
-        """Contents of dynamics.nc."""
-
-        return helical_dynamics_dataset(self)
-
-
-def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
-    """Contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
-    from femgear.system.assembler import free_motions
-
-    modes, data = result.modes, result.data
-    meshes = (2 * data.n_planets, data.slices)
-    deflection = modes.mesh_deflection.reshape(*meshes, -1).mean(axis=1)
-    variables, coords = modes_entries(data, modes, free_motions(data), AXES, result.phasing)
-    variables |= {
-        "mesh_stiffness": (
-            ("mesh",), modes.mesh_stiffness.reshape(meshes).sum(axis=1), "N/m",
-            "mean mesh stiffness along the tooth normals",
-        ),
-        "mesh_deflection": (
-            ("mesh", "mode"), deflection, "kg^-1/2", "mesh deflection of the mode along the tooth normals",
-        ),
-    }  # fmt: skip
-    coords = _coordinates(result) | coords
-    if result.whole is not None:
-        along, whole = np.cos(data.base_helix_angle), result.whole
-        where = ("mesh", "position")
-        variables["helical_stiffness"] = (
-            where, whole.stiffness * along**2, "N/m", "mesh stiffness along the transverse line of action",
+        """Contents of dynamics.nc of a helical case."""
+        response, basis, lines = self.response, self.modes, ("speed", "mesh", "harmonic")
+        data = basis.data
+        whole = (len(response.mesh_frequency), 2 * data.n_planets, data.slices, -1)
+        force, deflection = response.force.reshape(whole), response.deflection.reshape(whole)
+        pin, support = self.loads["pin"], self.loads["support"]
+        along = np.cos(data.base_helix_angle)
+        on_planet, on_member = (
+            ("speed", "planet", "direction", "harmonic"),
+            ("speed", "member", "axis", "harmonic"),
+        )
+        entries = (
+            (
+                "dte", lines, deflection.mean(axis=2) / along, "m",
+                "dynamic transmission error along the transverse line of action at mid-face",
+            ),
+            ("mesh_force", lines, force.sum(axis=2), "N", "dynamic mesh force along the tooth normals"),
+            (
+                "mesh_deflection", lines, deflection.mean(axis=2), "m",
+                "deflection of the mesh spring along the tooth normals at mid-face",
+            ),
+            (
+                "slice_force", ("speed", "mesh", "slice", "harmonic"), force, "N",
+                "dynamic force of a slice along the tooth normals",
+            ),
+            ("pin_force", on_planet, pin[:, :, :3], "N", "force of the pin on the planet"),
+            ("pin_moment", on_planet, pin[:, :, 3:], "N m", "moment of the pin on the planet"),
+            ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),
+            ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
         )  # fmt: skip
-        variables["helical_ste"] = (
-            where, whole.deflection / along, "m",
-            "static transmission error along the transverse line of action, centres fixed",
-        )  # fmt: skip
-        position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
-        coords["position"] = (("position",), position, "1", "position in mesh periods")
-    return dataset(
-        variables,
-        coords=coords,
-        attrs={"title": "modes of the helical set at standstill", "unknowns": len(modes.shape)}
-        | _attributes(result),
-    )
-
-
-def helical_dynamics_dataset(result: HelicalDynamicsResult) -> xr.Dataset:
-    """Contents of dynamics.nc of a helical case."""
-    response, basis, lines = result.response, result.modes, ("speed", "mesh", "harmonic")
-    data = basis.data
-    whole = (len(response.mesh_frequency), 2 * data.n_planets, data.slices, -1)
-    force, deflection = response.force.reshape(whole), response.deflection.reshape(whole)
-    pin, support = result.loads["pin"], result.loads["support"]
-    along = np.cos(data.base_helix_angle)
-    on_planet, on_member = (
-        ("speed", "planet", "direction", "harmonic"),
-        ("speed", "member", "axis", "harmonic"),
-    )
-    entries = (
-        (
-            "dte", lines, deflection.mean(axis=2) / along, "m",
-            "dynamic transmission error along the transverse line of action at mid-face",
-        ),
-        ("mesh_force", lines, force.sum(axis=2), "N", "dynamic mesh force along the tooth normals"),
-        (
-            "mesh_deflection", lines, deflection.mean(axis=2), "m",
-            "deflection of the mesh spring along the tooth normals at mid-face",
-        ),
-        (
-            "slice_force", ("speed", "mesh", "slice", "harmonic"), force, "N",
-            "dynamic force of a slice along the tooth normals",
-        ),
-        ("pin_force", on_planet, pin[:, :, :3], "N", "force of the pin on the planet"),
-        ("pin_moment", on_planet, pin[:, :, 3:], "N m", "moment of the pin on the planet"),
-        ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),
-        ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
-    )  # fmt: skip
-    return dataset(
-        response_entries(result) | complex_entries(entries),
-        coords=_coordinates(basis) | _lines(result),
-        attrs={
-            "title": "periodic response of the helical set by the spectral method",
-            "message": response.message,
-            "ring_teeth": basis.planetary_set.ring.teeth,
-            "fourier_convention": FOURIER,
-        }
-        | _attributes(basis),
-    )
+        return dataset(
+            response_entries(self) | complex_entries(entries),
+            coords=_coordinates(basis) | _lines(self),
+            attrs={
+                "title": "periodic response of the helical set by the spectral method",
+                "message": response.message,
+                "ring_teeth": basis.planetary_set.ring.teeth,
+                "fourier_convention": FOURIER,
+            }
+            | _attributes(basis),
+        )
 
 
 def _lines(result: HelicalDynamicsResult) -> dict[str, tuple]:

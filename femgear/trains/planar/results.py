@@ -49,6 +49,15 @@ _STABLE = {1: "yes", 0: "no", -1: "not known"}
 
 _BODIES = ("", "mass [kg]", "inertia [kg m^2]", "support [N/m]", "torsional support [N m/rad]")
 
+# what is known of a solution at every speed
+_OF_SOLUTIONS = {
+    "converged": "whether the solution satisfies its tolerance",
+    "iterations": "iterations of Newton's method",
+    "residual": "relative residual of the harmonic equations",
+    "tail": "share of the amplitude in the upper half of the lines",
+    "spectral_radius": "spectral radius of the fixed point",
+}
+
 # pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces
 _BY_STABILITY = ("weight_response", "tooth_contact")
 _OF_RESPONSE = (
@@ -68,9 +77,27 @@ class PlanarModesResult:
     modes: Modes
 
     def dataset(self) -> xr.Dataset:
-        """Contents of modes.nc."""
+        """Contents of modes.nc of a planar case: axes and rotations of all bodies, no elastic ring."""
+        from femgear.system.assembler import free_motions
 
-        return planar_modes_dataset(self)
+        modes, gears = self.modes, self.planetary_set
+        n, axes = 2 * gears.n_planets, ("x", "y", "rotation")
+        variables, coords = modes_entries(self.data, modes, free_motions(self.data), axes)
+        variables |= {
+            "mesh_stiffness": (("mesh",), modes.mesh_stiffness[:n], "N/m", "mean mesh stiffness"),
+            "mesh_deflection": (
+                ("mesh", "mode"), modes.mesh_deflection[:n], "kg^-1/2", "mesh deflection of the mode",
+            ),
+        }  # fmt: skip
+        return dataset(
+            variables,
+            coords=coords | {"mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh")},
+            attrs={
+                "title": "modes of the planar set at standstill, bearings closed, back flanks open",
+                "unknowns": len(modes.shape),
+                "planet_angles": np.asarray(gears.planet_angles),
+            },
+        )
 
 
 @dataclass(frozen=True)
@@ -86,8 +113,43 @@ class BranchResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of branch.nc."""
-
-        return branch_dataset(self)
+        branch, point = self.branch, ("point",)
+        hertz = branch.parameter / (2.0 * np.pi)
+        known = len(branch.verdicts) > 0
+        folds, crossings = np.zeros((2, len(hertz)), bool)
+        folds[branch.folds], crossings[branch.branch_points] = True, True
+        carrier = self.sense * branch.parameter
+        stable = np.array([_state(one) for one in branch.verdicts] if known else [-1] * len(hertz))
+        variables = {
+            "weight_frequency": (point, hertz, "Hz", "frequency of the weight in the carrier frame"),
+            "carrier_speed": (point, carrier, "rad/s", "speed of the carrier, counter-clockwise positive"),
+            "fold": (point, folds, "1", "whether the point is a limit point"),
+            "branch_point": (point, crossings, "1", "whether another branch crosses"),
+            "tail": (point, branch.tail, "1", "share of the amplitude in the upper half of the harmonics"),
+            "spectral_radius": (point, branch.spectral_radius, "1", "spectral radius of the fixed point"),
+            "residual": (point, branch.residual, "1", "relative residual of the harmonic equations"),
+            "converged": (point, branch.converged, "1", "whether the solution satisfies its tolerance"),
+        }  # fmt: skip
+        variables |= _stability(branch, stable) | _flank_forces(self, stable)
+        variables |= _motions(self.lines, "point", "harmonic")
+        coords = _coordinates(self.planetary_set) | {
+            "point": (point, np.arange(len(hertz)), "1", "point along the branch"),
+            "harmonic": (("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
+            "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
+        }
+        data = dataset(
+            variables,
+            coords=coords,
+            attrs={
+                "title": "periodic responses to the weight",
+                "message": self.ending,
+                "complete": int(branch.complete),
+                "stability": "Floquet multipliers" if known else "not computed",
+                "fourier_convention": FOURIER,
+            },
+        )
+        data["stable"].attrs |= {"flag_values": [1, 0, -1], "flag_meanings": "stable not_stable not_known"}
+        return data
 
 
 @dataclass(frozen=True)
@@ -102,73 +164,40 @@ class PlanarResponseResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of response.nc."""
-
-        return response_dataset(self)
-
-
-def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
-    """Contents of modes.nc of a planar case: axes and rotations of all bodies, no elastic ring."""
-    from femgear.system.assembler import free_motions
-
-    modes, gears = result.modes, result.planetary_set
-    n, axes = 2 * gears.n_planets, ("x", "y", "rotation")
-    variables, coords = modes_entries(result.data, modes, free_motions(result.data), axes)
-    variables |= {
-        "mesh_stiffness": (("mesh",), modes.mesh_stiffness[:n], "N/m", "mean mesh stiffness"),
-        "mesh_deflection": (
-            ("mesh", "mode"), modes.mesh_deflection[:n], "kg^-1/2", "mesh deflection of the mode",
-        ),
-    }  # fmt: skip
-    return dataset(
-        variables,
-        coords=coords | {"mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh")},
-        attrs={
-            "title": "modes of the planar set at standstill, bearings closed, back flanks open",
-            "unknowns": len(modes.shape),
-            "planet_angles": np.asarray(gears.planet_angles),
-        },
-    )
-
-
-def branch_dataset(result: BranchResult) -> xr.Dataset:
-    """Contents of branch.nc."""
-    branch, point = result.branch, ("point",)
-    hertz = branch.parameter / (2.0 * np.pi)
-    known = len(branch.verdicts) > 0
-    folds, crossings = np.zeros((2, len(hertz)), bool)
-    folds[branch.folds], crossings[branch.branch_points] = True, True
-    carrier = result.sense * branch.parameter
-    stable = np.array([_state(one) for one in branch.verdicts] if known else [-1] * len(hertz))
-    variables = {
-        "weight_frequency": (point, hertz, "Hz", "frequency of the weight in the carrier frame"),
-        "carrier_speed": (point, carrier, "rad/s", "speed of the carrier, counter-clockwise positive"),
-        "fold": (point, folds, "1", "whether the point is a limit point"),
-        "branch_point": (point, crossings, "1", "whether another branch crosses"),
-        "tail": (point, branch.tail, "1", "share of the amplitude in the upper half of the harmonics"),
-        "spectral_radius": (point, branch.spectral_radius, "1", "spectral radius of the fixed point"),
-        "residual": (point, branch.residual, "1", "relative residual of the harmonic equations"),
-        "converged": (point, branch.converged, "1", "whether the solution satisfies its tolerance"),
-    }  # fmt: skip
-    variables |= _stability(branch, stable) | _flank_forces(result, stable)
-    variables |= _motions(result.lines, "point", "harmonic")
-    coords = _coordinates(result.planetary_set) | {
-        "point": (point, np.arange(len(hertz)), "1", "point along the branch"),
-        "harmonic": (("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
-        "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
-    }
-    data = dataset(
-        variables,
-        coords=coords,
-        attrs={
-            "title": "periodic responses to the weight",
-            "message": result.ending,
-            "complete": int(branch.complete),
-            "stability": "Floquet multipliers" if known else "not computed",
-            "fourier_convention": FOURIER,
-        },
-    )
-    data["stable"].attrs |= {"flag_values": [1, 0, -1], "flag_meanings": "stable not_stable not_known"}
-    return data
+        found, speed = self.solutions, ("speed",)
+        mesh = [one.mesh_frequency for one in self.speeds]
+        variables = {
+            "carrier_speed": (
+                speed, [one.carrier for one in self.speeds], "rad/s",
+                "speed of the carrier, counter-clockwise positive",
+            ),
+            "mesh_frequency": (speed, mesh, "Hz", "mesh frequency"),
+            "frequency": (
+                ("speed", "line"), [one.line_frequency / (2 * np.pi) for one in found], "Hz",
+                "frequency of the line in the carrier frame",
+            ),
+        }  # fmt: skip
+        variables |= {
+            name: (speed, [getattr(one, name) for one in found], "1", text)
+            for name, text in _OF_SOLUTIONS.items()
+        }
+        variables |= _motions(self.lines, "speed", "line")
+        orders, line = found[0].orders, ("line",)
+        coords = _coordinates(self.planetary_set) | {
+            "speed": (speed, self.input_speed / RPM, "rpm", "speed of the input"),
+            "carrier_order": (line, orders[:, 0], "1", "multiple of the carrier's frequency"),
+            "mesh_order": (line, orders[:, 1], "1", "multiple of the mesh frequency"),
+        }
+        return dataset(
+            variables,
+            coords=coords,
+            attrs={
+                "title": "responses to weight and mesh frequency together",
+                "message": " ".join(dict.fromkeys(one.message for one in found)),
+                "mesh_lines": int(np.any(orders[:, 1] != 0)),
+                "fourier_convention": FOURIER,
+            },
+        )
 
 
 def _stability(branch: Branch, stable: np.ndarray) -> dict[str, tuple]:
@@ -222,53 +251,6 @@ def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
 def _nearest(verdict: FloquetVerdict) -> float:
     return (
         float(np.abs(verdict.multipliers - 1.0).min(initial=np.inf)) if len(verdict.multipliers) else np.nan
-    )
-
-
-def response_dataset(result: PlanarResponseResult) -> xr.Dataset:
-    """Contents of response.nc."""
-    found, speed = result.solutions, ("speed",)
-    mesh = [one.mesh_frequency for one in result.speeds]
-    variables = {
-        "carrier_speed": (
-            speed, [one.carrier for one in result.speeds], "rad/s",
-            "speed of the carrier, counter-clockwise positive",
-        ),
-        "mesh_frequency": (speed, mesh, "Hz", "mesh frequency"),
-        "frequency": (
-            ("speed", "line"), [one.line_frequency / (2 * np.pi) for one in found], "Hz",
-            "frequency of the line in the carrier frame",
-        ),
-        "converged": (
-            speed, [one.converged for one in found], "1", "whether the solution satisfies its tolerance",
-        ),
-        "iterations": (speed, [one.iterations for one in found], "1", "iterations of Newton's method"),
-        "residual": (
-            speed, [one.residual for one in found], "1", "relative residual of the harmonic equations",
-        ),
-        "tail": (
-            speed, [one.tail for one in found], "1", "share of the amplitude in the upper half of the lines",
-        ),
-        "spectral_radius": (
-            speed, [one.spectral_radius for one in found], "1", "spectral radius of the fixed point",
-        ),
-    }  # fmt: skip
-    variables |= _motions(result.lines, "speed", "line")
-    orders, line = found[0].orders, ("line",)
-    coords = _coordinates(result.planetary_set) | {
-        "speed": (speed, result.input_speed / RPM, "rpm", "speed of the input"),
-        "carrier_order": (line, orders[:, 0], "1", "multiple of the carrier's frequency"),
-        "mesh_order": (line, orders[:, 1], "1", "multiple of the mesh frequency"),
-    }
-    return dataset(
-        variables,
-        coords=coords,
-        attrs={
-            "title": "responses to weight and mesh frequency together",
-            "message": " ".join(dict.fromkeys(one.message for one in found)),
-            "mesh_lines": int(np.any(orders[:, 1] != 0)),
-            "fourier_convention": FOURIER,
-        },
     )
 
 
