@@ -6,9 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
-from femgear.case.fields import Count, Quantity
+from femgear.case.fields import Count, Quantity, Section
 from femgear.case.sections import MeshStiffnessSection, RigidCase
 from femgear.case.units import ANGLE, INERTIA, MASS, STIFFNESS, TORSION
 from femgear.errors import CaseError
@@ -33,11 +31,7 @@ Turning = Quantity(TORSION, 0.0, 1e13)
 Diametral = Quantity(INERTIA, 1e-12, 1e8)
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class _Supported(_Section):
+class _Supported(Section):
     """What a body needs beyond its mass, polar inertia and radial support to move in space."""
 
     diametral_inertia: Diametral
@@ -66,7 +60,7 @@ class HelicalRingSection(_Supported):
     support_stiffness: Stiffness
 
 
-class HelicalSection(_Section):
+class HelicalSection(Section):
     """Helical teeth on rigid bodies that move in space: sun, ring, carrier and planets.
 
     With this section module, pressure angle, racks and profile shifts are those of the normal section, and a

@@ -37,6 +37,7 @@ from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeri
 from femgear.system.mode_kinds import gear_set_kinds
 from femgear.system.rigid_bodies import CENTRAL, PlanarSet, PlanarTorque, flank_sign
 from femgear.system.system import HarmonicForce, Modes, NonlinearSystem, element_forces
+from femgear.system.transmission_errors import tooth_lines
 
 # natural frequencies closer than this, relative to the frequency, count as one
 _SAME = 1e-3
@@ -192,15 +193,11 @@ def phased_series(sun_planet, planet_ring, phases, *, mean, orders: tuple[int, .
         Multiples of the base frequencies that make the mesh frequency.
     """
     phases, mean = np.asarray(phases, float), np.asarray(mean, float)
-    waves = [np.atleast_1d(np.asarray(wave, complex)) for wave in (sun_planet, planet_ring)]
     if phases.ndim != 1 or len(phases) % 2 or phases.shape != mean.shape:
         raise CaseError(
             f"{phases.size} phases and {mean.size} mean stiffnesses", code="E-SHAPE", limit="2N of each"
         )
-    count = max(len(wave) for wave in waves)
-    table = np.array([np.pad(wave, (0, count - len(wave))) for wave in waves])
-    shift = np.exp(2j * np.pi * phases[:, None] * np.arange(1, count + 1))
-    lines = np.repeat(table, len(phases) // 2, axis=0) * shift
+    lines = tooth_lines(sun_planet, planet_ring, phases)
     return FourierSeries(mean[:, None] * np.column_stack([np.ones(len(phases)), lines]), orders)
 
 

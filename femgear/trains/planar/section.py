@@ -8,15 +8,13 @@ from typing import Annotated, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     StrictBool,
     model_validator,
 )
 
-from femgear.case.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
 from femgear.case.units import ACCELERATION, ANGLE, FREQUENCY, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
 from femgear.errors import CaseError
@@ -69,11 +67,7 @@ def _some(values: tuple) -> tuple:
     return values
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class PlanarRingSection(_Section):
+class PlanarRingSection(Section):
     """The ring as a rigid body on its support in the housing."""
 
     mass: Quantity(MASS, 1e-6, 1e6)
@@ -81,7 +75,7 @@ class PlanarRingSection(_Section):
     support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
 
 
-class TorsionSection(_Section):
+class TorsionSection(Section):
     """Torsional supports of the members; the fixed member is held where it has none."""
 
     sun: Torsion | None = None
@@ -89,7 +83,7 @@ class TorsionSection(_Section):
     carrier: Torsion | None = None
 
 
-class CarrierBearingSection(_Section):
+class CarrierBearingSection(Section):
     """A bearing of the carrier beside its support."""
 
     stiffness: Quantity(STIFFNESS, 1.0, 1e15)
@@ -97,14 +91,14 @@ class CarrierBearingSection(_Section):
     on: Literal["ring", "housing"] = "housing"
 
 
-class GravitySection(_Section):
+class GravitySection(Section):
     """Weight of all bodies; its direction counts from the x axis when the carrier's phase is zero."""
 
     acceleration: Quantity(ACCELERATION, 1e-3, 1e3) = 9.80665
     direction: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = -0.5 * math.pi
 
 
-class BranchSection(_Section):
+class BranchSection(Section):
     """Periodic responses to the weight, followed over its frequency in the carrier frame."""
 
     start: Frequency = Field(alias="from")
@@ -114,14 +108,14 @@ class BranchSection(_Section):
     points: Count(10, 5000) = 600
 
 
-class ResponseSection(_Section):
+class ResponseSection(Section):
     """Responses to weight and mesh frequency together at the speeds of the operation."""
 
     carrier_harmonics: Count(1, 500) = 3
     side_bands: Count(0, 100) = 3
 
 
-class PlanarPublished(_Section):
+class PlanarPublished(Section):
     """What somebody published: a natural frequency, or a figure and how ours compares with it."""
 
     kind: Literal["rotational", "translational", "planet"] | None = None
@@ -144,7 +138,7 @@ class PlanarPublished(_Section):
         return self
 
 
-class PlanarSection(_Section):
+class PlanarSection(Section):
     """Rigid bodies that move in their plane: sun, ring, carrier and planets.
 
     With this section a run solves the lumped set of Lin and Parker in place of the elastic ring.
