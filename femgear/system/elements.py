@@ -269,7 +269,8 @@ class PolynomialSprings:
     def evaluate(self, x, theta):
         """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
         x = x[..., 0]
-        force, slope = np.zeros_like(x), np.zeros_like(x)
+        force: np.ndarray = np.zeros_like(x)
+        slope: np.ndarray = np.zeros_like(x)
         for coefficient in self.coefficients.T[::-1]:
             slope = slope * x + force + coefficient
             force = (force + coefficient) * x
@@ -329,7 +330,9 @@ class PiecewiseSprings:
         return force[..., None], (self.slopes[0] + slope @ change)[..., None, None]
 
 
-def tangent_jumps(tangents: Callable, states: np.ndarray, *, intervals: int = _INTERVALS) -> list[np.ndarray]:
+def tangent_jumps(
+    tangents: Callable[..., np.ndarray], states: np.ndarray, *, intervals: int = _INTERVALS
+) -> list[np.ndarray]:
     """Fractions of the period, for every state, at which its tangents jump; ascending, zero left out.
 
     Tangents at equidistant instants; an interval whose change is unlike that of its neighbours is halved
@@ -353,9 +356,11 @@ def tangent_jumps(tangents: Callable, states: np.ndarray, *, intervals: int = _I
     around = 0.5 * (np.roll(change, 1, axis=1) + np.roll(change, -1, axis=1))
     unlike, change = (np.abs(a).max(axis=(2, 3), initial=0.0) for a in (change - around, change))
     suspect = (unlike > _UNLIKE * change) & (change > _SMALL * size[:, None])
+    row: np.ndarray
     row, column = np.nonzero(suspect)
     found = [[] for _ in states]
-    low, high = nodes[1:-2][column], nodes[2:-1][column]
+    low: np.ndarray = nodes[1:-2][column]
+    high: np.ndarray = nodes[2:-1][column]
     for _ in range(_ROUNDS):
         row, low, high, where = _halved(tangents, states, size, row, low, high)
         if not len(row):
@@ -368,10 +373,18 @@ def tangent_jumps(tangents: Callable, states: np.ndarray, *, intervals: int = _I
     return [_sorted(fractions) for fractions in found]
 
 
-def _halved(tangents, states, size, row, low, high):
+def _halved(
+    tangents: Callable[..., np.ndarray],
+    states: np.ndarray,
+    size: np.ndarray,
+    row: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Jumps in intervals (k,) of the rows: rows, ends and places of those that hold one."""
-    a, b = low.copy(), high.copy()
-    before = np.full(len(row), np.inf)
+    a: np.ndarray = low.copy()
+    b: np.ndarray = high.copy()
+    before: np.ndarray = np.full(len(row), np.inf)
     for level in range(_LAST):
         if not len(row):
             break

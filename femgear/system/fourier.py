@@ -375,7 +375,7 @@ def distinct_lines(orders) -> np.ndarray:
 
 def mirror_sign(orders: np.ndarray) -> np.ndarray:
     """Sign (L,) of the last order of every line that is not zero; 1 for the mean."""
-    last = np.zeros(len(orders), int)
+    last: np.ndarray = np.zeros(len(orders), int)
     for column in orders.T:
         last = np.where(column != 0, np.sign(column), last)
     return np.where(last == 0, 1, last)
