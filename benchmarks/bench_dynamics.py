@@ -191,7 +191,7 @@ def test_solution_with_verdict(benchmark):
 @question_group
 def test_two_base_frequencies(benchmark):
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-    from femgear.system.series import side_bands
+    from femgear.system.fourier import side_bands
 
     set_, orders = train.two_base_train(0.05), side_bands(2, 8, 2)
     omega = [train.OMEGA / 108.0, train.OMEGA]
@@ -289,13 +289,13 @@ def test_campbell_diagram(benchmark):
     from published.planetary_sets import lin_parker_set
 
     from femgear.solvers.linear.tracking import campbell_data
-    from femgear.system.assembler import planar_system
+    from femgear.system.assembler import gear_set_system
 
     data = lin_parker_set(3)
     found = ask(
         benchmark, "Campbell diagram of 31 carrier speeds",
         lambda: campbell_data(
-            lambda speed: planar_system(data, carrier_speed=speed), np.linspace(0.0, 1000.0, 31),
+            lambda speed: gear_set_system(data, carrier_speed=speed), np.linspace(0.0, 1000.0, 31),
             data.mesh_stiffness, orders=(108.0, 216.0),
         ),
         lambda c: f"{c.frequency.shape[1]} branches, {len(c.critical)} critical speeds",

@@ -35,7 +35,7 @@ def test_extended_harmonic_balance(benchmark, medians, problem, name):
     from published.wind_turbine import drive_reduction
 
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-    from femgear.system.series import side_bands
+    from femgear.system.fourier import side_bands
 
     orders = side_bands(*LINES[name])
     options = {"orders": orders, "reduction": drive_reduction(problem), "stability": False}

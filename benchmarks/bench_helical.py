@@ -18,21 +18,16 @@ def inputs():
     from published.planetary_sets import kahraman_set
 
     from femgear.gears.phasing import MeshPhasing
-    from femgear.trains.helical.model import (
-        helical_modes,
-        helical_springs,
-        helical_system,
-        phased_errors,
-        spring_loads,
-    )
+    from femgear.system.assembler import gear_set_springs, gear_set_system
+    from femgear.trains.helical.model import helical_modes, phased_errors, spring_loads
 
     data = kahraman_set()
     cases = [
         MeshPhasing(z, 100 - z, (0, 25, 50, 75), lag=lag) for z in (28, 29, 30, 31) for lag in (0.0, 0.5)
     ]
     error = np.array([phased_errors(np.full(4, 1e-6), case.phases) for case in cases])
-    _, rows = spring_loads(helical_springs(data))
-    return helical_system(data), helical_modes(data, damping_ratio=0.05), rows, error
+    _, rows = spring_loads(gear_set_springs(data))
+    return gear_set_system(data), helical_modes(data, damping_ratio=0.05), rows, error
 
 
 @pytest.fixture(scope="module")

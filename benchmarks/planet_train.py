@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import harmonics_of
+from femgear.system.fourier import harmonics_of
+from femgear.system.system import NonlinearSystem
 
 PHASES = np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])
 FLUCTUATION = 0.15 * np.array([1.0, 0.3, 0.15])
@@ -32,12 +32,12 @@ def planet_train(damping: float) -> NonlinearSystem:
     """Example set of Lin and Parker (1999) with three planets, 300 N m and 20 um of backlash."""
     from published.planetary_sets import lin_parker_set
 
-    from femgear.system.assembler import planar_meshes
-    from femgear.system.lumped import PlanarTorque
+    from femgear.system.assembler import mesh_elements
+    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.planar.model import planar_problem
 
     data = lin_parker_set(3)
-    meshes = planar_meshes(data, stiffness=mesh_stiffness(), backlash=20e-6)
+    meshes = mesh_elements(data, stiffness=mesh_stiffness(), backlash=20e-6)
     return planar_problem(data, meshes=meshes, torque=PlanarTorque(300.0), damping=damping)
 
 
@@ -45,12 +45,12 @@ def two_base_train(damping: float) -> NonlinearSystem:
     """The same set with its weight, which turns with the carrier: carrier first, mesh second frequency."""
     from published.planetary_sets import lin_parker_set
 
-    from femgear.system.assembler import planar_meshes
-    from femgear.system.lumped import PlanarTorque
+    from femgear.system.assembler import mesh_elements
+    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.trains.planar.model import Gravity, planar_problem
 
     data, stiffness = lin_parker_set(3), replace(mesh_stiffness(), orders=(0, 1))
-    meshes = planar_meshes(data, stiffness=stiffness, backlash=20e-6)
+    meshes = mesh_elements(data, stiffness=stiffness, backlash=20e-6)
     return planar_problem(
         data, meshes=meshes, torque=PlanarTorque(300.0), damping=damping, gravity=Gravity(orders=(1, 0))
     )

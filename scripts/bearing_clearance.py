@@ -42,11 +42,11 @@ def main(
     frequencies, points
         Number of frequencies and clearances of the maps.
     """
+    from published.wind_turbine_figures import response_branches
     from published.wind_turbine_response import wedging_map
 
     from femgear.case.units import LENGTH, to_si
     from femgear.report.style import save_figure
-    from femgear.trains.planar.figures import response_branches
 
     plays, play = [to_si(text, LENGTH) for text in clearance], to_si(backlash, LENGTH)
     if min(plays, default=0.0) < 0.0 or play <= 0.0 or harmonics < 1 or min(frequencies, points) < 2:
@@ -100,8 +100,7 @@ def _map_records(found):
 
 def _map_figure(found, play):
     from published.wind_turbine import wind_turbine_a
-
-    from femgear.trains.planar.figures import contact_map
+    from published.wind_turbine_figures import contact_map
 
     rigid = 0.5 * play / np.sin(wind_turbine_a().pressure_angle_sun_planet)
     panels = [("drive flanks", found.drive.mean(axis=2)), ("back flanks", found.back.mean(axis=2))]

@@ -49,7 +49,7 @@ def main(
 
     from femgear.report.style import save_figure
     from femgear.solvers.linear.tracking import campbell_data
-    from femgear.system.assembler import planar_system
+    from femgear.system.assembler import gear_set_system
 
     if not (np.isfinite(highest) and highest > 0.0) or speeds < 5 or modes < 1 or harmonics < 0:
         raise CaseError(
@@ -59,7 +59,7 @@ def main(
     data = wind_turbine_a() if train == "A" else wind_turbine_b()
     orders = [1.0, *(RING_TEETH[train] * h for h in range(1, harmonics + 1))]
     found = campbell_data(
-        lambda speed: planar_system(data, carrier_speed=speed),
+        lambda speed: gear_set_system(data, carrier_speed=speed),
         np.linspace(0.0, highest * RPM, speeds),
         data.mesh_stiffness,
         orders=orders,

@@ -55,10 +55,10 @@ def main(
         Of the integration, a period.
     """
     from published.wind_turbine import gravity_problem_b
+    from published.wind_turbine_figures import response_branches
 
     from femgear.case.units import LENGTH, to_si
     from femgear.report.style import save_figure
-    from femgear.trains.planar.figures import response_branches
 
     plays = [to_si(text, LENGTH) for text in backlash]
     if not 0.0 < lowest < highest < np.inf or harmonics < 1 or sweep < 0 or min(plays, default=0.0) <= 0.0:
@@ -167,10 +167,11 @@ def _print_sweeps(rows):
 
 def _details(folder, result) -> list[str]:
     """Orbits, planet bearing forces at the peak and contact along the branch, of the first play."""
+    from published.wind_turbine_figures import contact_over_frequency
     from published.wind_turbine_response import bearing_history, contact_shares, member_lines
 
     from femgear.report.style import save_figure
-    from femgear.trains.planar.figures import bearing_forces, contact_over_frequency, orbits
+    from femgear.trains.planar.figures import bearing_forces, orbits
 
     text, problem, branch, hertz, rms, _ = result
     top, phase = int(np.argmax(rms)), np.linspace(0.0, 2.0 * np.pi, 361)

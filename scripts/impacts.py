@@ -224,8 +224,8 @@ def eccentric_set(eccentricity: float, floating: bool):
 
     from published.planetary_sets import lin_parker_set
 
-    from femgear.system.assembler import planar_meshes
-    from femgear.system.lumped import PlanarTorque
+    from femgear.system.assembler import mesh_elements
+    from femgear.system.rigid_bodies import PlanarTorque
     from femgear.system.transmission_errors import (
         Eccentricity,
         TransmissionErrors,
@@ -245,7 +245,7 @@ def eccentric_set(eccentricity: float, floating: bool):
     )  # fmt: skip
     C = equivalent_damping(data, mesh_ratio=0.05, support_ratio=0.03)
     stiffness = phased_series([0.1], [0.1], phases, mean=data.mesh_stiffness)
-    meshes = planar_meshes(data, stiffness=stiffness, backlash=60e-6)
+    meshes = mesh_elements(data, stiffness=stiffness, backlash=60e-6)
     plain = planar_problem(data, meshes=meshes, torque=PlanarTorque(15.0), damping=C)
     dampers = planar_mesh_dampers(data, 0.05)
     return errors, lambda omega: with_errors(plain, errors, dampers=dampers, mesh_frequency=omega)
@@ -287,7 +287,7 @@ def eccentric_response(eccentricity: float, floating: bool, hertz):
     """Force of mesh 1 and convergence (3, F); path of the sun, lines of the force at the first frequency."""
     from femgear.solvers.linear.receptance import reduce_problem
     from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
-    from femgear.system.nonlinear import element_forces
+    from femgear.system.system import element_forces
 
     errors, build = eccentric_set(eccentricity, floating)
     orders, start, rows = errors.lines(mesh=3, member=3, bands=2), None, []

@@ -159,7 +159,7 @@ def _balance(train, rpm, torque, harmonics, damping, progress) -> dict[str, tupl
     from published.multistage_example import example_meshes
 
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-    from femgear.system.series import distinct_lines
+    from femgear.system.fourier import distinct_lines
     from femgear.trains.multistage.model import mesh_columns
     from femgear.trains.multistage.stages import base_frequencies, multistage_problem
 

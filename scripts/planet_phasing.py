@@ -169,10 +169,11 @@ def _spectra(points):
     from published.planetary_sets import cases, kahraman_set
 
     from femgear.gears.phasing import phase_factors
-    from femgear.trains.helical.model import helical_modes, helical_system, modal_error_response
+    from femgear.system.assembler import gear_set_system
+    from femgear.trains.helical.model import helical_modes, modal_error_response
 
     data, frequency = kahraman_set(), np.linspace(100.0, 15e3, points)
-    system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)
+    system, modes = gear_set_system(data), helical_modes(data, damping_ratio=0.05)
     last, turning = TYPES["sequentially phased"], cases()
     sets = {_title(name, letter): turning[letter] for name, letter in TYPES.items()}
     sets[f"{_title('sequentially phased', last)}, phases as printed"] = cases(convention="printed")[last]

@@ -10,7 +10,7 @@ from validation.reference.sensor_in_time import symmetry_leakage
 from femgear.case import text as case_text
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum
-from femgear.system.series import harmonics_of, sample
+from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic.checks import max_nodal_diameter
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import parse_case, read_case, with_value, with_values

@@ -13,9 +13,8 @@ from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_h
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries
-from femgear.system.system import MechanicalSystem, MeshExcitation
+from femgear.system.fourier import FourierSeries
+from femgear.system.system import HarmonicForce, MechanicalSystem, MeshExcitation, NonlinearSystem
 from femgear.trains.elastic.checks import check_rim_speed
 from femgear.trains.reading import read_case, with_value
 

@@ -1,6 +1,7 @@
 """Helical cases: the shipped train, its gears, what is refused, and what is said."""
 
 import math
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,11 @@ from published.planetary_sets import kahraman_set
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.checks import check_set
-from femgear.trains.helical.checks import check_helical_case
 from femgear.trains.helical.model import HelicalSet
+from femgear.trains.helical.setup import base_helix_angle, check_helical_case, helical_data, overlap_ratio
 from femgear.trains.helical.stages import HELICAL
-from femgear.trains.helical.virtual_gears import base_helix_angle, helical_data, overlap_ratio, rotation_sense
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
+from femgear.trains.rigid import rotation_sense
 
 ROOT = Path(__file__).parents[1]
 GIVEN = {"sun_planet": "200e6 N/m", "planet_ring": "200 N/um"}
@@ -39,7 +40,7 @@ def refused(case, key, value):
 def test_the_shipped_case_is_the_train_of_the_paper(given):
     found, expected = helical_data(given, planetary_set(given)), kahraman_set()
     # the paper rounds its pressure angle to 21.34 deg
-    for name in HelicalSet.__dataclass_fields__:
+    for name in (field.name for field in fields(HelicalSet)):
         one, other = getattr(found, name), getattr(expected, name)
         if isinstance(other, str):
             # the file has the points that keep the set in equilibrium

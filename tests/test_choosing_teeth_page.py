@@ -33,10 +33,11 @@ def test_table_of_the_eight_cases_is_computed():
     from published.planetary_sets import TABLE_2, cases, kahraman_set
 
     from femgear.gears.phasing import phase_factors, phasing_table
-    from femgear.trains.helical.model import helical_modes, helical_system, modal_error_response
+    from femgear.system.assembler import gear_set_system
+    from femgear.trains.helical.model import helical_modes, modal_error_response
 
     data, hertz = kahraman_set(), np.arange(5000.0, 15000.0, 5.0)
-    system, modes = helical_system(data), helical_modes(data, damping_ratio=0.005)
+    system, modes = gear_set_system(data), helical_modes(data, damping_ratio=0.005)
     for letter, case in cases().items():
         sun, ring, planet, printed_class = TABLE_2[letter]
         row = next(line for line in PAGE.splitlines() if line.startswith(f"| {letter} |"))

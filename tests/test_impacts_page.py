@@ -10,7 +10,7 @@ from femgear.solvers.stability.lyapunov import LyapunovExponents
 
 PAGE, EXAMPLES, PRINTED = read_page("impacts.md")
 MODULES = (
-    "system.transmission_errors", "system.series", "trains.gear_pair.model",
+    "system.transmission_errors", "system.fourier", "trains.gear_pair.model",
     "trains.gear_pair.figures", "solvers.linear.modal", "solvers.stability.lyapunov",
     "solvers.continuation.branches", "solvers.time.stroboscopic",
 )  # fmt: skip

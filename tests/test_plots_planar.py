@@ -1,15 +1,10 @@
 """Figures of the lumped set: what is drawn dashed, closed orbits, contact maps."""
 
 import numpy as np
+from published.wind_turbine_figures import contact_map, contact_over_frequency, response_branches
 
 from femgear.report.style import png_bytes
-from femgear.trains.planar.figures import (
-    bearing_forces,
-    contact_map,
-    contact_over_frequency,
-    orbits,
-    response_branches,
-)
+from femgear.trains.planar.figures import bearing_forces, orbits
 
 
 def test_unstable_segments_are_dashed_and_nothing_is_left_out():

@@ -14,7 +14,7 @@ from validation.reference.sensor_in_time import symmetry_leakage
 
 from femgear.gears.kinematics import torques
 from femgear.housing.orders import OrderSpectrum
-from femgear.system.series import harmonics_of, sample
+from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import with_value

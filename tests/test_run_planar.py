@@ -17,8 +17,8 @@ from femgear.solvers.periodic.solution import open_verdict
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.solvers.time.transient import solve_transient
 from femgear.storage.results import run_folder
-from femgear.system.assembler import planar_system
-from femgear.system.lumped import PlanarTorque
+from femgear.system.assembler import gear_set_system
+from femgear.system.rigid_bodies import PlanarTorque
 from femgear.trains import registry
 from femgear.trains.planar.figures import (
     branch_figures,
@@ -279,7 +279,7 @@ def test_weight_alone_in_a_turning_frame_is_the_linear_response(pgb):
     model = planar_model(case, planetary_set(case), mesh_frequency=True)
     omega = 900 * np.pi / 30
     torque = PlanarTorque(180e3, "carrier", None)
-    system = planar_system(model.data, torque=torque, carrier_speed=omega)
+    system = gear_set_system(model.data, torque=torque, carrier_speed=omega)
     K = system.K + (system.W * model.data.mesh_stiffness) @ system.W.T
     C = model.problem.system.C + omega * system.gyroscopic
     dynamic = K - omega**2 * system.M + 1j * omega * C

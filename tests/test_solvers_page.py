@@ -53,7 +53,7 @@ def public_names() -> set[str]:
     found = set()
     paths = [path for path in (ROOT / "femgear" / "solvers").rglob("*.py") if path.stem != "__init__"]
     assert len(paths) >= 19
-    paths += [ROOT / "femgear" / "system" / f"{name}.py" for name in ("elements", "nonlinear", "series")]
+    paths += [ROOT / "femgear" / "system" / f"{name}.py" for name in ("elements", "fourier", "system")]
     for path in paths:
         module = importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
         found |= {

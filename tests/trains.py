@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.system.lumped import PlanarBody, PlanarSet
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.trains.multistage.model import Stage, in_series
 
 EVEN = 2.0 * np.pi * np.arange(3) / 3

@@ -292,7 +292,7 @@ class Case(Section, ReadCase):
     @property
     def mesh_harmonics(self) -> int | None:
         """Harmonics of the excitation: as given, 6 of rigid bodies, None where a frequency limits them."""
-        return self.dynamics.mesh_harmonics or (6 if self.rigid else None)
+        return self.dynamics.mesh_harmonics
 
     @property
     def response_harmonics(self) -> int | None:
@@ -315,6 +315,14 @@ class RigidCase(Case):
     @property
     def rigid(self) -> bool:
         return True
+
+    @property
+    def mesh_harmonics(self) -> int:
+        return self.dynamics.mesh_harmonics or 6
+
+    @property
+    def response_harmonics(self) -> int:
+        return self.dynamics.response_harmonics or 3 * self.mesh_harmonics
 
 
 class MeshStiffnessSection(Section):

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from femgear.system.lumped import RigidSet
+    from femgear.system.rigid_bodies import RigidSet
 
 RPM = np.pi / 30.0
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
@@ -124,7 +124,7 @@ def in_space(data: RigidSet, motions: np.ndarray, axes: tuple[str, ...]) -> tupl
     axes : tuple of str
         Names of the motions of a body.
     """
-    from femgear.system.lumped import member_radius
+    from femgear.system.rigid_bodies import member_radius
 
     N = data.n_planets
     full = motions.reshape(N + 3, len(axes), -1).copy()

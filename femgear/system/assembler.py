@@ -1,15 +1,17 @@
-"""Planetary set of rigid bodies that move in their plane: the lumped model of Lin and Parker.
+"""Matrices of planetary sets of rigid bodies: bodies, springs, meshes and what is held.
 
-Carrier, ring, sun and N planets have two translations and ``u = r theta`` each, 3 (N + 3) coordinates in the
-order and with the signs of J. Lin and R. G. Parker, J. Vib. Acoust. 121, 1999, 316-321: x and y of the
-central members in a frame that turns with the carrier, planets radially outwards and tangentially (their
-zeta and eta), all rotations counter-clockwise; r is the base radius of the gears and the radius of the
-circle of planet centres for the carrier. Their equation of motion is
+Carrier, ring, sun and N planets move along x, y and z, tilt by ``w = r phi`` and turn by ``u = r theta``, in
+the order and with the signs of J. Lin and R. G. Parker, J. Vib. Acoust. 121, 1999, 316-321: x and y of the
+central members in a frame that turns with the carrier, planets radially outwards and tangentially (their zeta
+and eta), all rotations right-handed; r is the base radius of the gears and the radius of the circle of planet
+centres for the carrier. A kind of set has the motions `RigidSet.axes` of these: three in the plane, or all
+six as in A. Kahraman, J. Mech. Des. 116, 1994, 713-720. The equation of motion in the plane is
 
 ``M q'' + Omega G q' + [K_b + K_m - Omega^2 K_Omega] q = T + F``
 
-with the matrices printed in their appendix. Here K_b and K_m follow from kinematics: every spring is a
-column of deflections, ``w^T q``, and adds ``k w w^T``; the meshes stay columns of W.
+with the matrices printed in the appendix of Lin and Parker. Here K_b and K_m follow from kinematics: every
+spring is a column of deflections, ``w^T q``, and adds ``k w w^T``; the meshes stay columns of W. `assemble`
+reduces the matrices of any bodies, springs and meshes to the motions that are free.
 """
 
 from __future__ import annotations
@@ -21,49 +23,99 @@ from dataclasses import replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.elements import GearMeshes, gear_meshes
-from femgear.system.lumped import (
+from femgear.system.elements import GearMeshes
+from femgear.system.fourier import Series, constant
+from femgear.system.rigid_bodies import (
     CENTRAL,
-    PlanarSet,
+    ROTATIONS,
     PlanarTorque,
+    RigidSet,
     body_masses,
     flank_sign,
-    member_radius,
     torque_load,
 )
-from femgear.system.series import FourierSeries, StepSeries, constant
-from femgear.system.system import MechanicalSystem, MeshExcitation
+from femgear.system.system import MechanicalSystem, MeshExcitation, gear_meshes
+
+CENTRAL_AXES = ("x", "y", "z", "tilt x", "tilt y", "u")
+PLANET_AXES = ("radial", "tangential", "z", "tilt radial", "tilt tangential", "u")
 
 
-def planar_dofs(n_planets: int) -> tuple[str, ...]:
-    """Names of all 3 (N + 3) coordinates, in the order of Lin and Parker, Eq. (2)."""
-    central = [f"{body}: {axis}" for body in CENTRAL for axis in ("x", "y", "u")]
-    axes = ("radial", "tangential", "u")
-    return (*central, *(f"planet {n + 1}: {axis}" for n in range(n_planets) for axis in axes))
+def assemble(
+    mass: np.ndarray,
+    stiffness: np.ndarray,
+    columns: np.ndarray,
+    load: np.ndarray,
+    *,
+    motions: np.ndarray,
+    dofs: Sequence[str],
+    gyroscopic: np.ndarray | None = None,
+) -> MechanicalSystem:
+    """Reduce the matrices of bodies, springs and meshes to the motions that are free.
+
+    Parameters
+    ----------
+    mass : (n,) or (n, n) array
+        In all coordinates [kg, kg m^2].
+    stiffness : (n, n) array
+        Of springs that are not columns of ``W``, see `stiffness_matrix` [N/m, N m/rad].
+    columns : (n, g) array
+        Deflections of meshes, and of bearings that are elements, per unit of the coordinates.
+    load : (n,) array
+        [N, N m]
+    motions : (n, m) array
+        All coordinates per unit of the free ones: unit columns, and what follows them.
+    dofs : (m,) sequence of str
+        Names of the free coordinates.
+    gyroscopic : (n, n) array, optional
+
+    Returns
+    -------
+    MechanicalSystem
+        ``C`` is zero.
+    """
+    T = motions
+    return MechanicalSystem(
+        M=(T.T * mass) @ T if mass.ndim == 1 else T.T @ mass @ T,
+        C=np.zeros((T.shape[1], T.shape[1])),
+        K=T.T @ stiffness @ T,
+        W=T.T @ columns,
+        load=T.T @ load,
+        dofs=tuple(str(name) for name in dofs),
+        gyroscopic=None if gyroscopic is None else T.T @ gyroscopic @ T,
+    )
 
 
-def planar_system(
-    data: PlanarSet,
+def stiffness_matrix(columns: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+    """Stiffness (n, n) of springs, the sum of ``k w w^T`` over columns w (n, g) and stiffnesses k (g,).
+
+    Infinite ones hold motions and are not in it.
+    """
+    k = np.where(np.isfinite(stiffness), stiffness, 0.0)
+    return np.einsum("ig,g,jg->ij", columns, k, columns)
+
+
+def gear_set_system(
+    data: RigidSet,
     *,
     torque: PlanarTorque | None = None,
     carrier_speed: float = 0.0,
     back_flanks: bool = False,
     bearings: Sequence[str] = (),
 ) -> MechanicalSystem:
-    """Matrices of the lumped set; the meshes are columns of ``W`` and not in ``K``.
+    """Assemble the matrices of a planetary set; the meshes are columns of ``W`` and not in ``K``.
 
     Parameters
     ----------
-    data : PlanarSet
+    data : RigidSet
         Coordinates with an infinite stiffness are left out.
     torque : PlanarTorque, optional
         Its sign chooses the flanks of the mesh columns; without it those of a sun that drives
         counter-clockwise. Mesh deflections are positive in compression.
     carrier_speed : float
         Mean speed of the carrier [rad/s] for the gyroscopic matrix, the centripetal stiffness and the
-        centrifugal load of the planets; ``gyroscopic`` is None for zero.
+        centrifugal load of planets that move in their plane; ``gyroscopic`` is None for zero.
     back_flanks : bool
-        Adds the 2N columns of the other flanks, positive in their compression, on their own lines of action
+        Adds the columns of the other flanks, positive in their compression, on their own lines of action
         (Y. Guo and R. G. Parker, Eur. J. Mech. A 29, 2010, 1022-1033: tooth wedging).
     bearings : sequence of {"carrier", "ring", "sun", "planets"}
         Supports that become columns of ``W``, x and y (planets: radial and tangential, planet less pin);
@@ -72,55 +124,74 @@ def planar_system(
     Returns
     -------
     MechanicalSystem
-        ``C`` is zero.
+        ``C`` is zero. Columns of ``W``: the slices of mesh 1, of mesh 2 and so on.
 
     Raises
     ------
     CaseError
-        A torque on a held member (E-MECHANISM), an unknown or infinitely stiff bearing (E-BEARING).
+        A torque on a held member, a set that cannot move at all (E-MECHANISM), an unknown or infinitely stiff
+        bearing (E-BEARING), a carrier speed or bearings of bodies that move in space (E-HELICAL).
     """
-    T, flank = free_motions(data), flank_sign(data, torque)
+    if len(data.axes) > 3 and carrier_speed:
+        data.refuse("carrier_speed", carrier_speed, "rad/s", "0 of bodies that move in space")
+    if len(data.axes) > 3 and bearings:
+        data.refuse("bearings", tuple(bearings), "", "none of bodies that move in space")
+    T, flank, kept = free_motions(data), flank_sign(data, torque), _kept(data)
+    if not T.shape[1]:
+        raise CaseError(
+            "infinite stiffnesses hold every motion of the set", code="E-MECHANISM",
+            remedy="give the support or the bearing of a body finite stiffnesses",
+        )  # fmt: skip
     masses = body_masses(data)
-    # the translational part is the K_Omega of Lin and Parker
-    M, along = masses.ravel(), (masses * (1.0, 1.0, 0.0)).ravel()
     columns = [mesh_directions(data, flank)]
     if back_flanks:
         columns.append(mesh_directions(data, -flank))
     columns += [_bearing_columns(data, name) for name in bearings]
-    K = _linear_stiffness(data, bearings)
-    kept = _kept(data)
-    load = torque_load(data, torque, kept)
-    gyroscopic = None
+    stiffness, load, gyroscopic = _linear_stiffness(data, bearings), torque_load(data, torque, kept), None
     if carrier_speed:
-        K -= carrier_speed**2 * np.diag(along)
+        # the translational part is the K_Omega of Lin and Parker
+        along = (masses * ~_turning(data)).ravel()
+        stiffness -= carrier_speed**2 * np.diag(along)
         load[9::3] += carrier_speed**2 * data.planet.mass * data.centre_distance
-        gyroscopic = T.T @ _gyroscopic(along) @ T
-    names = np.array(planar_dofs(data.n_planets))[kept]
-    return MechanicalSystem(
-        M=(T.T * M) @ T,
-        C=np.zeros((T.shape[1], T.shape[1])),
-        K=T.T @ K @ T,
-        W=T.T @ np.hstack(columns),
-        load=T.T @ load,
-        dofs=tuple(str(name) for name in names),
+        gyroscopic = _gyroscopic(along)
+    return assemble(
+        masses.ravel(),
+        stiffness,
+        np.hstack(columns),
+        load,
+        motions=T,
+        dofs=np.array(dof_names(data))[kept].tolist(),
         gyroscopic=gyroscopic,
     )
 
 
+def dof_names(data: RigidSet) -> tuple[str, ...]:
+    """Names of all coordinates, held ones included, in the order of Lin and Parker, Eq. (2)."""
+    bodies = [(body, CENTRAL_AXES) for body in CENTRAL]
+    bodies += [(f"planet {n + 1}", PLANET_AXES) for n in range(data.n_planets)]
+    return tuple(f"{body}: {names[axis]}" for body, names in bodies for axis in data.axes)
+
+
+def mesh_names(n_planets: int) -> list[str]:
+    """Names of the 2N meshes, in the order of their columns."""
+    planets = range(1, n_planets + 1)
+    return [f"sun-planet {n}" for n in planets] + [f"planet {n}-ring" for n in planets]
+
+
 def column_groups(
-    data: PlanarSet, *, back_flanks: bool = False, bearings: Sequence[str] = ()
+    data: RigidSet, *, back_flanks: bool = False, bearings: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
     """Places of the columns of W: ``meshes`` (2N,), ``back flanks`` (2N,), and (g, 2) of every bearing.
 
     Parameters
     ----------
-    data : PlanarSet
+    data : RigidSet
     back_flanks : bool
     bearings : sequence of {"carrier", "ring", "sun", "planets"}
         In the order in which their columns follow.
     """
     n = 2 * data.n_planets
-    groups = {"meshes": np.arange(n)}
+    groups: dict[str, np.ndarray] = {"meshes": np.arange(n)}
     if back_flanks:
         groups["back flanks"] = np.arange(n, 2 * n)
     start = n * len(groups)
@@ -131,30 +202,30 @@ def column_groups(
     return groups
 
 
-def planar_meshes(
-    data: PlanarSet,
+def mesh_elements(
+    data: RigidSet,
     *,
-    stiffness: FourierSeries | StepSeries | MeshExcitation | None = None,
+    stiffness: Series | MeshExcitation | None = None,
     harmonics: int | None = None,
     orders: tuple[int, ...] = (1,),
     backlash: float | np.ndarray | None = None,
     separates: bool = True,
     smoothing: float = 0.0,
 ) -> GearMeshes:
-    """The 2N meshes as elements.
+    """Make elements of the 2N meshes, or of their slices, each of which separates by itself.
 
     Parameters
     ----------
-    data : PlanarSet
+    data : RigidSet
     stiffness : FourierSeries, StepSeries or MeshExcitation, optional
-        Of the meshes [N/m], or their static record; the constant stiffnesses of the set when not given.
+        Of the mesh columns [N/m], or their static record; the constant stiffnesses of the set when not given.
     harmonics, orders
-        Of a static record, see `elements.gear_meshes`.
-    backlash : float or (2N,) array, optional
+        Of a static record, see `femgear.system.system.gear_meshes`.
+    backlash : float or (n_columns,) array, optional
         Play along the line of action [m]. None takes that of the static record; without one, or where it
         is zero there, the meshes have no back side.
     separates, smoothing
-        See `elements.GearMeshes`.
+        See `femgear.system.elements.GearMeshes`.
 
     Raises
     ------
@@ -162,78 +233,198 @@ def planar_meshes(
         A static record without the number of its harmonics (E-HARMONICS), values for another number of
         meshes (E-SHAPE).
     """
-    made = mesh_elements(stiffness, data.mesh_stiffness, harmonics, orders, record="static record")
+    mean = data.column_stiffness
+    columns = np.arange(len(mean))
+    if not isinstance(stiffness, MeshExcitation):
+        made = GearMeshes(columns, constant(mean) if stiffness is None else stiffness)
+    elif harmonics is None:
+        raise CaseError(
+            "the mesh harmonics of the static record are not said", code="E-HARMONICS", key="harmonics",
+            limit="a whole number of 1 or more",
+        )  # fmt: skip
+    else:
+        made = gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
     backlash = made.backlash if backlash is None else backlash
     return replace(made, backlash=backlash, separates=separates, smoothing=smoothing)
 
 
-def mesh_elements(stiffness, mean: np.ndarray, harmonics, orders, *, record: str) -> GearMeshes:
-    """Elements on the first columns of ``W``, of mean stiffness where none is given; see `planar_meshes`."""
-    columns = np.arange(len(mean))
-    if not isinstance(stiffness, MeshExcitation):
-        return GearMeshes(columns, constant(mean) if stiffness is None else stiffness)
-    if harmonics is None:
+def check_mesh_columns(data: RigidSet, meshes: GearMeshes) -> None:
+    """Refuse meshes that do not act on the first columns of ``W``, one a column (E-SHAPE)."""
+    count = len(data.column_stiffness)
+    if not np.array_equal(meshes.columns[:, 0], np.arange(count)):
         raise CaseError(
-            f"the mesh harmonics of the {record} are not said", code="E-HARMONICS", key="harmonics",
-            limit="a whole number of 1 or more",
+            f"meshes on columns {meshes.columns[:, 0].tolist()}", code="E-SHAPE", key="meshes",
+            limit=f"columns 0 to {count - 1} in order", remedy="make them with mesh_elements",
         )  # fmt: skip
-    return gear_meshes(stiffness, harmonics=harmonics, columns=columns, orders=orders)
 
 
-def mesh_directions(data: PlanarSet, flank: int = 1) -> np.ndarray:
-    """Mesh columns (3 (N + 3), 2N): approach of the flanks along their line of action.
+def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
+    """Mesh columns (n, 2N S): approach of the flanks along their common normal.
 
-    Seen from the planet's centre the normal into gear 2 is ``(sin alpha, +- cos alpha)`` radially and
-    tangentially, so that with ``flank = 1`` (Lin and Parker's mesh deflections, psi_sn = psi_n - alpha_s and
-    psi_rn = psi_n + alpha_r)
+    A rigid body whose centre moves by v and which rotates by phi moves its point c by ``v + phi x c``, so
+    that the flanks of gears 1 and 2 approach by ``n . (v_1 + phi_1 x c_1) - n . (v_2 + phi_2 x c_2)`` with
+    the normal n into gear 2. Seen from the planet's centre n is ``(sin alpha cos beta_b, +- cos alpha cos
+    beta_b, - sin beta_b)`` radially, tangentially and axially for the flanks of a sun that drives
+    counter-clockwise (`flank` = 1). The rotation about the own axis gives ``+- u cos beta_b``. Forces on base
+    circles give a sun and one planet the mesh deflection of the helical pair of M. Kubur et al., J. Mech.
+    Des. 126, 2004, 398-406. In the plane these are Lin and Parker's mesh deflections, psi_sn = psi_n -
+    alpha_s and psi_rn = psi_n + alpha_r:
 
     ``delta_sn = y_s cos psi_sn - x_s sin psi_sn - zeta_n sin alpha_s - eta_n cos alpha_s + u_s + u_n``
     ``delta_rn = y_r cos psi_rn - x_r sin psi_rn + zeta_n sin alpha_r - eta_n cos alpha_r + u_r - u_n``
+
+    Parameters
+    ----------
+    data : RigidSet
+    flank : {1, -1}
+    """
+    N, S = data.n_planets, len(data.contact_lines.heights)
+    W = np.zeros((N + 3, 6, 2 * N, S))
+    n = np.arange(N)
+    for mesh, gear in enumerate(("sun", "ring")):
+        central, planet = _local_columns(data, gear, flank)
+        W[CENTRAL.index(gear), :, mesh * N + n] = _turned(data, central)
+        W[3 + n, :, mesh * N + n] = planet
+    return W[:, list(data.axes)].reshape(-1, 2 * N * S)
+
+
+def pin_directions(data: RigidSet) -> np.ndarray:
+    """Bearing columns (n, N, d): motion of each planet less that of its pin, as many as `pin_stiffness`.
+
+    Radial and tangential, of bodies in space also axial [m], tilt about the radial and the tangential axis
+    and rotation [rad]. A carrier that tilts by phi moves the pin along z by ``phi x a e_n``.
     """
     N, n = data.n_planets, np.arange(data.n_planets)
-    W = np.zeros((3 * (N + 3), 2 * N))
-    alpha, beta = data.pressure_angle_sun_planet, data.pressure_angle_planet_ring
-    sun_normal = np.array([math.sin(alpha), flank * math.cos(alpha)])
-    ring_normal = np.array([math.sin(beta), -flank * math.cos(beta)])
-    W[6:8, n], W[8, n] = _turned(data, sun_normal), flank
-    W[9 + 3 * n, n], W[10 + 3 * n, n], W[11 + 3 * n, n] = *-sun_normal, flank
-    W[9 + 3 * n, N + n], W[10 + 3 * n, N + n], W[11 + 3 * n, N + n] = *ring_normal, -flank
-    W[3:5, N + n], W[5, N + n] = -_turned(data, ring_normal), flank
-    return W
+    own = np.diag([1.0] * 3 + [1.0 / data.planet_radius] * 3)
+    # motion of the pin (6,) per local coordinate of the carrier (6,)
+    pin = np.diag([1.0] * 3 + [1.0 / data.centre_distance] * 3)
+    pin[1, 5], pin[2, 4] = 1.0, -1.0
+    W = np.zeros((N + 3, 6, N, 6))
+    W[3 + n, :, n] = own.T
+    W[CENTRAL.index("carrier")] = -_turned(data, pin.T).transpose(1, 0, 2)
+    axes = list(data.axes)
+    return W[:, axes][..., axes[: data.pin_stiffness.shape[1]]].reshape(len(axes) * (N + 3), N, -1)
 
 
-def pin_directions(data: PlanarSet) -> np.ndarray:
-    """Bearing columns (3 (N + 3), N, 2): radial and tangential motion of each planet less its pin."""
-    N, n = data.n_planets, np.arange(data.n_planets)
-    W = np.zeros((3 * (N + 3), N, 2))
-    W[:2, :, 0], W[:2, :, 1] = -_turned(data, (1.0, 0.0)), -_turned(data, (0.0, 1.0))
-    W[2, :, 1] = -1.0
-    W[9 + 3 * n, n, 0] = W[10 + 3 * n, n, 1] = 1.0
-    return W
-
-
-def free_motions(data: PlanarSet) -> np.ndarray:
-    """All coordinates (3 (N + 3), n) per unit of those that infinite stiffnesses leave free."""
-    N = data.n_planets
-    T, pins = np.eye(3 * (N + 3)), pin_directions(data)
-    for n in np.flatnonzero(np.isinf(data.planet_bearing)):
-        T[9 + 3 * n : 11 + 3 * n, :9] = -pins[:9, n].T
+def free_motions(data: RigidSet) -> np.ndarray:
+    """All coordinates (n_all, n) per unit of those that infinite stiffnesses leave free."""
+    pins, axes = pin_directions(data), len(data.axes)
+    T, central = np.eye(len(pins)), 3 * axes
+    for n, axis in zip(*np.nonzero(np.isinf(data.pin_stiffness))):
+        row = central + axes * n + axis
+        T[row, :central] = -pins[:central, n, axis] / pins[row, n, axis]
     return T[:, _kept(data)]
 
 
-def _kept(data: PlanarSet) -> np.ndarray:
-    kept = np.ones((data.n_planets + 3, 3), bool)
+def gear_set_springs(data: RigidSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Springs of the set by name, for `femgear.solvers.linear.tracking.strain_shares`.
+
+    Parameters
+    ----------
+    data : RigidSet
+    mesh_stiffness : (n_columns,) array, optional
+        Of the mesh columns [N/m]; that of the set when not given.
+
+    Returns
+    -------
+    dict of str to (columns (n, g), stiffness (g,))
+        Meshes one by one (a column a slice), planet bearings one by one, supports of the central members, in
+        [m] and [rad]; in space bearings and supports by direction: ``radial`` (two columns), ``axial``,
+        ``tilt`` (two) and ``torsional``. What is held or free has no spring.
+    """
+    T, N = free_motions(data), data.n_planets
+    k = np.asarray(data.column_stiffness if mesh_stiffness is None else mesh_stiffness, float)
+    k = k.reshape(2 * N, -1)
+    meshes = (T.T @ mesh_directions(data)).reshape(T.shape[1], 2 * N, -1)
+    springs = {name: (meshes[:, j], k[j]) for j, name in enumerate(mesh_names(N))}
+    pins = pin_directions(data)
+    for n in range(N):
+        springs |= _by_direction(data, f"bearing of planet {n + 1}", T.T @ pins[:, n], data.pin_stiffness[n])
+    axes, scale = len(data.axes), _arcs(data)
     for row, name in enumerate(CENTRAL):
-        body = getattr(data, name)
-        kept[row] = [math.isfinite(body.support)] * 2 + [math.isfinite(body.torsional_support)]
-    kept[3:, :2] = np.isfinite(data.planet_bearing)[:, None]
-    return kept.ravel()
+        columns = T[axes * row : axes * (row + 1)].T / scale[row]
+        springs |= _by_direction(data, f"support of the {name}", columns, data.support_stiffness[row])
+    return springs
 
 
-def _turned(data: PlanarSet, local) -> np.ndarray:
-    """x and y (2, N) of a vector given radially and tangentially at every planet."""
-    cosine, sine = np.cos(data.planet_angles), np.sin(data.planet_angles)
-    return np.array([local[0] * cosine - local[1] * sine, local[0] * sine + local[1] * cosine])
+def support_diagonal(data: RigidSet) -> np.ndarray:
+    """Finite stiffnesses (N + 3, axes) of the supports in all coordinates, zero of the planets [N/m]."""
+    diagonal = np.zeros((data.n_planets + 3, len(data.axes)))
+    diagonal[:3] = data.support_stiffness / _arcs(data)[:3] ** 2
+    return np.where(np.isfinite(diagonal), diagonal, 0.0)
+
+
+def _by_direction(data: RigidSet, name: str, columns: np.ndarray, stiffness: np.ndarray) -> dict:
+    """Springs by the directions of the kind of set that are finite and not zero."""
+    there = np.isfinite(stiffness) & (stiffness > 0.0)
+    return {
+        direction.format(name): (columns[:, list(places)], stiffness[list(places)])
+        for direction, places in data.directions.items()
+        if places[0] < len(stiffness) and there[places[0]]
+    }
+
+
+def _turning(data: RigidSet) -> np.ndarray:
+    """Whether the motions (axes,) of a body are rotations."""
+    return np.isin(data.axes, ROTATIONS)
+
+
+def _arcs(data: RigidSet) -> np.ndarray:
+    """Lengths (N + 3, axes) per unit of every motion: 1 of translations, the radius of rotations [m]."""
+    return np.where(_turning(data), data.radii[:, None], 1.0)
+
+
+def _kept(data: RigidSet) -> np.ndarray:
+    """Whether every coordinate is free of infinite stiffnesses."""
+    planets = np.ones((data.n_planets, len(data.axes)), bool)
+    planets[:, : data.pin_stiffness.shape[1]] = np.isfinite(data.pin_stiffness)
+    return np.concatenate([np.isfinite(data.support_stiffness), planets]).ravel()
+
+
+def _local_columns(data: RigidSet, gear: str, flank: int) -> tuple[np.ndarray, np.ndarray]:
+    """Columns (6, S) of the central gear and of a planet in one mesh, in the planet's directions.
+
+    Gear 1 is the sun or, in the ring mesh, the planet.
+    """
+    external, lines = gear == "sun", data.contact_lines
+    alpha = data.pressure_angle_sun_planet if external else data.pressure_angle_planet_ring
+    side = flank if external else -flank
+    along = np.array([math.sin(alpha), side * math.cos(alpha)])
+    beta = lines.base_helix_angle
+    normal = np.array([*(along * math.cos(beta)), -flank * math.sin(beta)])
+    r, r_p, a = getattr(data, f"{gear}_radius"), data.planet_radius, data.centre_distance
+    # speed of the point of each gear along the line of action per unit of its u
+    turn, turn_p = side, -flank
+    if lines.on_base_circles:
+        foot = np.array([along[1], -along[0]])
+        point, point_p = turn * r * foot, turn_p * r_p * foot
+    else:
+        point = np.array([a * r / (r + r_p if external else r - r_p), 0.0])
+        point_p = point - (a, 0.0)
+    sign = 1.0 if external else -1.0
+    heights, around = np.array(lines.heights), math.cos(beta)
+    central = sign * _point_column(normal, point, heights, r, turn * around)
+    return central, -sign * _point_column(normal, point_p, heights, r_p, turn_p * around)
+
+
+def _point_column(normal, point, heights, radius: float, around: float) -> np.ndarray:
+    """``n . (v + phi x c)`` (6, S) for points at all heights; `around` is the factor of u."""
+    column = np.zeros((6, len(heights)))
+    column[:3], column[5] = normal[:, None], around
+    column[3] = (normal[2] * point[1] - normal[1] * heights) / radius
+    column[4] = (normal[0] * heights - normal[2] * point[0]) / radius
+    return column
+
+
+def _turned(data: RigidSet, local: np.ndarray) -> np.ndarray:
+    """Coordinates (N, 6, k) of a central member of columns (6, k) in every planet's directions."""
+    cosine, sine = np.cos(data.angles), np.sin(data.angles)
+    turned = np.repeat(np.asarray(local, float)[None], data.n_planets, axis=0)
+    for first in (0, 3):
+        one, two = local[first], local[first + 1]
+        turned[:, first] = cosine[:, None] * one - sine[:, None] * two
+        turned[:, first + 1] = sine[:, None] * one + cosine[:, None] * two
+    return turned
 
 
 def _gyroscopic(along: np.ndarray) -> np.ndarray:
@@ -244,66 +435,30 @@ def _gyroscopic(along: np.ndarray) -> np.ndarray:
     return G
 
 
-def _linear_stiffness(data: PlanarSet, bearings: Sequence[str]) -> np.ndarray:
+def _linear_stiffness(data: RigidSet, bearings: Sequence[str]) -> np.ndarray:
     """Supports and planet bearings that are finite and not columns."""
-    diagonal = np.zeros((data.n_planets + 3, 3))
-    for row, name in enumerate(CENTRAL):
-        body, radius = getattr(data, name), member_radius(data, name)
-        support = 0.0 if name in bearings else body.support
-        diagonal[row] = support, support, body.torsional_support / radius**2
-    K = np.diag(np.where(np.isfinite(diagonal), diagonal, 0.0).ravel())
+    diagonal = support_diagonal(data)
+    for name in set(bearings) & set(CENTRAL):
+        diagonal[CENTRAL.index(name), :2] = 0.0
+    K = np.diag(diagonal.ravel())
     if "planets" not in bearings:
         pins = pin_directions(data)
-        k = np.where(np.isfinite(data.planet_bearing), data.planet_bearing, 0.0)
-        K += np.einsum("ina,n,jna->ij", pins, k, pins)
+        K += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())
     return K
 
 
-def _bearing_columns(data: PlanarSet, name: str) -> np.ndarray:
+def _bearing_columns(data: RigidSet, name: str) -> np.ndarray:
     if name not in (*CENTRAL, "planets"):
         raise CaseError(f"a bearing of {name!r}", code="E-BEARING", limit="carrier, ring, sun, planets")
-    stiffness = data.planet_bearing if name == "planets" else getattr(data, name).support
-    if np.any(np.isinf(stiffness)):
+    planets = name == "planets"
+    stiffness = data.pin_stiffness if planets else data.support_stiffness[CENTRAL.index(name)]
+    if np.any(np.isinf(stiffness[..., :2])):
         raise CaseError(
             f"the bearing of the {name} is infinitely stiff, so it has no deflection", code="E-BEARING",
             remedy="give it a finite stiffness",
         )  # fmt: skip
-    if name == "planets":
-        return pin_directions(data).reshape(-1, 2 * data.n_planets)
-    first = 3 * CENTRAL.index(name)
-    return np.eye(3 * (data.n_planets + 3))[:, first : first + 2]
-
-
-def planar_springs(data: PlanarSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the set by name.
-
-    Parameters
-    ----------
-    data : PlanarSet
-    mesh_stiffness : (2N,) array, optional
-        [N/m]; that of the set when not given.
-
-    Returns
-    -------
-    dict of str to (columns (n, g), stiffness (g,))
-        Meshes one by one, planet bearings one by one, supports and torsional supports of the central members;
-        what is held or free has no spring.
-    """
-    T, N = free_motions(data), data.n_planets
-    k = np.asarray(data.mesh_stiffness if mesh_stiffness is None else mesh_stiffness, float)
-    meshes, pins = T.T @ mesh_directions(data), pin_directions(data)
-    names = [f"sun-planet {n + 1}" for n in range(N)] + [f"planet {n + 1}-ring" for n in range(N)]
-    springs = {name: (meshes[:, [j]], k[[j]]) for j, name in enumerate(names)}
-    for n, bearing in enumerate(data.planet_bearing):
-        if np.isfinite(bearing):
-            springs[f"bearing of planet {n + 1}"] = (T.T @ pins[:, n], np.full(2, bearing))
-    for row, name in enumerate(CENTRAL):
-        body = getattr(data, name)
-        torsion = body.torsional_support / member_radius(data, name) ** 2
-        for text, first, stiffness in (
-            (f"support of the {name}", 3 * row, np.full(2, body.support)),
-            (f"torsional support of the {name}", 3 * row + 2, np.array([torsion])),
-        ):
-            if np.all(np.isfinite(stiffness)) and np.any(stiffness):
-                springs[text] = (T[first : first + len(stiffness)].T, stiffness)
-    return springs
+    pins = pin_directions(data)
+    if planets:
+        return pins[..., :2].reshape(-1, 2 * data.n_planets)
+    first = len(data.axes) * CENTRAL.index(name)
+    return np.eye(len(pins))[:, first : first + 2]

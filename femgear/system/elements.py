@@ -3,7 +3,7 @@
 An element acts on groups of columns of ``W`` and gives, for their deflections ``x = W^T q``, the forces
 ``f(x, t)`` of ``M q'' + C q' + K q + W f = load`` and the tangents ``df/dx``, for all instants at once.
 Tangents jump where contacts open or close and where a stiffness steps; `tangent_jumps` finds these instants
-of a period.
+of a period. `tabulated_element` is the law of an element at known instants.
 """
 
 from __future__ import annotations
@@ -14,10 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
-from femgear.errors import CaseError
-from femgear.system.entries import checked_numbers
-from femgear.system.series import FourierSeries, StepSeries, constant, series_of
-from femgear.system.system import MeshExcitation
+from femgear.errors import CaseError, checked_numbers
+from femgear.system.fourier import FourierSeries, Series, StepSeries, constant
 
 # Phases a harmonic at which the sign of a stiffness is looked at, and rounding of its size.
 _PHASES, _ROUNDING = 32, 1e-12
@@ -40,7 +38,8 @@ class Element(Protocol):
     theta (..., n_bases) [rad], forces (..., g, d) [N] and tangents (..., g, d, d) [N/m].
     """
 
-    columns: np.ndarray
+    @property
+    def columns(self) -> np.ndarray: ...
 
     @property
     def reference(self) -> np.ndarray: ...
@@ -48,7 +47,7 @@ class Element(Protocol):
     def evaluate(self, x, theta) -> tuple[np.ndarray, np.ndarray]: ...
 
 
-def positive_part(x, smoothing=0.0) -> tuple[np.ndarray, np.ndarray]:
+def positive_part(x, smoothing: float | np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """``max(x, 0)`` and its slope; with a smoothing length s, ``(x + sqrt(x^2 + s^2)) / 2``.
 
     The smooth form differs by at most s / 2, at the corner (NREL/CP-5000-55355 smooths its contacts so).
@@ -70,12 +69,12 @@ class GearMeshes:
     Parameters
     ----------
     columns : (g,) or (g, 1) int array
-    stiffness : FourierSeries or StepSeries
+    stiffness : FourierSeries, StepSeries or SummedSeries
         ``k`` of every mesh [N/m].
-    deflection : FourierSeries or StepSeries, optional
+    deflection : FourierSeries, StepSeries or SummedSeries, optional
         Deflection of the mesh at the state about which it is linear [m]; zero when not given. With `force`
         zero this is the unloaded transmission error.
-    force : FourierSeries or StepSeries, optional
+    force : FourierSeries, StepSeries or SummedSeries, optional
         Force at that state [N]; zero when not given.
     backlash : (g,) array or float
         Total play along the line of action [m]; infinite when there is no back side.
@@ -86,9 +85,9 @@ class GearMeshes:
     """
 
     columns: np.ndarray
-    stiffness: FourierSeries | StepSeries
-    deflection: FourierSeries | StepSeries | None = None
-    force: FourierSeries | StepSeries | None = None
+    stiffness: Series
+    deflection: Series | None = None
+    force: Series | None = None
     backlash: np.ndarray | float = np.inf
     smoothing: float = 0.0
     separates: bool = True
@@ -98,9 +97,8 @@ class GearMeshes:
         backlash = np.broadcast_to(_numbers(self.backlash, "backlash", "E-BACKLASH"), len(columns)).copy()
         object.__setattr__(self, "columns", columns)
         object.__setattr__(self, "backlash", backlash)
-        for name in ("deflection", "force"):
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, constant(np.zeros(len(columns))))
+        for name, series in zip(("deflection", "force"), self.state):
+            object.__setattr__(self, name, series)
         _positive("smoothing length", self.smoothing)
         if np.any(np.isnan(backlash)) or np.any(backlash < 0.0):
             raise CaseError(
@@ -118,6 +116,15 @@ class GearMeshes:
             _check_pressing(self.stiffness)
 
     @property
+    def state(self) -> tuple[Series, Series]:
+        """Deflection and force of every mesh at the state about which it is linear [m, N]."""
+        deflection, force = (
+            constant(np.zeros(len(self.columns))) if series is None else series
+            for series in (self.deflection, self.force)
+        )
+        return deflection, force
+
+    @property
     def reference(self) -> np.ndarray:
         """Mean mesh stiffness, (g, 1) [N/m]."""
         return self.stiffness.mean[:, None]
@@ -125,47 +132,17 @@ class GearMeshes:
     def evaluate(self, x, theta):
         """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
         k = self.stiffness.at(theta)
-        line = self.force.at(theta) + k * (x[..., 0] - self.deflection.at(theta))
+        deflection, force = self.state
+        line = force.at(theta) + k * (x[..., 0] - deflection.at(theta))
         if not self.separates:
             return line[..., None], np.broadcast_to(k, line.shape)[..., None, None]
         force, slope = positive_part(line, self.smoothing * k)
-        if np.isfinite(self.backlash).any():
-            has_back = np.isfinite(self.backlash)
+        has_back = np.isfinite(self.backlash)
+        if np.any(has_back):
             play = k * np.where(has_back, self.backlash, 0.0)
             back, back_slope = positive_part(-line - play, self.smoothing * k)
             force, slope = force - has_back * back, slope + has_back * back_slope
         return force[..., None], (k * slope)[..., None, None]
-
-
-def gear_meshes(
-    excitation: MeshExcitation,
-    *,
-    harmonics: int,
-    columns=None,
-    separates: bool = True,
-    smoothing: float = 0.0,
-    orders: tuple[int, ...] = (1,),
-) -> GearMeshes:
-    """The meshes of a static record, each series cut to ``harmonics`` mesh harmonics.
-
-    Parameters
-    ----------
-    excitation : MeshExcitation
-        Its zero backlashes mean that there is no back side.
-    harmonics : int
-        Mesh harmonics kept.
-    columns : (g,) int array, optional
-        Columns of ``W``; the first ones when not given.
-    orders : tuple of int
-        Orders of the mesh frequency; the record's own period counts ``periods`` mesh periods, so with
-        ``periods`` above one the base frequency must be the mesh frequency over ``periods``.
-    """
-    count = harmonics * excitation.periods
-    names = ("stiffness", "deflection", "force")
-    series = {name: series_of(getattr(excitation, name), count, orders=orders) for name in names}
-    backlash = np.where(excitation.backlash > 0.0, excitation.backlash, np.inf)
-    columns = np.arange(len(excitation.stiffness)) if columns is None else columns
-    return GearMeshes(columns, **series, backlash=backlash, separates=separates, smoothing=smoothing)
 
 
 @dataclass(frozen=True)
@@ -223,11 +200,11 @@ class RadialBearings:
     @property
     def reference(self) -> np.ndarray:
         """Stiffness without clearance, (g, 2) [N/m]."""
-        return np.repeat(self.stiffness[:, None], 2, axis=1)
+        return np.repeat(np.asarray(self.stiffness)[:, None], 2, axis=1)
 
     def evaluate(self, x, theta):
         """Forces (..., g, 2) and tangents (..., g, 2, 2)."""
-        return self._continuous(x) if self.springs is None else self._discrete(x)
+        return self._continuous(x) if self.directions is None else self._discrete(x, self.directions)
 
     def _continuous(self, x):
         r = np.hypot(x[..., 0], x[..., 1])
@@ -246,12 +223,12 @@ class RadialBearings:
         tangent = (radial - secant)[..., None, None] * unit[..., :, None] * unit[..., None, :]
         return secant[..., None] * x, tangent + secant[..., None, None] * np.eye(2)
 
-    def _discrete(self, x):
-        each = 4.0 * self.stiffness / self.springs
-        stretch = x @ self.directions.T - self.clearance[:, None]
+    def _discrete(self, x, directions: np.ndarray):
+        each = 4.0 * np.asarray(self.stiffness)[:, None] / len(directions)
+        stretch = x @ directions.T - np.asarray(self.clearance)[:, None]
         force, slope = positive_part(stretch, self.smoothing)
-        forces = (each[:, None] * force) @ self.directions
-        tangents = np.einsum("...gs,si,sj->...gij", each[:, None] * slope, self.directions, self.directions)
+        forces = (each * force) @ directions
+        tangents = np.einsum("...gs,si,sj->...gij", each * slope, directions, directions)
         return forces, tangents
 
 
@@ -292,7 +269,8 @@ class PolynomialSprings:
     def evaluate(self, x, theta):
         """Forces (..., g, 1) and tangents (..., g, 1, 1)."""
         x = x[..., 0]
-        force, slope = np.zeros_like(x), np.zeros_like(x)
+        force: np.ndarray = np.zeros_like(x)
+        slope: np.ndarray = np.zeros_like(x)
         for coefficient in self.coefficients.T[::-1]:
             slope = slope * x + force + coefficient
             force = (force + coefficient) * x
@@ -352,7 +330,9 @@ class PiecewiseSprings:
         return force[..., None], (self.slopes[0] + slope @ change)[..., None, None]
 
 
-def tangent_jumps(tangents: Callable, states: np.ndarray, *, intervals: int = _INTERVALS) -> list[np.ndarray]:
+def tangent_jumps(
+    tangents: Callable[..., np.ndarray], states: np.ndarray, *, intervals: int = _INTERVALS
+) -> list[np.ndarray]:
     """Fractions of the period, for every state, at which its tangents jump; ascending, zero left out.
 
     Tangents at equidistant instants; an interval whose change is unlike that of its neighbours is halved
@@ -376,9 +356,11 @@ def tangent_jumps(tangents: Callable, states: np.ndarray, *, intervals: int = _I
     around = 0.5 * (np.roll(change, 1, axis=1) + np.roll(change, -1, axis=1))
     unlike, change = (np.abs(a).max(axis=(2, 3), initial=0.0) for a in (change - around, change))
     suspect = (unlike > _UNLIKE * change) & (change > _SMALL * size[:, None])
+    row: np.ndarray
     row, column = np.nonzero(suspect)
     found = [[] for _ in states]
-    low, high = nodes[1:-2][column], nodes[2:-1][column]
+    low: np.ndarray = nodes[1:-2][column]
+    high: np.ndarray = nodes[2:-1][column]
     for _ in range(_ROUNDS):
         row, low, high, where = _halved(tangents, states, size, row, low, high)
         if not len(row):
@@ -391,10 +373,18 @@ def tangent_jumps(tangents: Callable, states: np.ndarray, *, intervals: int = _I
     return [_sorted(fractions) for fractions in found]
 
 
-def _halved(tangents, states, size, row, low, high):
+def _halved(
+    tangents: Callable[..., np.ndarray],
+    states: np.ndarray,
+    size: np.ndarray,
+    row: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Jumps in intervals (k,) of the rows: rows, ends and places of those that hold one."""
-    a, b = low.copy(), high.copy()
-    before = np.full(len(row), np.inf)
+    a: np.ndarray = low.copy()
+    b: np.ndarray = high.copy()
+    before: np.ndarray = np.full(len(row), np.inf)
     for level in range(_LAST):
         if not len(row):
             break
@@ -417,6 +407,96 @@ def _sorted(fractions) -> np.ndarray:
     values = np.sort(np.asarray(fractions, float))
     values = values[(values > 1e-13) & (values < 1.0 - 1e-13)]
     return values[np.diff(values, prepend=-1.0) > 1e-13]
+
+
+def tabulated_element(element: Element, theta: np.ndarray) -> Callable:
+    """Law of an element on single columns at known instants.
+
+    Parameters
+    ----------
+    element : Element
+    theta : (n_times, n_bases) array
+        Phases of the instants [rad].
+
+    Returns
+    -------
+    callable
+        ``law(i, x (g,)) -> (forces (g,), slopes (g,))`` at instant i.
+    """
+    if type(element) is GearMeshes:
+        return _mesh_law(element, theta)
+    if type(element) is PolynomialSprings:
+        return _polynomial_law(element)
+
+    def general(i, x):
+        force, slope = element.evaluate(x[:, None], theta[i])
+        return force[:, 0], slope[:, 0, 0]
+
+    return general
+
+
+def _polynomial_law(element: PolynomialSprings) -> Callable:
+    """``PolynomialSprings.evaluate`` with the coefficients of force and slope ready for Horner's rule."""
+    force_terms = list(element.coefficients.T[::-1])
+    slope_terms = [c * (len(force_terms) - d) for d, c in enumerate(force_terms)]
+
+    def law(i, x):
+        force, slope = force_terms[0], slope_terms[0]
+        for f, s in zip(force_terms[1:], slope_terms[1:]):
+            force, slope = force * x + f, slope * x + s
+        return force * x, slope
+
+    return law
+
+
+def _mesh_law(element: GearMeshes, theta) -> Callable:
+    """``GearMeshes.evaluate`` with its series tabulated."""
+    k = np.array(element.stiffness.at(theta))
+    deflection, force = element.state
+    offset = force.at(theta) - k * deflection.at(theta)
+    if not element.separates:
+        return lambda i, x: (offset[i] + k[i] * x, k[i])
+    has_back = np.isfinite(element.backlash)
+    play = k * np.where(has_back, element.backlash, 0.0)
+    play[:, ~has_back] = np.inf
+    if element.smoothing:
+        return _smooth_mesh_law(k, offset, play, element.smoothing)
+    if not np.any(has_back):
+
+        def drive(i, x):
+            stiffness = k[i]
+            line = offset[i] + stiffness * x
+            closed = line > 0.0
+            return line * closed, stiffness * closed
+
+        return drive
+
+    def both(i, x):
+        stiffness = k[i]
+        line = offset[i] + stiffness * x
+        behind = line + play[i]
+        drive, back = line > 0.0, behind < 0.0
+        return np.maximum(line, 0.0) + np.minimum(behind, 0.0), stiffness * (drive | back)
+
+    return both
+
+
+def _smooth_mesh_law(k, offset, play, smoothing) -> Callable:
+    length = smoothing * k
+    square = length * length
+    finite = np.isfinite(play[0])
+    gap = np.where(finite, play, 0.0)
+
+    def smooth(i, x):
+        line = offset[i] + k[i] * x
+        root = np.sqrt(line * line + square[i])
+        force, slope = 0.5 * (line + root), 0.5 * (1.0 + line / root)
+        behind = np.where(finite, -line - gap[i], 0.0)
+        root = np.sqrt(behind * behind + square[i])
+        back, back_slope = 0.5 * (behind + root), 0.5 * (1.0 + behind / root)
+        return force - finite * back, k[i] * (slope + finite * back_slope)
+
+    return smooth
 
 
 def _check_pressing(stiffness) -> None:
@@ -461,6 +541,6 @@ def _numbers(value, key: str, code: str = "E-SHAPE") -> np.ndarray:
 
 
 def _positive(name: str, value: float) -> None:
-    value = _numbers(value, name, "E-SMOOTHING")
-    if not (np.isfinite(value) and value >= 0.0):
-        raise CaseError(f"{name} of {value} m", code="E-SMOOTHING", limit="0 m or more")
+    length = _numbers(value, name, "E-SMOOTHING")
+    if not (np.isfinite(length) and length >= 0.0):
+        raise CaseError(f"{name} of {length} m", code="E-SMOOTHING", limit="0 m or more")

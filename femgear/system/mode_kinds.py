@@ -15,11 +15,14 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.system.assembler import free_motions
-from femgear.system.lumped import PlanarSet, RigidSet, body_masses
+from femgear.system.rigid_bodies import RigidSet, body_masses
 
 PURE = 0.99
 CLASSES = ("rotational", "translational", "planet")
 CENTRAL = ("carrier", "ring", "sun", "motor", "brake")
+# motions of a central member that turn into each other with the frame, the third one alone
+_PLANES = ((0, 1, 5), (3, 4, 2))
+_IN_SPACE = {"rotational": "rotational-axial", "translational": "translational-tilting"}
 
 
 @dataclass(frozen=True)
@@ -296,36 +299,74 @@ def _inside(pattern: np.ndarray, weighted: np.ndarray) -> np.ndarray:
     return (np.abs(np.einsum("nk,nam->kam", pattern, weighted)) ** 2).sum(axis=(0, 1))
 
 
-def energy_shares(motions: SetMotions) -> np.ndarray:
-    """`class_energies` (3, m) over the whole kinetic energy."""
+def class_shares(data: RigidSet, shape) -> np.ndarray:
+    """Shares (3, m) of rotational, translational and planet motion in the kinetic energy of every mode.
+
+    In space rotational-axial, translational-tilting and planet motion; see `class_energies`, also for unequal
+    spacing.
+    """
+    motions = gear_set_motions(data, shape)
     central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
     return class_energies(motions) / (central + (np.abs(motions.weighted) ** 2).sum(axis=(0, 1)))
 
 
-def planar_motions(data: PlanarSet, shape) -> SetMotions:
-    """Motions of all bodies, held ones and planets fixed to their pins included.
+def gear_set_motions(data: RigidSet, shape) -> SetMotions:
+    """Motions of all bodies in every mode, held ones and planets tied to their pins included.
+
+    The central members of bodies that move in space stand twice: x, y and rotation, then tilt about x, tilt
+    about y and z, which turn with the frame as those do. Planets have all their motions.
 
     Parameters
     ----------
-    data : PlanarSet
+    data : RigidSet
     shape : (n, m) array
-        In the coordinates of `planar_system`.
+        In the coordinates of `gear_set_system`.
 
     Raises
     ------
     CaseError
         Shapes of another system (E-SHAPE).
     """
-    full, mass = body_motions(data, free_motions(data), shape), body_masses(data)
-    return SetMotions(full[:3], mass[:3], full[3:], mass[3:], data.planet_angles)
-
-
-def body_motions(data: RigidSet, T: np.ndarray, shape) -> np.ndarray:
-    """Mode shapes (n, m) in all coordinates (N + 3, axes, m); `T` are the free motions (E-SHAPE)."""
-    shape = np.asarray(shape)
+    shape, T, axes = np.asarray(shape), free_motions(data), data.axes
     if shape.ndim != 2 or len(shape) != T.shape[1]:
         raise CaseError(
             f"mode shapes of shape {shape.shape}", code="E-SHAPE", limit=f"({T.shape[1]}, modes)"
         )  # fmt: skip
-    bodies = data.n_planets + 3
-    return (T @ shape).reshape(bodies, len(T) // bodies, -1)
+    full, mass = (T @ shape).reshape(data.n_planets + 3, len(axes), -1), body_masses(data)
+    planes = [[axes.index(axis) for axis in plane] for plane in _PLANES if set(plane) <= set(axes)]
+    central = np.concatenate([full[:3, plane] for plane in planes])
+    central_mass = np.concatenate([mass[:3, plane] for plane in planes])
+    return SetMotions(central, central_mass, full[3:], mass[3:], data.angles)
+
+
+def gear_set_kinds(data: RigidSet, shape, *, frequency) -> tuple[str, ...]:
+    """Kind of every mode from its shape.
+
+    T. Eritenel and R. G. Parker (J. Sound Vib. 325, 2009, 397-420) for bodies that move in space, equal
+    planets at equal angles: in a rotational-axial mode the central members rotate and move along z, and all
+    planets move alike; in a translational-tilting mode they move and tilt in the plane; in a planet mode they
+    rest. With four planets these are the modes that Kahraman (1994) calls in-phase, sequentially phased and
+    counter-phased; the phasing itself comes from `phasing` of `gear_set_motions`.
+
+    Parameters
+    ----------
+    data : RigidSet
+    shape : (n, m) array
+        In the coordinates of `gear_set_system`.
+    frequency : (m,) array
+        Zero for rigid-body modes.
+
+    Returns
+    -------
+    tuple of str
+        ``rigid``; ``rotational``, ``translational`` or ``planet``, in space ``rotational-axial``,
+        ``translational-tilting`` or ``planet``, where at least 99 % of the kinetic energy belongs to that
+        class; else ``mixed``, as for most modes of unequally spaced planets.
+
+    Raises
+    ------
+    CaseError
+        Shapes of another system (E-SHAPE).
+    """
+    kinds = named_kinds(class_shares(data, shape), frequency)
+    return tuple(_IN_SPACE.get(kind, kind) for kind in kinds) if len(data.axes) > 3 else kinds

@@ -9,13 +9,11 @@ Structural Analysis (1968), sections 5.6 and 11.3; gyroscopic terms: H. D. Nelso
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.system import MechanicalSystem
 
 AXES = ("x", "y", "tilt x", "tilt y", "rotation")
 
@@ -194,77 +192,6 @@ def _mass_terms(l: float, phi: float) -> tuple[np.ndarray, np.ndarray]:
     return moving, turning
 
 
-@dataclass(frozen=True)
-class Disc:
-    """Rigid disc on a station: mass [kg], polar and transverse inertia [kg m^2]."""
-
-    station: int
-    mass: float
-    polar: float
-    transverse: float
-
-
-@dataclass(frozen=True)
-class Support:
-    """Bearing on a station: stiffness across the axis [N/m] and against tilt [N m/rad]."""
-
-    station: int
-    radial: float
-    tilt: float = 0.0
-
-
-def shaft_system(
-    sections: Sequence[ShaftSection],
-    lengths: Sequence[float],
-    *,
-    discs: Sequence[Disc] = (),
-    supports: Sequence[Support] = (),
-) -> MechanicalSystem:
-    """One shaft of any number of elements with discs and bearings.
-
-    Parameters
-    ----------
-    sections, lengths : (n,) sequences
-        Of the elements, from the first station to the last.
-    discs, supports : sequences
-        An infinite stiffness holds the coordinate, which is then left out.
-
-    Returns
-    -------
-    MechanicalSystem
-        ``W`` has no columns; ``gyroscopic`` multiplies the speed of the shaft.
-    """
-    count = len(lengths) + 1
-    if len(sections) != len(lengths) or count < 2:
-        raise CaseError(
-            f"{len(sections)} sections and {len(lengths)} lengths", code="E-SHAPE",
-            limit="one of each an element, one element or more",
-        )  # fmt: skip
-    M, K, G = (np.zeros((5 * count, 5 * count)) for _ in range(3))
-    for number, (section, length) in enumerate(zip(sections, lengths)):
-        place = slice(5 * number, 5 * number + 10)
-        for total, part in zip((M, K, G), beam_element(section, length)):
-            total[place, place] += part
-    for disc in discs:
-        own = disc_matrices(disc.mass, disc.polar, disc.transverse)
-        place = _place(disc.station, count)
-        M[place, place] += own[0]
-        G[place, place] += own[1]
-    held = np.zeros(5 * count, bool)
-    for support in supports:
-        place = _place(support.station, count)
-        stiffness = np.array([support.radial, support.radial, support.tilt, support.tilt, 0.0])
-        held[place] |= np.isinf(stiffness)
-        K[place, place] += np.diag(np.where(np.isinf(stiffness), 0.0, stiffness))
-    free = np.flatnonzero(~held)
-    names = [f"station {n + 1}: {axis}" for n in range(count) for axis in AXES]
-    cut = np.ix_(free, free)
-    return MechanicalSystem(
-        M[cut], np.zeros((len(free), len(free))), K[cut], np.zeros((len(free), 0)), np.zeros(len(free)),
-        tuple(names[i] for i in free), G[cut],
-    )  # fmt: skip
-
-
 def disc_matrices(mass: float, polar: float, transverse: float) -> tuple[np.ndarray, np.ndarray]:
     """Mass (5, 5) and gyroscopic matrix (5, 5) of a rigid disc on its station.
 
@@ -273,12 +200,6 @@ def disc_matrices(mass: float, polar: float, transverse: float) -> tuple[np.ndar
     G = np.zeros((5, 5))
     G[2, 3], G[3, 2] = polar, -polar
     return np.diag([mass, mass, transverse, transverse, polar]), G
-
-
-def _place(station: int, count: int) -> slice:
-    if not 0 <= station < count:
-        raise CaseError(f"station {station} of {count}", code="E-SHAFT", limit=f"0 to {count - 1}")
-    return slice(5 * station, 5 * station + 5)
 
 
 def _check_length(length: float) -> None:

@@ -21,13 +21,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from femgear.errors import CaseError
-from femgear.system.assembler import free_motions, mesh_directions, pin_directions
+from femgear.errors import CaseError, checked_numbers
+from femgear.system.assembler import (
+    free_motions,
+    mesh_directions,
+    pin_directions,
+    stiffness_matrix,
+    support_diagonal,
+)
 from femgear.system.elements import GearMeshes
-from femgear.system.entries import checked_numbers
-from femgear.system.lumped import CENTRAL, PlanarSet, body_masses, member_radius
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, SummedSeries, distinct_lines
+from femgear.system.fourier import FourierSeries, StepSeries, SummedSeries, distinct_lines
+from femgear.system.rigid_bodies import CENTRAL, PlanarSet, body_masses
+from femgear.system.system import HarmonicForce, NonlinearSystem
 
 # sense of the rotation relative to the carrier where the sun turns counter-clockwise in its frame
 SENSE = {"sun": 1, "planet": -1, "ring": -1}
@@ -225,17 +230,23 @@ def with_errors(
     CaseError
         Back flanks on their own lines, stepwise series (E-ERRORS), dampers without a frequency (E-FREQUENCY).
     """
-    drive = problem.elements[0]
-    plain = isinstance(drive, GearMeshes) and isinstance(drive.deflection, FourierSeries | SummedSeries)
-    others = any(isinstance(one, GearMeshes) for one in problem.elements[1:])
-    if not plain or others or len(drive.columns) != 2 * errors.data.n_planets:
+    drive, *others = problem.elements
+    known = drive.state[0] if isinstance(drive, GearMeshes) else None
+    several = any(isinstance(one, GearMeshes) for one in others)
+    if (
+        not isinstance(drive, GearMeshes)
+        or known is None
+        or isinstance(known, StepSeries)
+        or several
+        or len(drive.columns) != 2 * errors.data.n_planets
+    ):
         raise CaseError(
             "errors need one element of all meshes with Fourier series", code="E-ERRORS",
             remedy="build the problem with planar_problem, without back flanks on their own lines",
         )  # fmt: skip
     series = errors.series
-    known = drive.deflection.parts if isinstance(drive.deflection, SummedSeries) else (drive.deflection,)
-    elements = (replace(drive, deflection=SummedSeries((*known, *series.parts))), *problem.elements[1:])
+    parts = known.parts if isinstance(known, SummedSeries) else (known,)
+    elements = (replace(drive, deflection=SummedSeries((*parts, *series.parts))), *others)
     forces = problem.forces
     if dampers is not None:
         if mesh_frequency is None:
@@ -270,7 +281,7 @@ def carrier_pins(data: PlanarSet, amplitude: float, phase: float = 0.0) -> np.nd
         number = checked_numbers(value, name, code="E-ERRORS", unit="")
         if number.ndim or not np.isfinite(number):
             raise CaseError(f"a {name} of {value}", code="E-ERRORS", key=name, limit="one finite number")
-    angle = phase - data.planet_angles
+    angle = phase - data.angles
     return amplitude * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
@@ -341,7 +352,7 @@ def planar_mesh_dampers(data: PlanarSet, ratio) -> np.ndarray:
 
 
 def equivalent_damping(data: PlanarSet, *, mesh_ratio, support_ratio, flank: int = 1) -> np.ndarray:
-    """Damping matrix of a lumped set in the coordinates of `planar_system`, for ``planar_problem(damping=)``.
+    """Damping matrix of a set in the coordinates of `gear_set_system`, for ``planar_problem(damping=)``.
 
     Parameters
     ----------
@@ -363,22 +374,12 @@ def equivalent_damping(data: PlanarSet, *, mesh_ratio, support_ratio, flank: int
         raise CaseError(f"flank {flank}", code="E-DAMPING", key="flank", limit="1 or -1")
     if _numbers("support_ratio", support_ratio).ndim:
         raise CaseError("several support damping ratios", code="E-DAMPING", key="support_ratio", limit="one")
-    W = mesh_directions(data, flank)
+    W, T, pins = mesh_directions(data, flank), free_motions(data), pin_directions(data)
     C = (W * planar_mesh_dampers(data, mesh_ratio)) @ W.T
-    along = np.zeros(len(W))
-    for row, name in enumerate(CENTRAL):
-        body, radius = getattr(data, name), member_radius(data, name)
-        if math.isfinite(body.support):
-            along[3 * row : 3 * row + 2] = support_dampers(body.support, body.mass, support_ratio)
-        if math.isfinite(body.torsional_support):
-            turning = support_dampers(body.torsional_support, body.inertia, support_ratio)
-            along[3 * row + 2] = turning / radius**2
-    C += np.diag(along)
-    finite = np.where(np.isfinite(data.planet_bearing), data.planet_bearing, 0.0)
-    pins = pin_directions(data)
-    dampers = support_dampers(finite, data.planet.mass, support_ratio)
-    C += np.einsum("ina,n,jna->ij", pins, dampers, pins)
-    T = free_motions(data)
+    C += np.diag(support_dampers(support_diagonal(data), body_masses(data), support_ratio).ravel())
+    bearings = np.where(np.isfinite(data.pin_stiffness), data.pin_stiffness, 0.0)
+    dampers = support_dampers(bearings, data.planet.mass, support_ratio)
+    C += stiffness_matrix(pins.reshape(len(pins), -1), dampers.ravel())
     return T.T @ C @ T
 
 

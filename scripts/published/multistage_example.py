@@ -20,10 +20,10 @@ from published.iso6336_stiffness import mesh_stiffness_method_b
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
-from femgear.system.assembler import planar_meshes
+from femgear.system.assembler import mesh_elements
 from femgear.system.elements import GearMeshes
-from femgear.system.lumped import PlanarBody, PlanarSet, torsional_of_reduced, torsional_set
-from femgear.system.series import harmonics_of, sample
+from femgear.system.fourier import harmonics_of, sample
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet, torsional_of_reduced, torsional_set
 from femgear.trains.multistage.model import (
     MultistageSet,
     Stage,
@@ -270,7 +270,7 @@ def example_meshes(train: MultistageSet, harmonics: int) -> dict[int, GearMeshes
     for number, (stage, design) in enumerate(zip(train.stages, DESIGNS), 1):
         waves = stiffness_waves(design, harmonics)
         series = phased_series(*waves, stage.phases, mean=stage.data.mesh_stiffness)
-        made[number] = planar_meshes(stage.data, stiffness=series, separates=False)
+        made[number] = mesh_elements(stage.data, stiffness=series, separates=False)
     return made
 
 

@@ -7,17 +7,15 @@ import math
 import numpy as np
 
 from femgear.gears.phasing import MeshPhasing, standard_lag
-from femgear.system.lumped import (
+from femgear.system.rigid_bodies import (
+    HelicalBody,
+    HelicalSupport,
     PlanarBody,
     PlanarSet,
     inertia_of_reduced,
     torsional_of_reduced,
 )
-from femgear.trains.helical.model import (
-    HelicalSet,
-    reduced_body,
-    reduced_support,
-)
+from femgear.trains.helical.model import HelicalSet
 
 # N/um in N/m
 MICRO = 1e6
@@ -33,6 +31,31 @@ TABLE_2 = {
     "G": (31, 69, 20, "IV-II-even"),
     "H": (31, 69, 19, "IV-II-odd"),
 }
+
+
+def reduced_body(
+    radius: float, *, mass: float, polar: float, diametral: float, support: HelicalSupport | None = None
+) -> HelicalBody:
+    """Body from data on ``u = r theta`` and ``w = r phi``, as Kahraman (1994, Table 3) prints them.
+
+    Parameters
+    ----------
+    radius : float
+        r [m]: base radius of a gear, radius of the circle of planet centres for the carrier.
+    mass, polar, diametral : float
+        m, J / r^2 and I / r^2 [kg].
+    support : HelicalSupport, optional
+        In SI, see `reduced_support`.
+    """
+    support = HelicalSupport() if support is None else support
+    return HelicalBody(mass, polar * radius**2, diametral * radius**2, support)
+
+
+def reduced_support(
+    radius: float, *, radial: float = 0.0, axial: float = 0.0, tilt: float = 0.0, torsional: float = 0.0
+) -> HelicalSupport:
+    """Support from stiffnesses on translations, ``w = r phi`` and ``u = r theta``, all [N/m]."""
+    return HelicalSupport(radial, axial, tilt * radius**2, torsional * radius**2)
 
 
 def kahraman_set(**changes) -> HelicalSet:

@@ -16,9 +16,9 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
-from femgear.system.assembler import planar_meshes
-from femgear.system.lumped import PlanarBody, PlanarSet, PlanarTorque, inertia_of_reduced
-from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.assembler import mesh_elements
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque, inertia_of_reduced
+from femgear.system.system import NonlinearSystem
 from femgear.trains.planar.model import (
     Gravity,
     MemberBearing,
@@ -118,7 +118,7 @@ def gravity_problem_b(
     data = wind_turbine_b()
     return planar_problem(
         data,
-        meshes=planar_meshes(data, backlash=backlash, smoothing=smoothing),
+        meshes=mesh_elements(data, backlash=backlash, smoothing=smoothing),
         back_flanks=own_lines,
         torque=PlanarTorque(torque, "carrier", output=None),
         gravity=Gravity(orders=(1,) if driven else (-1,)),
@@ -147,7 +147,7 @@ def extended_problem_b(
     stiffness = phased_series(fluctuation, fluctuation, phases, mean=data.mesh_stiffness, orders=(0, 1))
     return planar_problem(
         data,
-        meshes=planar_meshes(data, stiffness=stiffness, smoothing=SMOOTHING),
+        meshes=mesh_elements(data, stiffness=stiffness, smoothing=SMOOTHING),
         torque=PlanarTorque(torque, "carrier", output=None),
         gravity=Gravity(orders=(1, 0)),
         damping=mode_ratios(planar_modes(data).frequency, DAMPING_B),
@@ -181,7 +181,7 @@ def bearing_problem_a(
     back = backlash is not None
     base = planar_problem(
         data,
-        meshes=planar_meshes(data, backlash=backlash, smoothing=smoothing if back else 0.0),
+        meshes=mesh_elements(data, backlash=backlash, smoothing=smoothing if back else 0.0),
         back_flanks=back,
         torque=PlanarTorque(TORQUE_A, "carrier", output=None),
         gravity=Gravity(orders=(1,)),

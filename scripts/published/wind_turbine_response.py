@@ -13,8 +13,8 @@ from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmo
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.time.stroboscopic import SweepResponse, stroboscopic_map
 from femgear.system.assembler import free_motions, pin_directions
-from femgear.system.lumped import CENTRAL
-from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.rigid_bodies import CENTRAL
+from femgear.system.system import NonlinearSystem
 from femgear.trains.planar.model import column_contact, fluctuation, weight_curve
 
 

@@ -6,14 +6,9 @@ from phase_patterns import mesh_loads
 
 from femgear.gears.phasing import MEMBERS, mesh_phasing, phasing_table
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
-from femgear.system.lumped import HelicalBody, HelicalSupport
-from femgear.trains.helical.model import (
-    HelicalSet,
-    helical_modes,
-    helical_system,
-    mesh_directions,
-    pin_directions,
-)
+from femgear.system.assembler import gear_set_system, mesh_directions, pin_directions
+from femgear.system.rigid_bodies import HelicalBody, HelicalSupport
+from femgear.trains.helical.model import HelicalSet, helical_modes
 
 HARMONICS = np.arange(1, 7)
 KIND = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}
@@ -128,7 +123,9 @@ def test_harmonics_excite_one_kind_of_mode(sun, ring, planets, offsets):
     modes = helical_modes(data)
     kind = np.array(modes.kind)
     k = data.mesh_stiffness[:, None]
-    force = np.abs(mesh_loads(modes.shape.T @ (helical_system(data).W * k.T), phasing, HARMONICS)).max(axis=1)
+    force = np.abs(mesh_loads(modes.shape.T @ (gear_set_system(data).W * k.T), phasing, HARMONICS)).max(
+        axis=1
+    )
     table = phasing_table(phasing, HARMONICS)
     for row, excited in zip(force, table.excited):
         (name,) = excited

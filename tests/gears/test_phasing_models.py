@@ -7,16 +7,19 @@ from validation.reference.frequency_response import mesh_error_response
 
 from femgear.gears.phasing import (
     MEMBERS,
-    cyclic_shares,
-    mesh_loads,
     mesh_phasing,
     phase_factors,
     phasing_table,
 )
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
-from femgear.system.assembler import mesh_directions, pin_directions, planar_system
-from femgear.system.lumped import PlanarBody, PlanarSet
-from femgear.system.mode_kinds import equally_spaced, phase_basis, phase_shares, planar_motions
+from femgear.system.assembler import gear_set_system, mesh_directions, pin_directions
+from femgear.system.mode_kinds import (
+    equally_spaced,
+    gear_set_motions,
+    phase_basis,
+    phase_shares,
+)
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.trains.planar.model import planar_modes
 
 ALPHA = np.radians(21.0), np.radians(20.0)
@@ -131,7 +134,7 @@ def test_harmonics_excite_the_kinds_that_the_rule_names(sun, ring, planets, offs
     modes = planar_modes(data)
     kind = np.array(modes.kind)
     factor = phase_factors(phasing, HARMONICS).reshape(-1, 2, planets)
-    directions = planar_system(data).W.reshape(-1, 2, planets)
+    directions = gear_set_system(data).W.reshape(-1, 2, planets)
     force = np.abs(np.einsum("gm,gfn,hfn->hfm", modes.shape, directions, factor)).max(axis=1)
     size = np.linalg.norm(np.einsum("gm,gfn->fnm", modes.shape, directions), axis=(0, 1))
     force = force / np.where(size > 1e-9 * size.max(), size, np.inf)
@@ -161,11 +164,11 @@ def test_planet_modes_are_excited_by_cyclic_harmonic(planets):
     phasing = mesh_phasing(sun, ring, equal_planet_angles(planets))
     data = lumped(np.array(equal_planet_angles(planets)))
     modes = planar_modes(data)
-    motions = planar_motions(data, modes.shape)
+    motions = gear_set_motions(data, modes.shape)
     shape = modes.shape @ phase_basis(motions, modes.frequency)
-    share = phase_shares(planar_motions(data, shape))
+    share = phase_shares(gear_set_motions(data, shape))
     number = np.array([np.nanargmax(column) for column in share.T])
-    directions = planar_system(data).W.reshape(-1, 2, planets)
+    directions = gear_set_system(data).W.reshape(-1, 2, planets)
     force = np.abs(
         np.einsum(
             "gm,gfn,hfn->hfm", shape, directions, phase_factors(phasing, HARMONICS).reshape(-1, 2, planets)
@@ -183,7 +186,7 @@ def mesh_forces(phasing, psi):
     data = lumped(psi)
     error = phase_factors(phasing, [1]).T * 1e-6
     answer = mesh_error_response(
-        planar_system(data), [700.0], error, mesh_stiffness=data.mesh_stiffness, damping_ratio=0.03
+        gear_set_system(data), [700.0], error, mesh_stiffness=data.mesh_stiffness, damping_ratio=0.03
     )
     return np.abs(answer.force[0, 0]).reshape(2, -1)
 

@@ -6,7 +6,7 @@ import pytest
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.elements import GearMeshes
-from femgear.system.series import FourierSeries, constant
+from femgear.system.fourier import FourierSeries, constant
 from femgear.trains.gear_pair.model import (
     STATE_NAMES,
     UNKNOWN,

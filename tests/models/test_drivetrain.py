@@ -17,7 +17,7 @@ from scipy.linalg import eigh
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.system.assembler import planar_system
+from femgear.system.assembler import gear_set_system
 from femgear.system.shaft import ShaftSection
 from femgear.trains.drivetrain.data import (
     ChainBearing,
@@ -157,7 +157,10 @@ def test_one_planetary_stage_is_the_planar_model():
             sun=replace(lumped.sun, support=3e7),
         )
         k = model.mean_stiffness
-        ours, theirs = solve_modes(model.still, k), solve_modes(planar_system(lumped), lumped.mesh_stiffness)
+        ours, theirs = (
+            solve_modes(model.still, k),
+            solve_modes(gear_set_system(lumped), lumped.mesh_stiffness),
+        )
         assert ours.frequency[1:] == pytest.approx(theirs.frequency[1:], rel=1e-9)
         strain = [np.sort((m.mesh_deflection**2).sum(axis=0))[2:] for m in (ours, theirs)]
         assert strain[0] == pytest.approx(strain[1], rel=1e-8)
@@ -176,7 +179,7 @@ def test_turning_directions_against_the_carrier_frame():
     lumped = replace(
         lumped, carrier=replace(lumped.carrier, support=2e8), sun=replace(lumped.sun, support=3e7)
     )
-    system = planar_system(lumped, carrier_speed=speed)
+    system = gear_set_system(lumped, carrier_speed=speed)
     # x, y of carrier and sun, then rotations: u = r theta
     start = np.zeros(len(model.rigid))
     start[model.index("sun: x")] = 1e-5

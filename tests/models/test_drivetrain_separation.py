@@ -169,7 +169,7 @@ def test_adaptive_integrator_and_order():
 
 
 def forces_of(model, speed, times, q):
-    from femgear.system.series import FourierSeries
+    from femgear.system.fourier import FourierSeries
 
     theta = times[:, None] * model.frequencies(speed)
     x = np.einsum("tmj,tm->tj", model.geometry.selection(theta[:, :2:2]), q @ model.geometry.basic)

@@ -15,8 +15,8 @@ from femgear.fe.reduction import CyclicModes
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_angles
 from femgear.solvers.linear.modal import complex_modes, solve_modes
-from femgear.system.assembler import planar_system
-from femgear.system.lumped import PlanarBody, planar_from_set
+from femgear.system.assembler import gear_set_system
+from femgear.system.rigid_bodies import PlanarBody, planar_from_set
 from femgear.trains.elastic.model import (
     RADIAL,
     TANGENTIAL,
@@ -530,7 +530,7 @@ def test_turning_set_with_a_rigid_ring_is_the_planar_set():
     i = place(model, "carrier: rotation")
     K[i, i] -= 3 * PLANET.mass * (0.051 * speed) ** 2
     ours = complex_modes(replace(system, K=K), SPRING, speed=speed)
-    planar = planar_system(
+    planar = gear_set_system(
         planar_from_set(
             gears,
             sun=PlanarBody(SUN.mass, SUN.inertia, SUN.stiffness),

@@ -8,8 +8,8 @@ from published.planetary_sets import lin_parker_set
 from scipy import linalg
 
 from femgear.errors import CaseError
-from femgear.system.assembler import planar_system
-from femgear.system.lumped import torsional_set
+from femgear.system.assembler import gear_set_system
+from femgear.system.rigid_bodies import torsional_set
 from femgear.system.transmission_errors import (
     equivalent_damping,
     mesh_dampers,
@@ -46,7 +46,7 @@ def test_supports_alone_damp_the_members_of_a_set():
     data = replace(
         lin_parker_set(3), stiffness_sun_planet=1e-6, stiffness_planet_ring=1e-6, planet_bearing=1e-6
     )
-    system = planar_system(data)
+    system = gear_set_system(data)
     C = equivalent_damping(data, mesh_ratio=0.0, support_ratio=0.07)
     K = system.K + (system.W * data.mesh_stiffness) @ system.W.T
     found = ratios(system.M, C, K)
@@ -58,7 +58,7 @@ def test_whole_matrix_is_the_sum_of_its_dampers():
     data, rng = lin_parker_set(3), np.random.default_rng(4)
     C = equivalent_damping(data, mesh_ratio=0.05, support_ratio=0.02)
     assert np.allclose(C, C.T) and np.linalg.eigvalsh(C).min() > -1e-9 * np.abs(C).max()
-    velocity, system = rng.standard_normal(len(C)), planar_system(data)
+    velocity, system = rng.standard_normal(len(C)), gear_set_system(data)
     turning = {
         name: body.inertia / radius**2
         for name, body, radius in (
@@ -87,7 +87,7 @@ def test_whole_matrix_is_the_sum_of_its_dampers():
 def test_held_members_have_no_dampers():
     data = torsional_set(lin_parker_set(3))
     C = equivalent_damping(data, mesh_ratio=0.05, support_ratio=0.02)
-    assert C.shape == planar_system(data).M.shape
+    assert C.shape == gear_set_system(data).M.shape
     fixed = replace(data, ring=replace(data.ring, torsional_support=np.inf))
     dampers = planar_mesh_dampers(fixed, 0.05)[3:]
     planet = data.planet.inertia / data.planet_radius**2

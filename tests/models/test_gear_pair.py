@@ -8,9 +8,8 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.system.elements import GearMeshes
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries
+from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.gear_pair.model import equivalent_mass, gear_pair
 
 INERTIA, RADIUS = (1.2e-3, 4.5e-3), (0.04, 0.07)

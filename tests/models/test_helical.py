@@ -15,19 +15,9 @@ from validation.planetary import nrel_set
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.system.assembler import planar_system
-from femgear.system.lumped import HelicalBody, HelicalSupport, PlanarTorque
-from femgear.trains.helical.model import (
-    HelicalSet,
-    body_masses,
-    contact_ratios,
-    free_motions,
-    helical_dofs,
-    helical_from_set,
-    helical_system,
-    mesh_directions,
-    pin_directions,
-)
+from femgear.system.assembler import dof_names, free_motions, gear_set_system, mesh_directions, pin_directions
+from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque, body_masses
+from femgear.trains.helical.model import HelicalSet, contact_ratios, helical_from_set
 
 
 def uneven(**changes):
@@ -174,7 +164,7 @@ def test_modes_of_a_pair_are_those_of_its_published_matrices():
         sun=replace(data.sun, support=HelicalSupport(1e8, 3e7, 2e4, 5e3)),
         planet_bearing=HelicalSupport(2e8, 4e7, 1e4, 6e3),
     )
-    system = helical_system(data)
+    system = gear_set_system(data)
     assert len(system.M) == 12
     psi, beta = data.pressure_angle_sun_planet - 0.7, data.base_helix_angle
     c, s, sp, cp = math.cos(beta), math.sin(beta), math.sin(psi), math.cos(psi)
@@ -226,7 +216,7 @@ def test_without_helix_the_plane_motions_are_those_of_the_planar_set(torque, con
     planar = replace(planar, sun=replace(planar.sun, support=sun_support))
     support = replace(data.sun.support, radial=sun_support)
     data = replace(data, contact_points=contact_points, sun=replace(data.sun, support=support))
-    flat, system = planar_system(planar, torque=torque), helical_system(data, torque=torque)
+    flat, system = gear_set_system(planar, torque=torque), gear_set_system(data, torque=torque)
     plane = [system.dofs.index(name) for name in flat.dofs]
     rest = np.setdiff1d(np.arange(len(system.M)), plane)
     size = np.abs(flat.K).max()
@@ -272,7 +262,7 @@ def test_infinite_supports_and_pins_are_constraints():
         )
         for v in (math.inf, 0.0)
     )
-    system, loose = helical_system(held), helical_system(free)
+    system, loose = gear_set_system(held), gear_set_system(free)
     assert len(system.M) == 36 - 1 - 12
     assert "planet 1: radial" not in system.dofs and "planet 1: z" in system.dofs
     rows = [pin_directions(data)[:, n, axis] for n in range(3) for axis in (0, 1, 3, 4)] + [np.eye(36)[11]]
@@ -299,7 +289,7 @@ def test_pins_feel_no_rigid_motion_and_all_relative_ones():
 def test_torque_is_carried_by_meshes_and_pins_in_equilibrium():
     """Mesh forces from equilibrium of moments; axial forces on each planet cancel."""
     data = kahraman_set(contact_points="pitch_point")
-    system = helical_system(data, torque=PlanarTorque(100.0))
+    system = gear_set_system(data, torque=PlanarTorque(100.0))
     modes = solve_modes(system, data.column_stiffness, damping_ratio=0.0)
     force = data.column_stiffness * modes.load_deflection
     around = 100.0 / 4 / 0.024 / math.cos(math.radians(20.0))
@@ -311,7 +301,7 @@ def test_torque_is_carried_by_meshes_and_pins_in_equilibrium():
     assert np.abs(axial).max() < 1e-6 * force[0]
     with pytest.raises(CaseError, match="E-MECHANISM"):
         held = replace(data.sun, support=replace(data.sun.support, torsional=math.inf))
-        helical_system(replace(data, sun=held), torque=PlanarTorque(1.0))
+        gear_set_system(replace(data, sun=held), torque=PlanarTorque(1.0))
 
 
 def test_data_of_a_geared_set():
@@ -337,7 +327,7 @@ def test_reduced_data_are_the_masses_of_the_coordinates():
     data = kahraman_set()
     expected = [3.0, 3.0, 3.0, 0.75, 0.75, 1.5]
     assert body_masses(data)[0] == pytest.approx(expected, rel=1e-14)
-    assert len(helical_dofs(4)) == 42 and helical_dofs(4)[41] == "planet 4: u"
+    assert len(dof_names(kahraman_set())) == 42 and dof_names(kahraman_set())[41] == "planet 4: u"
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ import pytest
 from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
-from femgear.system.lumped import CENTRAL, HelicalBody, HelicalSupport, PlanarTorque
-from femgear.trains.helical.model import helical_system
+from femgear.system.assembler import gear_set_system
+from femgear.system.rigid_bodies import CENTRAL, HelicalBody, HelicalSupport, PlanarTorque
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_a_set_that_is_held_in_every_motion_is_refused():
     data, rigid = kahraman_set(), HelicalSupport(*[math.inf] * 4)
     held = {name: replace(getattr(data, name), support=rigid) for name in CENTRAL}
     with pytest.raises(CaseError, match="E-MECHANISM"):
-        helical_system(kahraman_set(planet_bearing=rigid, **held))
+        gear_set_system(kahraman_set(planet_bearing=rigid, **held))
 
 
 @pytest.mark.parametrize(("points", "left"), [("pitch_point", 0.0), ("base_circles", 0.3)])
@@ -50,7 +50,7 @@ def test_tilting_moments_of_one_planet_are_in_equilibrium_at_the_pitch_point_alo
     data = kahraman_set(planet_angles=[0.0], contact_points=points)
     data = replace(data, sun=replace(data.sun, support=HelicalSupport(1e8, 1e8, 1e6)))
     data = replace(data, carrier=replace(data.carrier, support=HelicalSupport(1e8, 1e8, 1e6, 1e6)))
-    system = helical_system(data, torque=PlanarTorque(100.0, "sun", None))
+    system = gear_set_system(data, torque=PlanarTorque(100.0, "sun", None))
     stiffness = system.K + (system.W * data.column_stiffness) @ system.W.T
     q = np.linalg.solve(stiffness, system.load)[:18].reshape(3, 6)
     springs = np.array([getattr(data, name).support.stiffness for name in CENTRAL])

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from published.iso6336_stiffness import theoretical_single_stiffness
 from published.planetary_sets import kahraman_set
 from scipy.integrate import quad
 
@@ -12,7 +11,7 @@ from femgear.contact.cycle import cycle_without_load
 from femgear.errors import CaseError
 from femgear.gears import profile
 from femgear.system.system import MeshExcitation
-from femgear.trains.helical.model import contact_line_width, helical_excitation, slice_phases
+from femgear.trains.helical.model import helical_excitation, slice_phases
 
 TAU = np.arange(128) / 128
 MEAN, LINES = 4e8, np.array([0.2, 0.1j, 0.05 - 0.03j, 0.02])
@@ -107,15 +106,6 @@ def test_height_runs_ahead_by_the_twist_of_the_flanks(helix):
         [0.2], profile.overlap_ratio(width, module, beta), slices=4, hand=int(np.sign(helix))
     )  # fmt: skip
     assert ahead == pytest.approx(0.2 + height * twist * teeth / (2 * math.pi), rel=1e-12)
-
-
-def test_length_of_contact_lines_gives_the_transverse_stiffness_of_the_standard():
-    """ISO 6336-1: c' in the transverse section is that of the normal section times cos(beta)."""
-    beta, width = math.radians(20.0), 0.03
-    normal = theoretical_single_stiffness(30, 70, 0.0, 0.0, helix_angle=beta)
-    along = normal * contact_line_width(width, beta)
-    # force and deflection along the normal, seen in the transverse section
-    assert along * math.cos(beta) ** 2 == pytest.approx(normal * width * math.cos(beta), rel=1e-14)
 
 
 def test_what_cannot_be_is_refused():

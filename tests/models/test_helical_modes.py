@@ -8,14 +8,11 @@ from published.planetary_sets import kahraman_set
 from validation.reference.mode_energy import stiffness_of, strain_shares
 
 from femgear.errors import CaseError
-from femgear.system.lumped import HelicalSupport
-from femgear.system.mode_kinds import phase_basis, phasing
+from femgear.system.assembler import gear_set_springs, gear_set_system
+from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis, phasing
+from femgear.system.rigid_bodies import HelicalSupport
 from femgear.trains.helical.model import (
-    helical_kinds,
     helical_modes,
-    helical_motions,
-    helical_springs,
-    helical_system,
 )
 
 
@@ -50,10 +47,10 @@ def test_phasing_of_the_modes_of_six_planets():
     """The classes 0, 1, 2 and 3 of the cyclic group: six modes of each that can be told apart in twos."""
     data = equal(6)
     modes = helical_modes(data, max_frequency=60e3)
-    shape = modes.shape @ phase_basis(helical_motions(data, modes.shape), modes.frequency)
-    names = phasing(helical_motions(data, shape))
+    shape = modes.shape @ phase_basis(gear_set_motions(data, modes.shape), modes.frequency)
+    names = phasing(gear_set_motions(data, shape))
     kinds = dict(zip(("rotational-axial", "translational-tilting"), ("in phase", "sequentially phased 1")))
-    for kind, name in zip(helical_kinds(data, shape, frequency=modes.frequency), names):
+    for kind, name in zip(gear_set_kinds(data, shape, frequency=modes.frequency), names):
         if kind == "planet":
             assert name in ("sequentially phased 2", "counter-phased")
         elif kind != "rigid":
@@ -69,8 +66,8 @@ def test_modes_of_unequal_planets_are_mixed():
 def test_springs_make_the_whole_stiffness_and_their_shares_add_up():
     bearing = HelicalSupport(np.array([1e8, 2e8, 3e8, 4e8]), 1e9, 1e5, 3e3)
     data = kahraman_set(planet_bearing=bearing, slices=2, face_width=0.03, contact_points="pitch_point")
-    system, modes = helical_system(data), helical_modes(data, max_frequency=20e3)
-    springs = helical_springs(data)
+    system, modes = gear_set_system(data), helical_modes(data, max_frequency=20e3)
+    springs = gear_set_springs(data)
     total = system.K + (system.W * data.column_stiffness) @ system.W.T
     assert stiffness_of(springs) == pytest.approx(total, rel=1e-12, abs=1e-12 * np.abs(total).max())
     shares = strain_shares(springs, modes.shape)
@@ -79,9 +76,9 @@ def test_springs_make_the_whole_stiffness_and_their_shares_add_up():
     assert energy == pytest.approx((2 * np.pi * modes.frequency) ** 2, rel=1e-7)
     assert {"bearing of planet 4, torsional", "support of the sun, tilt"} <= set(springs)
     held = replace(data, ring=replace(data.ring, support=HelicalSupport(np.inf, 0.0, np.inf, np.inf)))
-    assert not [name for name in helical_springs(held) if "ring, " in name]
+    assert not [name for name in gear_set_springs(held) if "ring, " in name]
 
 
 def test_shapes_of_another_set_are_refused():
     with pytest.raises(CaseError, match="E-SHAPE"):
-        helical_kinds(equal(4), np.eye(36), frequency=np.ones(36))
+        gear_set_kinds(equal(4), np.eye(36), frequency=np.ones(36))

@@ -13,14 +13,12 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.system.assembler import planar_meshes, planar_system
-from femgear.system.lumped import HelicalBody, HelicalSupport, PlanarTorque
-from femgear.system.nonlinear import element_forces
-from femgear.system.system import MeshExcitation
+from femgear.system.assembler import gear_set_system, mesh_elements
+from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque
+from femgear.system.system import MeshExcitation, element_forces
 from femgear.trains.helical.model import (
     HelicalSet,
     helical_excitation,
-    helical_meshes,
     helical_modes,
     helical_problem,
     modal_error_response,
@@ -60,8 +58,8 @@ def both_problems(backlash):
     stiffness = phased_series(WAVE, WAVE, PHASES, mean=planar.mesh_stiffness)
     options = {"stiffness": stiffness, "backlash": backlash}
     return (
-        planar_problem(planar, meshes=planar_meshes(planar, **options), torque=TORQUE, damping=0.05),
-        helical_problem(data, meshes=helical_meshes(data, **options), torque=TORQUE, damping=0.05),
+        planar_problem(planar, meshes=mesh_elements(planar, **options), torque=TORQUE, damping=0.05),
+        helical_problem(data, meshes=mesh_elements(data, **options), torque=TORQUE, damping=0.05),
     )
 
 
@@ -83,7 +81,9 @@ def test_without_helix_phased_errors_do_the_same():
     planar = lin_parker_set(3)
     data, error = without_helix(planar), phased_errors(1e-6 * WAVE, PHASES)
     hertz = np.linspace(100.0, 9000.0, 60)
-    flat = modal_error_response(planar_system(planar), planar_modes(planar, damping_ratio=0.05), hertz, error)
+    flat = modal_error_response(
+        gear_set_system(planar), planar_modes(planar, damping_ratio=0.05), hertz, error
+    )
     system = helical_problem(data, torque=TORQUE).system
     space = modal_error_response(system, helical_modes(data, damping_ratio=0.05), hertz, error)
     assert np.abs(space.force - flat.force).max() < 1e-9 * np.abs(flat.force).max()
@@ -104,7 +104,7 @@ def test_spectral_iteration_and_harmonic_balance_agree_on_a_helical_set():
     record = helical_excitation(waves(data, cases()["F"].phases, 0.3), 0.7, slices=2)
     around = 500.0 * math.cos(data.base_helix_angle)
     torque = PlanarTorque(4 * around * data.sun_radius)
-    meshes = helical_meshes(data, stiffness=record, harmonics=2, separates=False)
+    meshes = mesh_elements(data, stiffness=record, harmonics=2, separates=False)
     problem = helical_problem(data, meshes=meshes, torque=torque, damping=0.05)
     modes = solve_modes(
         replace(problem.system, C=np.zeros_like(problem.system.C)), data.column_stiffness, damping_ratio=0.05
@@ -125,7 +125,7 @@ def test_parting_teeth_by_shooting_and_harmonic_balance():
     data = kahraman_set(contact_points="pitch_point", planet_bearing=stiff)
     record = waves(data, cases()["C"].phases, 0.25)
     torque = PlanarTorque(4 * 500.0 * math.cos(data.base_helix_angle) * data.sun_radius)
-    meshes = helical_meshes(data, stiffness=record, harmonics=2, backlash=1e-4)
+    meshes = mesh_elements(data, stiffness=record, harmonics=2, backlash=1e-4)
     problem = helical_problem(data, meshes=meshes, torque=torque, damping=0.05)
     omega = 2 * math.pi * 9840.0
     balance = solve_harmonic_balance(problem, omega, harmonics=12, samples=1024, stability=False)
@@ -151,10 +151,10 @@ def test_what_does_not_fit_is_refused():
     data = kahraman_set()
     record = waves(data, np.zeros(8), 0.1)
     with pytest.raises(CaseError, match="E-HARMONICS"):
-        helical_meshes(data, stiffness=record)
+        mesh_elements(data, stiffness=record)
     with pytest.raises(CaseError, match="E-SHAPE"):
         helical_problem(data, damping=np.eye(3))
     with pytest.raises(CaseError, match="E-SHAPE"):
-        helical_problem(replace(data, slices=2, face_width=0.1), meshes=helical_meshes(data))
+        helical_problem(replace(data, slices=2, face_width=0.1), meshes=mesh_elements(data))
     with pytest.raises(CaseError, match="E-LOAD-BALANCE"):
         helical_problem(data, torque=PlanarTorque(10.0, output=None))

@@ -9,14 +9,11 @@ from validation.reference.frequency_response import mesh_error_response
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears.phasing import MeshPhasing, mesh_phasing, phase_factors
-from femgear.system.mode_kinds import phase_shares
+from femgear.system.assembler import free_motions, gear_set_springs, gear_set_system
+from femgear.system.mode_kinds import gear_set_motions, phase_shares
+from femgear.system.rigid_bodies import body_masses
 from femgear.trains.helical.model import (
-    body_masses,
-    free_motions,
     helical_modes,
-    helical_motions,
-    helical_springs,
-    helical_system,
     modal_error_response,
     phased_errors,
     spring_loads,
@@ -28,7 +25,7 @@ AMPLITUDES = np.array([1.0, 0.5j, -0.25, 0.1 + 0.1j]) * 1e-6
 
 def direct(data, error, outputs=None, hertz=HERTZ):
     return mesh_error_response(
-        helical_system(data), hertz, error, mesh_stiffness=data.column_stiffness, outputs=outputs,
+        gear_set_system(data), hertz, error, mesh_stiffness=data.column_stiffness, outputs=outputs,
         damping_ratio=0.05,
     )  # fmt: skip
 
@@ -41,11 +38,11 @@ def direct(data, error, outputs=None, hertz=HERTZ):
 ])  # fmt: skip
 def test_sum_of_modes_is_the_direct_solution(changes):
     data = kahraman_set(**changes)
-    system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)
+    system, modes = gear_set_system(data), helical_modes(data, damping_ratio=0.05)
     rng = np.random.default_rng(1)
     phases = rng.uniform(size=(2, len(data.column_stiffness)))
     error = np.array([phased_errors(AMPLITUDES, p) for p in phases])
-    _, rows = spring_loads(helical_springs(data))
+    _, rows = spring_loads(gear_set_springs(data))
     found = modal_error_response(system, modes, HERTZ, error, outputs=rows)
     for case in range(2):
         expected = direct(data, error[case], rows)
@@ -56,8 +53,8 @@ def test_sum_of_modes_is_the_direct_solution(changes):
 
 def test_modes_left_out_leave_their_static_part():
     data = kahraman_set()
-    system, error = helical_system(data), phased_errors(AMPLITUDES, cases()["F"].phases)
-    _, rows = spring_loads(helical_springs(data))
+    system, error = gear_set_system(data), phased_errors(AMPLITUDES, cases()["F"].phases)
+    _, rows = spring_loads(gear_set_springs(data))
     whole, cut = (
         modal_error_response(system, modes, [50.0, 100.0], error, outputs=rows)
         for modes in (
@@ -81,10 +78,10 @@ def test_each_harmonic_moves_the_planets_in_its_own_phasing(letter, planets):
     data = kahraman_set(planet_angles=2 * np.pi * np.arange(planets) / planets)
     case = MeshPhasing(sun, ring, tuple(25 * n for n in range(planets)), lag=0.3)
     error = phased_errors(AMPLITUDES, case.phases)
-    n = len(helical_system(data).M)
+    n = len(gear_set_system(data).M)
     found = direct(data, error, np.eye(n), hertz=np.array([400.0, 1300.0, 2500.0]))
     for h in range(4):
-        motions = helical_motions(data, found.output[:, h].T)
+        motions = gear_set_motions(data, found.output[:, h].T)
         share = phase_shares(motions, signed=True)
         own = (-(h + 1) * sun) % planets
         others = np.delete(share, own, axis=0)
@@ -108,7 +105,7 @@ def test_printed_phases_pair_opposite_planets_and_turning_teeth_make_all_equal(l
 def test_counter_phased_harmonics_peak_at_the_counter_phased_mode():
     """Case C: harmonics 1 and 3 peak near 9840 Hz, harmonics 2 and 4 at in-phase modes."""
     data = kahraman_set()
-    system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)
+    system, modes = gear_set_system(data), helical_modes(data, damping_ratio=0.05)
     error = phased_errors(np.full(4, 1e-6), cases()["C"].phases)
     for h, expected in ((1, 9840.2), (2, 12032.9), (3, 9840.2), (4, 12032.9)):
         hertz = np.arange(9e3, 14e3, 10.0)
@@ -120,7 +117,7 @@ def test_counter_phased_harmonics_peak_at_the_counter_phased_mode():
 def test_parity_of_the_planets_chooses_the_counter_phased_mode():
     """Same sun and ring: even planets (C) answer at 9840 Hz, odd ones (D) at 7625 Hz."""
     data = kahraman_set()
-    system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)
+    system, modes = gear_set_system(data), helical_modes(data, damping_ratio=0.05)
     hertz = np.arange(5e3, 14e3, 10.0)
     for letter, expected in (("C", 9840.2), ("D", 7625.0)):
         error = phased_errors(np.full(1, 1e-6), cases()[letter].phases)
@@ -144,8 +141,8 @@ def test_loads_of_springs_move_the_masses(uneven):
     """Newton on every body: spring loads along their directions against -omega^2 m q, undamped."""
     angles = 0.5 * np.pi * np.arange(4) + 0.2 * np.array([0, 1, 0, -1]) * uneven
     data = kahraman_set(planet_angles=angles)
-    system, modes = helical_system(data), helical_modes(data)
-    springs = {k: v for k, v in helical_springs(data).items() if k.startswith(("bearing", "support"))}
+    system, modes = gear_set_system(data), helical_modes(data)
+    springs = {k: v for k, v in gear_set_springs(data).items() if k.startswith(("bearing", "support"))}
     names, rows = spring_loads(springs)
     hertz, error = np.array([333.3]), phased_errors(AMPLITUDES, [0, 0.3, 0.1, 0.7, 0.2, 0.9, 0.4, 0.6])
     motion = np.eye(len(system.M))
@@ -170,7 +167,7 @@ def test_phase_factors_are_those_of_the_teeth():
 
 def test_what_does_not_fit_is_refused():
     data = kahraman_set()
-    system, modes = helical_system(data), helical_modes(data)
+    system, modes = gear_set_system(data), helical_modes(data)
     error = phased_errors(AMPLITUDES, np.zeros(8))
     with pytest.raises(CaseError, match="E-SHAPE"):
         modal_error_response(system, modes, [100.0], error[:7])
@@ -187,4 +184,4 @@ def test_harmonics_that_are_none_are_refused(harmonics):
     data = kahraman_set()
     error = np.full((8, 1), 1e-6)
     with pytest.raises(CaseError, match="E-HARMONICS"):
-        modal_error_response(helical_system(data), helical_modes(data), HERTZ, error, harmonics=harmonics)
+        modal_error_response(gear_set_system(data), helical_modes(data), HERTZ, error, harmonics=harmonics)

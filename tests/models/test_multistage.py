@@ -14,8 +14,8 @@ from trains import closed_set, stage, two_stages
 from validation.reference.mode_energy import stiffness_of, strain_shares
 
 from femgear.errors import CaseError
-from femgear.system.assembler import planar_meshes, planar_system
-from femgear.system.lumped import CENTRAL
+from femgear.system.assembler import gear_set_system, mesh_elements
+from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
@@ -313,7 +313,7 @@ def test_turning_stages_are_planar_sets_at_their_own_speeds():
     system = multistage_system(train, speed=speed)
     carrier = train_speeds(train, speed).carrier
     for one, w, rows in zip(train.stages, carrier, stage_slices(train)):
-        alone = planar_system(one.data, carrier_speed=float(w))
+        alone = gear_set_system(one.data, carrier_speed=float(w))
         assert speed * system.gyroscopic[rows, rows] == pytest.approx(w * alone.gyroscopic)
         assert system.load[rows] == pytest.approx(alone.load)
         # the coupling and the free rotation touch rotations and tangential motions only
@@ -361,7 +361,7 @@ def test_shaft_stiffness_between_its_limits():
         (lambda: train_speeds(two_stages(), math.inf), "E-VALUE"),
         (lambda: train_torques(two_stages(), math.nan), "E-VALUE"),
         (lambda: multistage_system(two_stages(lateral=math.inf), speed=10.0), "E-COUPLING"),
-        (lambda: multistage_problem(two_stages(), meshes={3: planar_meshes(lin_parker_set())}), "E-SHAPE"),
+        (lambda: multistage_problem(two_stages(), meshes={3: mesh_elements(lin_parker_set())}), "E-SHAPE"),
         (lambda: multistage_problem(two_stages(), damping=np.eye(3)), "E-SHAPE"),
         (lambda: error_response(two_stages(), 10.0, {1: np.zeros((5, 2))}), "E-SHAPE"),
         (lambda: error_response(two_stages(), 10.0, {4: np.zeros((6, 2))}), "E-SHAPE"),

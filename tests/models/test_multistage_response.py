@@ -11,9 +11,9 @@ from validation.reference.frequency_response import mesh_error_response
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.assembler import planar_meshes
-from femgear.system.lumped import PlanarTorque
-from femgear.system.series import FourierSeries, distinct_lines, harmonic_lines
+from femgear.system.assembler import mesh_elements
+from femgear.system.fourier import FourierSeries, distinct_lines, harmonic_lines
+from femgear.system.rigid_bodies import PlanarTorque
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
@@ -76,7 +76,7 @@ def test_phases_of_the_example_are_those_of_its_gears():
 
 def linear_meshes(one, error):
     """Meshes that may pull, with the error as unloaded deflection."""
-    made = planar_meshes(one.data, separates=False)
+    made = mesh_elements(one.data, separates=False)
     return replace(made, deflection=FourierSeries(np.column_stack([np.zeros(len(error)), error])))
 
 
@@ -104,7 +104,7 @@ def parametric_meshes(train, depth):
     for number, one in enumerate(train.stages, 1):
         waves = [depth, 0.3j * depth], [0.7 * depth, -0.2 * depth]
         series = phased_series(*waves, one.phases, mean=one.data.mesh_stiffness)
-        made[number] = planar_meshes(one.data, stiffness=series, separates=False)
+        made[number] = mesh_elements(one.data, stiffness=series, separates=False)
     return made
 
 
@@ -169,7 +169,7 @@ def test_turning_lateral_coupling_is_a_constant_spring_in_a_fixed_frame():
     train = two_stages(torsional=3e5, lateral=lateral)
     train = replace(train, stages=(train.stages[0], replace(train.stages[1], angle=0.0)))
     ((_, relative),) = turning_couplings(train, speed).items()
-    meshes = {n: planar_meshes(one.data, separates=False) for n, one in enumerate(train.stages, 1)}
+    meshes = {n: mesh_elements(one.data, separates=False) for n, one in enumerate(train.stages, 1)}
     problem = multistage_problem(train, meshes=meshes, speed=speed)
     system, (one, other) = problem.system, stage_slices(train)
     load = np.zeros(len(system.M))
@@ -229,7 +229,7 @@ def test_one_stage_is_the_planar_problem():
     one = two_stages().stages[0]
     train = MultistageSet(stages=(one,), couplings=(), input=Member(1, "sun"), output=Member(1, "carrier"))
     wave = phased_series([0.2, 0.1j], [0.2, 0.1], one.phases, mean=one.data.mesh_stiffness)
-    meshes = planar_meshes(one.data, stiffness=wave, backlash=4e-5)
+    meshes = mesh_elements(one.data, stiffness=wave, backlash=4e-5)
     ours = multistage_problem(train, meshes={1: meshes}, torque=300.0, damping=0.04)
     alone = planar_problem(one.data, meshes=meshes, torque=PlanarTorque(300.0), damping=0.04)
     for name in ("M", "K", "C", "W", "load"):

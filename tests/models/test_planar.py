@@ -15,13 +15,13 @@ from femgear.gears.kinematics import torques
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.assembler import (
     column_groups,
+    dof_names,
     free_motions,
+    gear_set_system,
     mesh_directions,
     pin_directions,
-    planar_dofs,
-    planar_system,
 )
-from femgear.system.lumped import (
+from femgear.system.rigid_bodies import (
     CENTRAL,
     PlanarBody,
     PlanarTorque,
@@ -66,7 +66,7 @@ def test_mesh_columns_are_the_gradient_of_exact_involute_kinematics(flank, mesh)
     frame = np.array([out, [-out[1], out[0]]]).T
 
     def approach(q):
-        q = dict(zip(planar_dofs(3), q))
+        q = dict(zip(dof_names(data), q))
         centre = {body: np.array([q[f"{body}: x"], q[f"{body}: y"]]) for body in ("sun", "ring")}
         name = f"planet {planet + 1}"
         centre["planet"] = data.centre_distance * out + frame @ [
@@ -131,7 +131,7 @@ def printed_stiffness(data):
 
 @pytest.mark.parametrize("data", [uneven(), lin_parker_set(4), lin_parker_set(5)], ids=["uneven", "4", "5"])
 def test_stiffness_and_mass_are_those_that_lin_and_parker_print(data):
-    system = planar_system(data)
+    system = gear_set_system(data)
     total = system.K + (system.W * data.mesh_stiffness) @ system.W.T
     assert total == pytest.approx(printed_stiffness(data), abs=1e-14 * np.abs(total).max())
     bodies = [
@@ -142,12 +142,12 @@ def test_stiffness_and_mass_are_those_that_lin_and_parker_print(data):
     bodies += [(data.planet, data.planet_radius)] * data.n_planets
     mass = np.concatenate([[b.mass, b.mass, b.inertia / r**2] for b, r in bodies])
     assert np.array_equal(system.M, np.diag(mass))
-    assert system.dofs == planar_dofs(data.n_planets) and not system.C.any() and system.gyroscopic is None
+    assert system.dofs == dof_names(data) and not system.C.any() and system.gyroscopic is None
 
 
 def rotation(data, *, sun, carrier):
     """Small rotations of the mechanism, angles [rad] of sun and carrier given."""
-    q = dict.fromkeys(planar_dofs(data.n_planets), 0.0)
+    q = dict.fromkeys(dof_names(data), 0.0)
     a = data.centre_distance
     planet = carrier - (sun - carrier) * data.sun_radius / data.planet_radius
     ring = carrier + (planet - carrier) * data.planet_radius / data.ring_radius
@@ -184,7 +184,7 @@ def test_turning_all_planets_turns_nothing_else():
     modes = []
     for shift in (0.0, 0.7):
         data = uneven(planet_angles=ANGLES + shift)
-        modes.append(solve_modes(planar_system(data), data.mesh_stiffness).frequency)
+        modes.append(solve_modes(gear_set_system(data), data.mesh_stiffness).frequency)
     assert modes[1] == pytest.approx(modes[0], rel=1e-9, abs=1e-3)
 
 
@@ -197,7 +197,7 @@ def test_geared_set_gives_radii_angles_and_the_torques_of_willis():
     )  # fmt: skip
     assert np.abs(data.closure).max() < 1e-12
     assert math.degrees(data.pressure_angle_sun_planet) == pytest.approx(24.169, abs=1e-3)
-    system = planar_system(data, torque=PlanarTorque(100.0))
+    system = gear_set_system(data, torque=PlanarTorque(100.0))
     expected = torques(gears, member="sun", torque=100.0)
     load = dict(zip(system.dofs, system.load))
     assert load["sun: u"] * data.sun_radius == pytest.approx(expected.sun, rel=1e-14)
@@ -217,7 +217,7 @@ def test_geared_set_gives_radii_angles_and_the_torques_of_willis():
 )  # fmt: skip
 def test_columns_follow_the_loaded_flanks(torque, compressed):
     data = uneven(carrier=replace(uneven().carrier, torsional_support=1e6))
-    system = planar_system(data, torque=torque)
+    system = gear_set_system(data, torque=torque)
     q = np.linalg.solve(system.K + (system.W * data.mesh_stiffness) @ system.W.T, system.load)
     assert np.all(system.W.T @ q > 0) == compressed
 
@@ -225,7 +225,7 @@ def test_columns_follow_the_loaded_flanks(torque, compressed):
 def test_rotating_frame_shifts_whirl_by_the_carrier_speed():
     """A ring on isotropic supports whirls at sqrt(k/m) in the housing, -+ Omega seen from the carrier."""
     data, speed = lin_parker_set(3), 1500.0
-    system = planar_system(data, carrier_speed=speed)
+    system = gear_set_system(data, carrier_speed=speed)
     G = system.gyroscopic
     assert np.array_equal(G, -G.T) and system.K == pytest.approx(system.K.T, abs=1e-15 * system.K.max())
     ring = [system.dofs.index(f"ring: {axis}") for axis in "xy"]
@@ -239,7 +239,7 @@ def test_whole_set_whirls_as_one_body_seen_from_the_carrier():
     """Without ring, sun and carrier supports the set is one free body: it stands still in the housing."""
     free = {name: replace(getattr(uneven(), name), support=0.0) for name in CENTRAL}
     data, speed = uneven(**free), 200.0
-    system = planar_system(data, carrier_speed=speed)
+    system = gear_set_system(data, carrier_speed=speed)
     total = system.K + (system.W * data.mesh_stiffness) @ system.W.T
     shift = np.zeros((18, 2))
     shift[[0, 3, 6], 0] = shift[[1, 4, 7], 1] = 1.0
@@ -255,24 +255,24 @@ def test_whole_set_whirls_as_one_body_seen_from_the_carrier():
 
 def test_centrifugal_load_pulls_planets_outwards():
     data, speed = lin_parker_set(3), 300.0
-    system = planar_system(data, carrier_speed=speed)
+    system = gear_set_system(data, carrier_speed=speed)
     force = 0.66 * data.centre_distance * speed**2
     q = np.linalg.solve(system.K + 1e-3 * np.eye(18), system.load)
     radial = q[[system.dofs.index(f"planet {n}: radial") for n in (1, 2, 3)]]
     assert radial == pytest.approx(force / (1e8 - 0.66 * speed**2), rel=1e-9)
-    still, tangential = planar_system(data).load, system.load[10::3]
+    still, tangential = gear_set_system(data).load, system.load[10::3]
     assert not still.any() and not tangential.any()
 
 
 def test_infinite_supports_are_the_limit_of_stiff_ones():
     """Error of the stiff supports falls with their stiffness, towards the held coordinates."""
     rigid = torsional_set(lin_parker_set(3))
-    exact = solve_modes(planar_system(rigid), rigid.mesh_stiffness).frequency
+    exact = solve_modes(gear_set_system(rigid), rigid.mesh_stiffness).frequency
     errors = []
     for stiff in (1e13, 1e14):
         held = {name: replace(getattr(rigid, name), support=stiff) for name in CENTRAL}
         data = replace(rigid, planet_bearing=stiff, **held)
-        system = planar_system(data)
+        system = gear_set_system(data)
         total = system.K + (system.W * data.mesh_stiffness) @ system.W.T
         value = eigh(total, system.M, eigvals_only=True)[1 : len(exact)]
         errors.append(np.abs(np.sqrt(value) / (2 * np.pi) / exact[1:] - 1.0).max())
@@ -285,18 +285,18 @@ def test_held_planets_follow_their_pins():
     assert T.shape == (18, 16)
     q = T @ np.arange(1.0, 17.0)
     assert np.abs(pins[:, 1].T @ q).max() < 1e-14
-    system = planar_system(data)
+    system = gear_set_system(data)
     assert "planet 2: radial" not in system.dofs and len(system.dofs) == 16
-    assert np.trace(system.M) > np.trace(planar_system(uneven()).M) - 1e-9
+    assert np.trace(system.M) > np.trace(gear_set_system(uneven()).M) - 1e-9
     assert np.array_equal(system.W, T.T @ mesh_directions(data))
 
 
 def test_bearing_columns_carry_what_left_the_stiffness():
     data, names = uneven(), ("carrier", "sun", "planets", "ring")
     groups = column_groups(data, back_flanks=True, bearings=names)
-    system = planar_system(data, back_flanks=True, bearings=names)
+    system = gear_set_system(data, back_flanks=True, bearings=names)
     assert system.W.shape[1] == 6 + 6 + 3 * 2 + 6 == 1 + max(g.max() for g in groups.values())
-    whole = planar_system(data)
+    whole = gear_set_system(data)
     K = np.array(system.K)
     for name in names:
         k = data.planet_bearing if name == "planets" else [getattr(data, name).support]
@@ -337,8 +337,8 @@ def test_impossible_requests_are_refused():
         PlanarTorque(math.nan)
     held = uneven(sun=replace(uneven().sun, torsional_support=math.inf))
     with pytest.raises(CaseError, match="which is held"):
-        planar_system(held, torque=PlanarTorque(1.0))
+        gear_set_system(held, torque=PlanarTorque(1.0))
     with pytest.raises(CaseError, match="infinitely stiff"):
-        planar_system(uneven(planet_bearing=math.inf), bearings=("planets",))
+        gear_set_system(uneven(planet_bearing=math.inf), bearings=("planets",))
     with pytest.raises(CaseError, match="motor"):
-        planar_system(uneven(), bearings=("motor",))
+        gear_set_system(uneven(), bearings=("motor",))

@@ -9,7 +9,8 @@ from published.wind_turbine import wind_turbine_b
 from validation.planar import by_kind, torsional
 
 from femgear.errors import CaseError
-from femgear.trains.planar.model import class_shares, planar_kinds, planar_modes
+from femgear.system.mode_kinds import class_shares, gear_set_kinds
+from femgear.trains.planar.model import planar_modes
 
 # the matrices of Lin and Parker (1999) set up elsewhere and solved in double precision [Hz]
 PLANET = (1808.18088204, 5963.76002161, 6981.70516704)
@@ -123,7 +124,7 @@ def test_shares_are_those_of_constructed_motions():
     shape[9::3, 3] = np.sin(2 * psi) * np.sqrt(3.0 / (0.66 * (np.sin(2 * psi) ** 2).sum()))
     expected = [[1, 0, 0, 0.25], [0, 1, 0, 0], [0, 0, 1, 0.75]]
     assert class_shares(data, shape) == pytest.approx(np.array(expected), abs=1e-12)
-    kinds = planar_kinds(data, shape, frequency=np.ones(4))
+    kinds = gear_set_kinds(data, shape, frequency=np.ones(4))
     assert kinds == ("rotational", "translational", "planet", "mixed")
 
 

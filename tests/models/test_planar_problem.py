@@ -12,15 +12,14 @@ from validation.planar import sharing_set, static_mesh_forces, sun_forces
 from femgear.errors import CaseError
 from femgear.system.assembler import (
     column_groups,
+    gear_set_system,
     mesh_directions,
+    mesh_elements,
     pin_directions,
-    planar_meshes,
-    planar_system,
 )
-from femgear.system.lumped import PlanarTorque, torque_shares
-from femgear.system.nonlinear import element_forces, external_force
-from femgear.system.series import FourierSeries, StepSeries, constant
-from femgear.system.system import MeshExcitation
+from femgear.system.fourier import FourierSeries, StepSeries, constant
+from femgear.system.rigid_bodies import PlanarTorque, torque_shares
+from femgear.system.system import MeshExcitation, element_forces, external_force
 from femgear.trains.planar.model import Clearances, Gravity, phased_series, pin_deflections, planar_problem
 
 ANGLES = np.array([0.3, 1.9, 4.1])
@@ -62,9 +61,9 @@ def test_pin_errors_act_as_forces_of_the_bearings(sign):
     data = supported(planet_angles=ANGLES, planet_bearing=[1e8, 2e8, 3e8])
     pins, torque = np.array([[3e-6, 5e-6], [-4e-6, 1e-6], [2e-6, -7e-6]]), PlanarTorque(sign * 900.0)
     problem = planar_problem(
-        data, torque=torque, pin_errors=pins, meshes=planar_meshes(data, separates=False)
+        data, torque=torque, pin_errors=pins, meshes=mesh_elements(data, separates=False)
     )
-    system = planar_system(data, torque=torque)
+    system = gear_set_system(data, torque=torque)
     pushed = np.einsum("ina,n,na->i", pin_directions(data), data.planet_bearing, pins)
     q = np.linalg.solve(system.K + (system.W * 5e8) @ system.W.T, system.load + pushed)
     assert static_mesh_forces(problem) == pytest.approx(5e8 * system.W.T @ q, rel=1e-9)
@@ -87,7 +86,7 @@ def test_torque_of_the_mirrored_set():
     forces = [
         static_mesh_forces(
             planar_problem(
-                data, torque=PlanarTorque(t), pin_errors=p, meshes=planar_meshes(data, separates=False)
+                data, torque=PlanarTorque(t), pin_errors=p, meshes=mesh_elements(data, separates=False)
             )
         )
         for data, t, p in ((one, 400.0, pins), (two, -400.0, pins[::-1] * [1.0, -1.0]))
@@ -166,11 +165,11 @@ def test_static_record_is_the_quasi_static_solution():
     torque, tau = PlanarTorque(500.0), np.arange(32) / 32
     phases = np.array([0.0, 0.3, 0.7, 0.1, 0.4, 0.8])
     k = 5e8 * (1 + 0.2 * np.cos(2 * np.pi * (tau + phases[:, None])))
-    system = planar_system(data, torque=torque)
+    system = gear_set_system(data, torque=torque)
     states = np.array([np.linalg.solve(system.K + (system.W * row) @ system.W.T, system.load) for row in k.T])
     deflection = (states @ system.W).T
     record = MeshExcitation(k, deflection, k * deflection, np.full(6, 5e-5))
-    problem = planar_problem(data, torque=torque, meshes=planar_meshes(data, stiffness=record, harmonics=15))
+    problem = planar_problem(data, torque=torque, meshes=mesh_elements(data, stiffness=record, harmonics=15))
     assert np.array_equal(problem.elements[0].backlash, np.full(6, 5e-5))
     for i in (0, 5, 17):
         force = element_forces(problem, states[i] @ problem.system.W, np.array([2 * np.pi * tau[i]]))[0]
@@ -193,7 +192,7 @@ def test_mesh_phases_shift_the_wave():
 def test_a_planet_pushed_outwards_wedges_in_the_ring():
     """Both flanks of a mesh approach by d sin(alpha) when the centres approach by d."""
     data, b, d = supported(), 2e-5, 1e-4
-    meshes = planar_meshes(data, backlash=b)
+    meshes = mesh_elements(data, backlash=b)
     problem = planar_problem(data, meshes=meshes, back_flanks=True)
     q = np.zeros(18)
     q[9] = d
@@ -212,7 +211,7 @@ def test_a_planet_pushed_outwards_wedges_in_the_ring():
 def test_back_flanks_in_rotation_are_those_of_one_line(turn):
     """When bodies only turn, both ways to model the back flanks give the same forces on the bodies."""
     data, pins = supported(), np.array([[0.0, 1e-6], [0.0, -2e-6], [0.0, 0.0]])
-    meshes = planar_meshes(data, backlash=2e-5)
+    meshes = mesh_elements(data, backlash=2e-5)
     q = np.zeros(18)
     q[8] = turn
     moments = []
@@ -228,7 +227,7 @@ def test_back_flanks_of_a_record_touch_beyond_its_unloaded_deflection(theta):
     data, phase = supported(), np.array([theta])
     k = phased_series([0.2], [0.1], np.zeros(6), mean=data.mesh_stiffness)
     waves = FourierSeries(np.tile([[2e-6, 5e-7j]], (6, 1))), FourierSeries(np.tile([[800.0, 100.0]], (6, 1)))
-    meshes = replace(planar_meshes(data, stiffness=k, backlash=3e-5), deflection=waves[0], force=waves[1])
+    meshes = replace(mesh_elements(data, stiffness=k, backlash=3e-5), deflection=waves[0], force=waves[1])
     problem = planar_problem(data, meshes=meshes, back_flanks=True)
     start = (waves[0].at(phase) - waves[1].at(phase) / k.at(phase))[0]
     for x in (start + 1e-6, start - 1.5e-5, start - 3.1e-5):
@@ -242,9 +241,9 @@ def test_damping_is_modal_at_standstill_with_closed_meshes():
     data = supported()
     problem = planar_problem(
         data, damping=0.03, carrier_speed=50.0, back_flanks=True,
-        meshes=planar_meshes(data, backlash=1e-5), clearances=Clearances(carrier=1e-4),
+        meshes=mesh_elements(data, backlash=1e-5), clearances=Clearances(carrier=1e-4),
     )  # fmt: skip
-    plain = planar_system(data)
+    plain = gear_set_system(data)
     value, shape = np.linalg.eigh(
         np.linalg.solve(np.sqrt(plain.M), np.linalg.solve(
             np.sqrt(plain.M), plain.K + (plain.W * 5e8) @ plain.W.T).T))  # fmt: skip
@@ -270,7 +269,7 @@ def test_output_torque_balances_and_a_missing_one_is_refused():
     data = lin_parker_set(3)
     problem = planar_problem(data, torque=PlanarTorque(80.0))
     forces = static_mesh_forces(
-        planar_problem(supported(), torque=PlanarTorque(80.0), meshes=planar_meshes(data, separates=False))
+        planar_problem(supported(), torque=PlanarTorque(80.0), meshes=mesh_elements(data, separates=False))
     )
     assert forces == pytest.approx(np.full(6, 80.0 / data.sun_radius / 3), rel=1e-9)
     assert problem.system.load[2] == pytest.approx(torque_shares(data)["carrier"] * 80.0 / data.sun_radius)
@@ -295,15 +294,15 @@ def test_impossible_requests_are_refused():
         ("E-BACKLASH", lambda: planar_problem(data, back_flanks=True)),
         ("E-BACKLASH", lambda: planar_problem(
             data, back_flanks=True,
-            meshes=replace(planar_meshes(data, stiffness=steps, backlash=1e-5), force=constant(np.ones(6))))),
+            meshes=replace(mesh_elements(data, stiffness=steps, backlash=1e-5), force=constant(np.ones(6))))),
         ("E-BEARING", lambda: planar_problem(
             replace(data, sun=replace(data.sun, support=0.0)), clearances=Clearances(sun=1e-5))),
         ("E-SHAPE", lambda: planar_problem(data, pin_errors=np.zeros((3, 3)))),
         ("E-SHAPE", lambda: planar_problem(data, damping=np.zeros((4, 4)))),
         ("E-SHAPE", lambda: planar_problem(
-            data, meshes=replace(planar_meshes(data), columns=np.arange(1, 7)))),
-        ("E-SHAPE", lambda: planar_meshes(data, stiffness=constant(np.ones(4)))),
-        ("E-HARMONICS", lambda: planar_meshes(
+            data, meshes=replace(mesh_elements(data), columns=np.arange(1, 7)))),
+        ("E-SHAPE", lambda: mesh_elements(data, stiffness=constant(np.ones(4)))),
+        ("E-HARMONICS", lambda: mesh_elements(
             data, stiffness=MeshExcitation(np.ones((6, 4)), np.ones((6, 4)), np.ones((6, 4)), np.zeros(6)))),
     ):  # fmt: skip
         with pytest.raises(CaseError, match=error):

@@ -5,18 +5,10 @@ import math
 import numpy as np
 import pytest
 from scipy.linalg import eigh, eigvals
-from validation.timoshenko import free_bending
+from validation.timoshenko import Disc, Support, free_bending, shaft_system
 
 from femgear.errors import CaseError
-from femgear.system.shaft import (
-    Disc,
-    ShaftSection,
-    Support,
-    beam_element,
-    joint_deflections,
-    joint_springs,
-    shaft_system,
-)
+from femgear.system.shaft import ShaftSection, beam_element, joint_deflections, joint_springs
 
 SECTION = ShaftSection(0.1, 0.02)
 LENGTH, COUNT = 1.0, 24

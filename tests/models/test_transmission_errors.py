@@ -9,9 +9,9 @@ from published.planetary_sets import lin_parker_set
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.assembler import planar_meshes, planar_system
-from femgear.system.lumped import PlanarTorque
-from femgear.system.series import series_spectrum
+from femgear.system.assembler import gear_set_system, mesh_elements
+from femgear.system.fourier import series_spectrum
+from femgear.system.rigid_bodies import PlanarTorque
 from femgear.system.transmission_errors import (
     Eccentricity,
     TransmissionErrors,
@@ -47,10 +47,10 @@ def test_planets_act_on_both_of_their_meshes():
     one = errors(planet=Eccentricity([5e-6, 0.0, 0.0], 0.2))
     theta = np.array([[0.0, 1.1], [0.4, 2.5]])
     found, direction = one.series.at(theta), -theta[:, 1] + 0.2
-    shift = np.zeros((2, len(planar_system(DATA).M)))
+    shift = np.zeros((2, len(gear_set_system(DATA).M)))
     shift[:, 9], shift[:, 10] = 5e-6 * np.cos(direction), 5e-6 * np.sin(direction)
     # the clockwise planet turns from its direction at phase zero, counter-clockwise from outwards
-    np.testing.assert_allclose(found, -shift @ planar_system(DATA).W, atol=1e-18)
+    np.testing.assert_allclose(found, -shift @ gear_set_system(DATA).W, atol=1e-18)
 
 
 def test_frequencies_and_spectrum():
@@ -72,7 +72,7 @@ def slow_response(support, amplitude=10e-6):
     """Sun centre and mesh deflections at a crawl, torque on the sun."""
     data = replace(DATA, sun=replace(DATA.sun, support=support))
     eccentric = TransmissionErrors(data=data, teeth=TEETH, sun=Eccentricity(amplitude))
-    meshes = planar_meshes(data, separates=False)
+    meshes = mesh_elements(data, separates=False)
     problem = planar_problem(data, meshes=meshes, torque=PlanarTorque(300.0), damping=0.02)
     problem = with_errors(problem, eccentric)
     frequency = eccentric.frequency(27.0)
@@ -96,7 +96,7 @@ def test_dampers_act_on_the_rate_less_the_error():
     both = errors(tooth=tooth_lines([4e-6, 0.0], [2e-6, 1e-6], np.arange(6) / 7))
     dampers = planar_mesh_dampers(DATA, 0.04)
     C = equivalent_damping(DATA, mesh_ratio=0.04, support_ratio=0.03)
-    meshes = planar_meshes(DATA, separates=False)
+    meshes = mesh_elements(DATA, separates=False)
     plain = planar_problem(DATA, meshes=meshes, torque=PlanarTorque(300.0), damping=C)
     omega = 2 * np.pi * 1500.0
     problem = with_errors(plain, both, dampers=dampers, mesh_frequency=omega)
@@ -116,7 +116,7 @@ def test_two_bases_against_integration():
         data=DATA, teeth={"sun": 7, "planet": 9, "ring": 25}, sun=Eccentricity(9e-6),
         tooth=tooth_lines([2e-6], [1e-6], np.arange(6) / 3),
     )  # fmt: skip
-    meshes = planar_meshes(DATA, backlash=40e-6)
+    meshes = mesh_elements(DATA, backlash=40e-6)
     problem = planar_problem(DATA, meshes=meshes, torque=PlanarTorque(12.0), damping=0.08)
     problem, frequency = with_errors(problem, eccentric), eccentric.frequency(2 * np.pi * 2200.0)
     orders = eccentric.lines(mesh=6, member=3, bands=3)
@@ -173,7 +173,7 @@ def test_phases_that_are_no_pairs_are_refused(phases):
 
 
 def test_problems_that_cannot_take_errors_are_refused():
-    meshes = planar_meshes(DATA, backlash=40e-6)
+    meshes = mesh_elements(DATA, backlash=40e-6)
     wedging = planar_problem(DATA, meshes=meshes, torque=PlanarTorque(60.0), back_flanks=True)
     with pytest.raises(CaseError, match="E-ERRORS"):
         with_errors(wedging, errors(sun=Eccentricity(1e-6)))

@@ -16,10 +16,9 @@ from femgear.solvers.continuation.branches import (
 from femgear.solvers.linear.modal import modal_damping
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.stability.parametric import stability_boundary
-from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, gear_meshes
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings
+from femgear.system.fourier import FourierSeries
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 
 ONE = np.ones((1, 1))
 

@@ -8,7 +8,7 @@ from published.planetary_sets import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes, damping_matrix, solve_modes, whirl
-from femgear.system.assembler import planar_system
+from femgear.system.assembler import gear_set_system
 from femgear.system.mode_kinds import motion_planes
 from femgear.system.system import MechanicalSystem
 
@@ -156,10 +156,10 @@ def test_planar_set_at_rest_and_with_small_speed():
     """Standstill gives the real modes; a speed shifts frequencies by no more than itself."""
     data = lin_parker_set(4)
     k, speed = data.mesh_stiffness, 20.0
-    rest = complex_modes(planar_system(data), k)
-    real = solve_modes(planar_system(data), k, damping_ratio=0.0)
+    rest = complex_modes(gear_set_system(data), k)
+    real = solve_modes(gear_set_system(data), k, damping_ratio=0.0)
     assert rest.frequency == pytest.approx(real.frequency, rel=1e-9, abs=1e-6)
-    system = planar_system(data, carrier_speed=speed)
+    system = gear_set_system(data, carrier_speed=speed)
     turning = complex_modes(system, k, speed=speed)
     assert (
         np.abs(turning.eigenvalue[turning.paired].imag - 2 * np.pi * real.frequency[1:]).max() <= 1.01 * speed

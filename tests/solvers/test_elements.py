@@ -12,11 +12,10 @@ from femgear.system.elements import (
     PiecewiseSprings,
     PolynomialSprings,
     RadialBearings,
-    gear_meshes,
     positive_part,
 )
-from femgear.system.series import FourierSeries, StepSeries, constant, harmonics_of
-from femgear.system.system import MeshExcitation
+from femgear.system.fourier import FourierSeries, StepSeries, constant, harmonics_of
+from femgear.system.system import MeshExcitation, gear_meshes
 
 RNG = np.random.default_rng(4)
 THETA = RNG.uniform(0.0, 6.0, (200, 1))

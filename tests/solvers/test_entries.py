@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from validation.reference.free_vibration import solve_free_vibration
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
 from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic.harmonic_balance import (
@@ -24,10 +24,8 @@ from femgear.solvers.time.stroboscopic import (
 )
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
-from femgear.system.entries import checked_numbers, checked_tolerance
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries, StepSeries
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 from femgear.trains.gear_pair.model import gear_pair
 
 SYSTEM = gear_pair((1.2e-3, 4.5e-3), (0.04, 0.07), torque=120.0, mesh_damping=900.0)

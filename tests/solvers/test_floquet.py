@@ -8,7 +8,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.stability.floquet import monodromy
 from femgear.solvers.stability.parametric import stability
-from femgear.system.series import harmonics_of
+from femgear.system.fourier import harmonics_of
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 

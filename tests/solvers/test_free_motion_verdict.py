@@ -8,9 +8,8 @@ from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 from femgear.trains.gear_pair.model import gear_pair
 
 OMEGA, PERIOD = 0.7, 2 * np.pi / 0.7

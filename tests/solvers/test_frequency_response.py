@@ -16,7 +16,7 @@ from validation.reference.frequency_response import (
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes, solve_modes
 from femgear.solvers.linear.receptance import direct_response, modal_response
-from femgear.system.assembler import planar_system
+from femgear.system.assembler import gear_set_system
 from femgear.system.system import MechanicalSystem
 from femgear.trains.planar.model import planar_modes
 
@@ -73,7 +73,7 @@ def test_complex_modes_agree_with_the_direct_solution(geared_chain):
 def test_planar_set_by_both_routes_in_time():
     """18 coordinates with a rigid rotation, 2000 frequencies, all six meshes as inputs and outputs."""
     data = lin_parker_set(3)
-    system, k = planar_system(data), data.mesh_stiffness
+    system, k = gear_set_system(data), data.mesh_stiffness
     modes = solve_modes(system, k, damping_ratio=0.02)
     f = np.linspace(20.0, 12000.0, 2000)
     began = time.perf_counter()
@@ -87,7 +87,7 @@ def test_planar_set_by_both_routes_in_time():
 
 def test_turning_planar_set_with_damping_by_complex_modes():
     data, speed = lin_parker_set(3), 150.0
-    system, k = planar_system(data, carrier_speed=speed), data.mesh_stiffness
+    system, k = gear_set_system(data, carrier_speed=speed), data.mesh_stiffness
     system = replace(system, C=2e-6 * system.K + 40.0 * system.M)
     # rounding of the stiff springs blurs the slow pair at 10 Hz by 1e-16 (12000 / 10)^2
     f = np.linspace(200.0, 12000.0, 500)
@@ -98,7 +98,7 @@ def test_turning_planar_set_with_damping_by_complex_modes():
 
 def test_modes_left_out_leave_their_static_flexibility():
     data = lin_parker_set(3)
-    system, k = planar_system(data), data.mesh_stiffness
+    system, k = gear_set_system(data), data.mesh_stiffness
     f = np.array([50.0, 200.0])
     exact = direct_response(system, f, system.W, system.W.T, mesh_stiffness=k, damping_ratio=0.02)
     few = solve_modes(system, k, damping_ratio=0.02, count=8)
@@ -114,7 +114,7 @@ def test_modes_left_out_leave_their_static_flexibility():
 def test_slow_mesh_errors_are_followed_without_force_by_a_free_set():
     """At low frequency a free sun follows the errors of an alike set: W^T q = e, no force."""
     data = lin_parker_set(3)
-    system, k = planar_system(data), data.mesh_stiffness
+    system, k = gear_set_system(data), data.mesh_stiffness
     error = np.ones((6, 1)) * 1e-6
     found = mesh_error_response(system, [0.01], error, mesh_stiffness=k)
     assert found.deflection[0, 0] == pytest.approx(error[:, 0], rel=1e-6)
@@ -144,7 +144,7 @@ def test_mesh_error_response_is_the_solution_of_the_equations(geared_chain):
 def test_planet_phasing_selects_the_kind_of_mode(harmonic, kind):
     """R. G. Parker, J. Sound Vib. 236, 2000: with N = 4, h z_s mod 4 = 0, +-1 or 2 chooses the kind."""
     data = lin_parker_set(4)
-    system, k, N = planar_system(data), data.mesh_stiffness, 4
+    system, k, N = gear_set_system(data), data.mesh_stiffness, 4
     modes = planar_modes(data, damping_ratio=0.05)
     wave = np.exp(-1j * harmonic * data.planet_angles)
     error = np.concatenate([wave, 0.6 * wave * np.exp(0.4j)])[:, None] * 1e-6
@@ -166,7 +166,7 @@ def test_undamped_resonance_is_refused():
     with pytest.raises(ConvergenceError, match="E-RESONANCE"):
         modal_response(system, modes, modes.frequency, np.ones(1), np.ones((1, 1)))
     data = lin_parker_set(3)
-    free = planar_system(data)
+    free = gear_set_system(data)
     with pytest.raises(ConvergenceError, match="E-RESONANCE"):
         modes = solve_modes(free, data.mesh_stiffness, damping_ratio=0.02)
         modal_response(free, modes, [0.0], np.eye(18), np.eye(18))
@@ -231,7 +231,7 @@ def test_too_few_samples_are_named():
 def test_planar_set_resonances():
     """Driving-point response of the sun: where modes stand alone the given damping comes back."""
     data, zeta = lin_parker_set(3), 0.01
-    system, k = planar_system(data), data.mesh_stiffness
+    system, k = gear_set_system(data), data.mesh_stiffness
     modes = solve_modes(system, k, damping_ratio=zeta)
     f = np.linspace(300.0, 13000.0, 30000)
     force = unit_force(system, "sun: u")

@@ -13,16 +13,9 @@ from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import adapt_harmonics, displacements, solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.system.elements import (
-    GearMeshes,
-    PiecewiseSprings,
-    PolynomialSprings,
-    RadialBearings,
-    gear_meshes,
-)
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, harmonic_lines, harmonics_of, side_bands
-from femgear.system.system import MechanicalSystem
+from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
+from femgear.system.fourier import FourierSeries, harmonic_lines, harmonics_of, side_bands
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 
 
 def oscillator(*elements, damping=0.0, stiffness=0.0, load=0.0, forces=()):

@@ -8,9 +8,8 @@ from femgear.solvers.linear.receptance import reduce_problem
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.elements import GearMeshes, PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 
 def duffing():

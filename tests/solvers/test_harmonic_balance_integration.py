@@ -9,12 +9,17 @@ from published.planetary_sets import lin_parker_set
 from scipy.integrate import solve_ivp
 
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
-from femgear.system.assembler import planar_meshes
+from femgear.system.assembler import mesh_elements
 from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
-from femgear.system.lumped import PlanarTorque
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces, external_force
-from femgear.system.series import FourierSeries, harmonic_lines, harmonics_of
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries, harmonic_lines, harmonics_of
+from femgear.system.rigid_bodies import PlanarTorque
+from femgear.system.system import (
+    HarmonicForce,
+    MechanicalSystem,
+    NonlinearSystem,
+    element_forces,
+    external_force,
+)
 from femgear.trains.planar.model import Clearances, planar_problem
 
 
@@ -117,7 +122,7 @@ def test_planetary_set_with_backlash():
     mesh = 5e8 * np.array([1.0, 0.25, 0.075, 0.0375])
     stiffness = FourierSeries(mesh * np.exp(-2j * np.pi * phases[:, None] * np.arange(4)))
     problem = planar_problem(
-        data, meshes=planar_meshes(data, stiffness=stiffness, backlash=20e-6), torque=PlanarTorque(300.0),
+        data, meshes=mesh_elements(data, stiffness=stiffness, backlash=20e-6), torque=PlanarTorque(300.0),
         damping=0.03,
     )  # fmt: skip
     omega = 2.0 * np.pi * 7400.0

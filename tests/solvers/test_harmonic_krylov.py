@@ -8,9 +8,8 @@ from femgear.solvers.periodic import harmonic_balance as solvers_periodic_harmon
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.elements import GearMeshes, RadialBearings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, side_bands
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries, side_bands
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 
 def two_masses(load=1.0):

@@ -17,10 +17,9 @@ from femgear.solvers.stability.floquet import (
     tangents_of,
 )
 from femgear.solvers.stability.parametric import stability
-from femgear.system.elements import GearMeshes, PolynomialSprings, gear_meshes, tangent_jumps
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries, constant
-from femgear.system.system import MechanicalSystem
+from femgear.system.elements import GearMeshes, PolynomialSprings, tangent_jumps
+from femgear.system.fourier import FourierSeries, StepSeries, constant
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 
 ONE = np.ones((1, 1))
 MEAN = RATIO + (1.0 - RATIO) * SOFT

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.system.series import checked_lines, distinct_lines, harmonic_lines, line_tail, side_bands
+from femgear.system.fourier import checked_lines, distinct_lines, harmonic_lines, line_tail, side_bands
 
 
 def test_lines_of_one_base_are_its_harmonics():

@@ -8,9 +8,8 @@ from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.stability.lyapunov import lyapunov_exponents
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, constant
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries, constant
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 from femgear.trains.gear_pair.model import example_pair, lightly_loaded_pair
 
 

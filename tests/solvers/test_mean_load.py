@@ -11,9 +11,8 @@ from femgear.solvers.periodic.harmonic_balance import (
     solve_harmonic_balance,
 )
 from femgear.system.elements import GearMeshes, PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 from femgear.trains.gear_pair.model import gear_pair
 
 NOTE = "nothing carries the mean load of column 1 (mesh 1)"

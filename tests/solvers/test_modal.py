@@ -7,7 +7,7 @@ from published.planetary_sets import lin_parker_set
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import output_load, output_response, residual_output, solve_modes
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.system.assembler import planar_system
+from femgear.system.assembler import gear_set_system
 from femgear.system.system import MechanicalSystem
 
 
@@ -160,7 +160,7 @@ def test_bad_requests_are_refused(stiffness, options):
 
 def test_load_on_a_part_that_the_rigid_mode_leaves_at_rest():
     """Free rotation moves no centre but by rounding: a weight on the sun is held by its bearing."""
-    system = planar_system(lin_parker_set(3))
+    system = gear_set_system(lin_parker_set(3))
     sun = system.dofs.index("sun: x")
     load = np.zeros(len(system.M))
     load[sun] = 50.0

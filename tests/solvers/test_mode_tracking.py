@@ -18,10 +18,10 @@ from validation.reference.mode_energy import (
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes
 from femgear.solvers.linear.tracking import campbell_data, oscillating, track_modes
-from femgear.system.assembler import planar_springs, planar_system
-from femgear.system.mode_kinds import motion_planes
+from femgear.system.assembler import gear_set_springs, gear_set_system
+from femgear.system.mode_kinds import gear_set_kinds, motion_planes
 from femgear.system.system import MechanicalSystem
-from femgear.trains.planar.model import planar_kinds, planar_modes
+from femgear.trains.planar.model import planar_modes
 
 # two masses 1 on springs 1 + p and 2 - p, joined by kc: eigenvalues 1.5 + kc -+ sqrt((p - 1/2)^2 + kc^2)
 SPLIT = np.diag([1.0, -1.0])
@@ -112,18 +112,18 @@ def test_equal_planets_cross_and_keep_their_kinds():
     of a planet mode is free of the other two, and planet modes cross as well.
     """
     base = replace(lin_parker_set(4), stiffness_planet_ring=5.2e8)
-    system = planar_system(base)
+    system = gear_set_system(base)
 
     def at(bearing):
         return replace(base, planet_bearing=bearing)
 
     def family(bearing):
-        modes = complex_modes(planar_system(at(bearing)), base.mesh_stiffness)
+        modes = complex_modes(gear_set_system(at(bearing)), base.mesh_stiffness)
         return oscillating(modes)
 
     tracked = track_modes(family, np.geomspace(1e7, 1e9, 9), system.M)
     assert tracked.unresolved == () and tracked.eigenvalue.shape[1] == 20
-    ends = [planar_kinds(at(tracked.value[i]), tracked.shape[i], frequency=np.ones(20)) for i in (0, -1)]
+    ends = [gear_set_kinds(at(tracked.value[i]), tracked.shape[i], frequency=np.ones(20)) for i in (0, -1)]
     # double modes are followed as a space: any pair of shapes in it is translational
     assert ends[0] == ends[1] and "mixed" not in ends[0]
     found, kinds = approaches(tracked, system.M), np.array(ends[0])
@@ -206,8 +206,8 @@ def test_critical_speeds_converge():
 def test_campbell_of_the_planar_set():
     data = lin_parker_set(3)
     found = campbell_data(
-        lambda speed: planar_system(data, carrier_speed=speed), np.linspace(0.0, 300.0, 4),
-        data.mesh_stiffness, orders=[73.0], count=17, planes=motion_planes(planar_system(data).dofs),
+        lambda speed: gear_set_system(data, carrier_speed=speed), np.linspace(0.0, 300.0, 4),
+        data.mesh_stiffness, orders=[73.0], count=17, planes=motion_planes(gear_set_system(data).dofs),
     )  # fmt: skip
     assert found.tracked.unresolved == ()
     # translational pairs split into one forward and one backward mode
@@ -217,14 +217,14 @@ def test_campbell_of_the_planar_set():
     below = np.count_nonzero(found.frequency[-1] < line)
     assert len(found.critical) >= below > 3
     for one in found.critical:
-        system = planar_system(data, carrier_speed=one.speed)
+        system = gear_set_system(data, carrier_speed=one.speed)
         exact = complex_modes(system, data.mesh_stiffness, speed=one.speed).damped_frequency
         assert np.abs(exact / one.frequency - 1.0).min() < 1e-4
 
 
 def test_energy_shares():
     data = lin_parker_set(3)
-    system, modes, springs = planar_system(data), planar_modes(data), planar_springs(data)
+    system, modes, springs = gear_set_system(data), planar_modes(data), gear_set_springs(data)
     total = system.K + (system.W * data.mesh_stiffness) @ system.W.T
     assert np.abs(stiffness_of(springs) - total).max() < 1e-12 * np.abs(total).max()
     kinetic = kinetic_shares(system.M, modes.shape, body_groups(system.dofs))

@@ -7,9 +7,14 @@ from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces, external_force
-from femgear.system.series import FourierSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries
+from femgear.system.system import (
+    HarmonicForce,
+    MechanicalSystem,
+    NonlinearSystem,
+    element_forces,
+    external_force,
+)
 
 
 def problem_of(system, **changes):

@@ -6,8 +6,7 @@ import pytest
 from femgear.errors import CaseError
 from femgear.solvers.time.stroboscopic import bifurcation_diagram, stroboscopic_section
 from femgear.system.elements import PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.system import MechanicalSystem
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 
 def oscillator(c, k, *elements, force=None):

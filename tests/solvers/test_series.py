@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.system.series import FourierSeries, StepSeries, constant, phase_of, series_of
+from femgear.system.fourier import FourierSeries, StepSeries, constant, phase_of, series_of
 
 THETA = np.random.default_rng(0).uniform(-20.0, 20.0, (7, 2))
 

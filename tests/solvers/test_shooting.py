@@ -14,16 +14,9 @@ from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.stability.floquet import monodromy
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import (
-    GearMeshes,
-    PiecewiseSprings,
-    PolynomialSprings,
-    RadialBearings,
-    gear_meshes,
-)
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries, constant
-from femgear.system.system import MechanicalSystem
+from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
+from femgear.system.fourier import FourierSeries, StepSeries, constant
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
 
 # Omega = 1.2 of NLvib example 01 (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019)
 DUFFING = {

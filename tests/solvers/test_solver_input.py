@@ -18,8 +18,7 @@ from femgear.solvers.time.stroboscopic import (
 )
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.system import MechanicalSystem
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 STARTS = (([np.nan], [0.0]), ([0.0, 0.0], [0.0]), ([0.0],), (0.0, 0.0), "ab")
 

@@ -8,7 +8,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic import spectral
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.system.series import harmonics_of, multiply, pad, product_matrix, sample
+from femgear.system.fourier import harmonics_of, multiply, pad, product_matrix, sample
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 

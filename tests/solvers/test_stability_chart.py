@@ -6,9 +6,8 @@ from validation.parametric import NATURAL, RATIO, SOFT, rectangular_monodromy
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.stability.parametric import stability, stability_boundary, stability_chart
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries, StepSeries
+from femgear.system.system import MechanicalSystem, NonlinearSystem
 
 ONE = np.ones((1, 1))
 RECTANGLE = StepSeries([[1.0, SOFT]], [0.0, RATIO])

@@ -5,7 +5,7 @@ import pytest
 
 from femgear.errors import CaseError
 from femgear.system.elements import GearMeshes
-from femgear.system.series import FourierSeries, SummedSeries, constant, series_spectrum
+from femgear.system.fourier import FourierSeries, SummedSeries, constant, series_spectrum
 
 ONE = FourierSeries([[1.0, 2.0 - 1j, 0.5]], (1,))
 OTHER = FourierSeries([[0.5, 3j]], (0, 1))

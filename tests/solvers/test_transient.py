@@ -17,16 +17,16 @@ from femgear.solvers.time.steps import (
     stability_limit,
 )
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.elements import (
-    GearMeshes,
-    PiecewiseSprings,
-    PolynomialSprings,
-    RadialBearings,
+from femgear.system.elements import GearMeshes, PiecewiseSprings, PolynomialSprings, RadialBearings
+from femgear.system.fourier import FourierSeries, StepSeries, constant
+from femgear.system.system import (
+    HarmonicForce,
+    MechanicalSystem,
+    NonlinearSystem,
+    element_forces,
     gear_meshes,
+    tabulated_law,
 )
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces, tabulated_law
-from femgear.system.series import FourierSeries, StepSeries, constant
-from femgear.system.system import MechanicalSystem
 
 RATIOS = np.array([0.01, 0.05, 0.1, 0.2])
 FIXED = (

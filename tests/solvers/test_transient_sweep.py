@@ -7,9 +7,8 @@ from femgear.errors import CaseError
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.time.stroboscopic import sweep_response, sweep_up_and_down
 from femgear.system.elements import GearMeshes, PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 
 def oscillator(c, k, *elements, force=None, load=0.0):

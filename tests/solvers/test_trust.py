@@ -25,8 +25,7 @@ from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.solvers.stability.parametric import stability
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PolynomialSprings, RadialBearings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import (
+from femgear.system.fourier import (
     FourierSeries,
     StepSeries,
     coinciding_lines,
@@ -36,7 +35,7 @@ from femgear.system.series import (
     line_tail,
     side_bands,
 )
-from femgear.system.system import MechanicalSystem
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 ONE = np.ones((1, 1))
 

@@ -16,8 +16,8 @@ from published.wind_turbine_drivetrain import (
 )
 
 from femgear.solvers.linear.modal import solve_modes
-from femgear.system.assembler import planar_system
-from femgear.system.shaft import Disc, ShaftSection, Support, shaft_system
+from femgear.system.assembler import gear_set_system
+from femgear.system.shaft import ShaftSection
 from femgear.trains.drivetrain.data import (
     ChainBearing,
     ChainBody,
@@ -36,7 +36,7 @@ from femgear.trains.drivetrain.model import (
 )
 from femgear.trains.drivetrain.time import march_drivetrain
 from validation.rows import Row, at_most, information, printed, within
-from validation.timoshenko import free_bending
+from validation.timoshenko import Disc, Support, free_bending, shaft_system
 
 PAPER = "Dynamic analysis of the wind turbine drivetrain considering shaft bending effect"
 TRANSFER = "zeros of the exact transfer matrix"
@@ -184,7 +184,7 @@ def reductions() -> tuple[Row, ...]:
     lumped = replace(lumped, carrier=carrier, sun=sun)
     ours = drivetrain_model(alone)
     ours = solve_modes(ours.still, ours.mean_stiffness).frequency[1:]
-    theirs = solve_modes(planar_system(lumped), lumped.mesh_stiffness).frequency[1:]
+    theirs = solve_modes(gear_set_system(lumped), lumped.mesh_stiffness).frequency[1:]
     planar = np.abs(ours / theirs - 1.0).max()
     return (
         at_most("reductions", "torsional matrices", "chain with held axes, error of M, K and W", 1e-9, error),

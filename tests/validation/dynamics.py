@@ -8,8 +8,8 @@ import numpy as np
 
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import stability
-from femgear.system.series import mesh_harmonics, sample
-from femgear.system.system import MeshExcitation, Modes
+from femgear.system.fourier import sample
+from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
 from validation.cases import reference_case, reference_modes, reference_static
 from validation.rows import Row, at_most, counted, information, within
 

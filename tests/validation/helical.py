@@ -10,13 +10,11 @@ import numpy as np
 from published.planetary_sets import TABLE_2, cases, kahraman_set
 
 from femgear.gears.phasing import phase_factors
-from femgear.system.mode_kinds import phasing
+from femgear.system.assembler import gear_set_system, mesh_directions
+from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.trains.helical.model import (
     HelicalSet,
     helical_modes,
-    helical_motions,
-    helical_system,
-    mesh_directions,
     modal_error_response,
     phased_errors,
 )
@@ -41,7 +39,7 @@ UNIT, SHARE = 1.0, 3e-4
 def by_phasing(data: HelicalSet, *, below: float = 15e3) -> dict[str, np.ndarray]:
     """Frequencies [Hz] of the elastic modes of every phasing below a frequency [Hz]."""
     modes = helical_modes(data)
-    names = np.array(phasing(helical_motions(data, modes.shape)))
+    names = np.array(phasing(gear_set_motions(data, modes.shape)))
     inside = (modes.frequency > 0.0) & (modes.frequency < below)
     return {key: modes.frequency[inside & (names == name)] for key, name in PHASINGS.items()}
 
@@ -190,7 +188,7 @@ def leakage() -> tuple[Row, ...]:
     """Forces that phased transmission errors exert on modes of another phasing, over those on their own."""
     data, rows = kahraman_set(), []
     modes = helical_modes(data, max_frequency=20e3)
-    names = np.array(phasing(helical_motions(data, modes.shape)))
+    names = np.array(phasing(gear_set_motions(data, modes.shape)))
     for letter, case in cases().items():
         push = data.mesh_stiffness[:, None] * phased_errors(np.full(4, 1e-6), case.phases)
         work = np.abs(modes.mesh_deflection.T @ push)
@@ -208,7 +206,7 @@ def leakage() -> tuple[Row, ...]:
 def response() -> tuple[Row, ...]:
     """Forced response to 1 um in four harmonics, 5 % damping: modes against direct solution, and the peak."""
     data, rows = kahraman_set(), []
-    system, modes = helical_system(data), helical_modes(data, damping_ratio=0.05)
+    system, modes = gear_set_system(data), helical_modes(data, damping_ratio=0.05)
     amplitudes, hertz = np.full(4, 1e-6), np.linspace(50.0, 15e3, 300)
     for letter, convention in product("EF", ("rotation", "printed")):
         error = phased_errors(amplitudes, cases(convention=convention)[letter].phases)

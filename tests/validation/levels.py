@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.system.series import harmonics_of, sample
+from femgear.system.fourier import harmonics_of, sample
 from validation.cases import CASE
 from validation.rows import Row, at_most, information, within
 

@@ -20,8 +20,7 @@ from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.gears.kinematics import speeds
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, external_force
-from femgear.system.system import MechanicalSystem, Modes
+from femgear.system.system import HarmonicForce, MechanicalSystem, Modes, NonlinearSystem, external_force
 from femgear.threads import one_blas_thread
 from validation.mapped import mapped_grid, ring_mapping
 from validation.planetary import reference_set

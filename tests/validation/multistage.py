@@ -18,7 +18,7 @@ from published.multistage_example import (
 )
 from published.planetary_sets import lin_parker_set
 
-from femgear.system.lumped import torsional_set
+from femgear.system.rigid_bodies import torsional_set
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,

@@ -21,9 +21,8 @@ from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmo
 from femgear.solvers.periodic.shooting import ShootingSolution, solve_shooting
 from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.system.elements import PiecewiseSprings, PolynomialSprings
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import harmonics_of
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import harmonics_of
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 from validation.reference.free_vibration import solve_free_vibration
 from validation.rows import Row, at_most, counted, printed, within
 

@@ -33,7 +33,7 @@ from published.wind_turbine_response import (
 from femgear.errors import ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.series import side_bands
+from femgear.system.fourier import side_bands
 from femgear.trains.planar.model import planar_modes
 from validation import independent, independent_weight
 from validation.rows import Row, at_most, information, within

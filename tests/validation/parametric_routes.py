@@ -12,8 +12,8 @@ from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdict
 from femgear.solvers.stability.parametric import stability_boundary
 from femgear.system.elements import GearMeshes
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries
+from femgear.system.fourier import FourierSeries, StepSeries
+from femgear.system.system import NonlinearSystem
 from validation.nonlinear import oscillator
 from validation.parametric import EXACT, NATURAL, RATIO, SOFT
 from validation.rows import REPEATED, Row, at_most, counted, printed, within

@@ -10,8 +10,8 @@ from published.planetary_sets import lin_parker_set
 from published.wind_turbine import wind_turbine_b
 
 from femgear.errors import ConvergenceError
-from femgear.system.assembler import planar_meshes
-from femgear.system.lumped import (
+from femgear.system.assembler import mesh_elements
+from femgear.system.rigid_bodies import (
     PlanarBody,
     PlanarSet,
     PlanarTorque,
@@ -19,7 +19,7 @@ from femgear.system.lumped import (
     torsional_of_reduced,
     torsional_set,
 )
-from femgear.system.nonlinear import NonlinearSystem, element_forces
+from femgear.system.system import NonlinearSystem, element_forces
 from femgear.trains.planar.model import planar_modes, planar_problem
 from validation import independent
 from validation.planetary import nrel_set
@@ -167,7 +167,7 @@ def sun_forces(data: PlanarSet, torque: float, tangential) -> np.ndarray:
     pins = np.column_stack([np.zeros(data.n_planets), tangential])
     problem = planar_problem(
         data,
-        meshes=planar_meshes(data, separates=False),
+        meshes=mesh_elements(data, separates=False),
         torque=PlanarTorque(torque, output=None),
         pin_errors=pins,
     )

@@ -17,11 +17,11 @@ from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmo
 from femgear.solvers.periodic.shooting import ShootingSolution, solve_shooting
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.assembler import planar_meshes
+from femgear.system.assembler import mesh_elements
 from femgear.system.elements import GearMeshes
-from femgear.system.lumped import PlanarTorque
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, harmonics_of
+from femgear.system.fourier import FourierSeries, harmonics_of
+from femgear.system.rigid_bodies import PlanarTorque
+from femgear.system.system import NonlinearSystem
 from femgear.trains.planar.model import phased_series, planar_problem
 from validation.nonlinear import duffing, one_harmonic, oscillator, shooting_motion
 from validation.rows import Row, at_most, counted, information
@@ -139,7 +139,7 @@ def planetary_train(damping: float = 0.05, backlash: float = 20e-6) -> Nonlinear
     late = np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])
     wave = np.array([0.25, 0.075, 0.0375])
     stiffness = phased_series(wave, wave, -late, mean=data.mesh_stiffness)
-    meshes = planar_meshes(data, stiffness=stiffness, backlash=backlash)
+    meshes = mesh_elements(data, stiffness=stiffness, backlash=backlash)
     return planar_problem(data, meshes=meshes, torque=PlanarTorque(300.0), damping=damping)
 
 

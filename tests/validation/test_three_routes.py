@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
-from femgear.system.series import harmonics_of
+from femgear.system.fourier import harmonics_of
 from validation import nonlinear, routes
 from validation.routes import GATE, difference
 

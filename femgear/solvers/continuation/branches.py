@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.continuation.arclength import (
     Curve,
     StepOptions,
@@ -26,9 +26,8 @@ from femgear.solvers.periodic.equations import HarmonicBalance, harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import judged, require_period
-from femgear.system.entries import checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import coincidence_note
+from femgear.system.fourier import coincidence_note
+from femgear.system.system import NonlinearSystem
 
 # Step of the differences by a parameter, in parts of its range.
 _DIFFERENCE = 1e-5

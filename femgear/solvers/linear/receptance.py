@@ -21,8 +21,7 @@ from femgear.solvers.linear.modal import (
     solve_modes,
     total_stiffness,
 )
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.system import MechanicalSystem, Modes
+from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 
 # Bytes of dynamic stiffness that are solved in one batch.
 _BATCH = 2**26

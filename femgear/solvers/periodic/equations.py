@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_count
 from femgear.solvers.linear.receptance import Reduction, reduce_problem, source_columns
 from femgear.solvers.periodic.phase_grid import (
     PhaseGrid,
@@ -35,9 +35,8 @@ from femgear.solvers.periodic.phase_grid import (
 )
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.system.elements import Element
-from femgear.system.entries import checked_count
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import checked_lines, harmonic_lines, line_tail
+from femgear.system.fourier import checked_lines, harmonic_lines, line_tail
+from femgear.system.system import NonlinearSystem
 
 # Mean deflection, over the typical one and over the lengths of the elements, beyond which it is far away.
 _FAR, _LENGTHS = 1e6, 10.0

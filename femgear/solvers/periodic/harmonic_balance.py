@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_count, checked_numbers, checked_tolerance
 from femgear.solvers.linear.receptance import Reduction, respond, source_columns
 from femgear.solvers.periodic.equations import (
     MANY,
@@ -24,9 +24,8 @@ from femgear.solvers.periodic.equations import (
 )
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import judged, require_period
-from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import coincidence_note
+from femgear.system.fourier import coincidence_note
+from femgear.system.system import NonlinearSystem
 
 # Shortest step of the line search and the decrease that it asks for (Dennis and Schnabel, 1983, 6.3); full
 # steps taken all the same where a corner of a contact law blocks the search.

@@ -12,8 +12,8 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.system.elements import Element, GearMeshes, PolynomialSprings
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries
+from femgear.system.fourier import FourierSeries
+from femgear.system.system import NonlinearSystem
 
 # Samples a line and at least, where a contact opens and closes: one base, several bases.
 _CONTACT_SAMPLES = ((128, 2048), (8, 64))

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from femgear.errors import CaseError, FemgearError
+from femgear.errors import CaseError, FemgearError, checked_count, checked_tolerance
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution, open_verdict, verdict_of
 from femgear.solvers.time.adaptive import (
@@ -29,9 +29,8 @@ from femgear.solvers.time.adaptive import (
 from femgear.solvers.time.stroboscopic import common_period
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import Element
-from femgear.system.entries import checked_count, checked_tolerance
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, checked_bases, element_forces
-from femgear.system.series import harmonics_of, line_tail
+from femgear.system.fourier import harmonics_of, line_tail
+from femgear.system.system import HarmonicForce, NonlinearSystem, checked_bases, element_forces
 
 # Stiffness and damping of a motion, relative to the largest, that count as none.
 _FREE = 1e-11

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.system.series import mesh_harmonics, multiply, pad, product_matrix, sample
-from femgear.system.system import MeshExcitation, Modes, Response
+from femgear.system.fourier import multiply, pad, product_matrix, sample
+from femgear.system.system import MeshExcitation, Modes, Response, mesh_harmonics
 
 # Two signals or receptances closer than this (relative) are equal: identical planets.
 _EQUAL = 1e-9

@@ -15,12 +15,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution, open_verdict, verdict_of
+from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
+from femgear.solvers.periodic.solution import (
+    FloquetVerdict,
+    PeriodicSolution,
+    open_verdict,
+    verdict_of,
+)
 from femgear.system.elements import tangent_jumps
-from femgear.system.entries import checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem, element_forces
-from femgear.system.system import Modes
+from femgear.system.system import Modes, NonlinearSystem, element_forces
 
 # Angle [rad] that the fastest mode turns in a step of the first sequence, and sequences of halved steps.
 _STEP_ANGLE = 0.7

@@ -18,12 +18,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_count, checked_numbers, checked_tolerance
 from femgear.solvers.stability.floquet import Frame, frame_of
 from femgear.solvers.time.adaptive import checked_start, flow, motion_scale, trajectory
 from femgear.solvers.time.stroboscopic import PoincareSection, common_period, stroboscopic_map
-from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem, element_forces
+from femgear.system.system import NonlinearSystem, element_forces
 
 # parts of the run that are compared for the error
 _PARTS = 4

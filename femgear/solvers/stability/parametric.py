@@ -11,14 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.periodic.solution import CIRCLE, loss_of
 from femgear.solvers.stability.floquet import Frame, frame_of, frame_of_modes, passage, stiffness_in_series
 from femgear.system.elements import tangent_jumps
-from femgear.system.entries import checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries, mesh_harmonics, sample, series_of
-from femgear.system.system import MeshExcitation, Modes
+from femgear.system.fourier import FourierSeries, StepSeries, sample, series_of
+from femgear.system.system import MeshExcitation, Modes, NonlinearSystem, mesh_harmonics
 
 # Angle [rad] that the fastest mode turns in one step, and steps in a period of the highest harmonic.
 _STEP_ANGLE, _STEPS_PER_HARMONIC = 1.0, 8

@@ -19,8 +19,8 @@ import numpy as np
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error
 from femgear.system.elements import Element, GearMeshes, PiecewiseSprings, RadialBearings
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries, constant, phase_of
+from femgear.system.fourier import FourierSeries, StepSeries, constant, phase_of
+from femgear.system.system import NonlinearSystem
 
 METHODS = ("DOP853", "Radau", "LSODA")
 # Instants inside a step at which contact changes are looked for.

@@ -29,9 +29,8 @@ from scipy.linalg import get_lapack_funcs
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error, output_load, residual_output, solve_modes
-from femgear.system.nonlinear import Law, NonlinearSystem, external_force, tabulated_law
-from femgear.system.series import phase_of
-from femgear.system.system import MechanicalSystem, Modes
+from femgear.system.fourier import phase_of
+from femgear.system.system import Law, MechanicalSystem, Modes, NonlinearSystem, external_force, tabulated_law
 
 # Numbers held in the states of one block of steps.
 _BLOCK_NUMBERS = 2_000_000

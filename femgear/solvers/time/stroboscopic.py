@@ -14,13 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, checked_count, checked_numbers, checked_tolerance
 from femgear.solvers.time.adaptive import checked_start
 from femgear.solvers.time.steps import Marched, Scheme, march
 from femgear.solvers.time.transient import step_scheme
-from femgear.system.entries import checked_count, checked_numbers, checked_tolerance
-from femgear.system.nonlinear import Law, NonlinearSystem, tabulated_law
-from femgear.system.series import harmonics_of
+from femgear.system.fourier import harmonics_of
+from femgear.system.system import Law, NonlinearSystem, tabulated_law
 
 # Largest number of steps in a period, and so the memory of its states.
 _MOST_STEPS = 100_000

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_numbers, checked_tolerance
 from femgear.solvers.time import adaptive
 from femgear.solvers.time.adaptive import checked_start, motion_scale
 from femgear.solvers.time.steps import (
@@ -21,9 +21,14 @@ from femgear.solvers.time.steps import (
     stability_limit,
 )
 from femgear.system.elements import GearMeshes, PiecewiseSprings
-from femgear.system.entries import checked_numbers, checked_tolerance
-from femgear.system.nonlinear import NonlinearSystem, checked_bases, drift_note, element_forces, tabulated_law
-from femgear.system.system import freeze
+from femgear.system.system import (
+    NonlinearSystem,
+    checked_bases,
+    drift_note,
+    element_forces,
+    freeze,
+    tabulated_law,
+)
 
 # Steps in the shortest natural period when no step is given: average acceleration errs by 0.2 % of it.
 _STEPS_A_PERIOD = 40

@@ -388,7 +388,7 @@ def stiffness_figure(model: DrivetrainModel):
     -------
     Figure
     """
-    from femgear.system.series import FourierSeries
+    from femgear.system.fourier import FourierSeries
     from femgear.trains.drivetrain.model import stiffness_levels
 
     train, phase = model.train, np.linspace(0.0, 2.0, 1601)

@@ -29,11 +29,10 @@ from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping
 from femgear.system.assembler import mesh_directions, pin_directions
 from femgear.system.elements import positive_part
-from femgear.system.lumped import PlanarBody, PlanarSet
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, phase_of
+from femgear.system.fourier import FourierSeries, phase_of
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.system.shaft import AXES, beam_element, disc_matrices, joint_deflections
-from femgear.system.system import MechanicalSystem
+from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.drivetrain.data import (
     ChainBearing,
     Drivetrain,

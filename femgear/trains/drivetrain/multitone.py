@@ -38,8 +38,8 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.receptance import Reduction, reduce_problem, respond
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, checked_lines, distinct_lines
+from femgear.system.fourier import FourierSeries, checked_lines, distinct_lines
+from femgear.system.system import NonlinearSystem
 from femgear.trains.drivetrain.data import check_free_spin
 from femgear.trains.drivetrain.model import DrivetrainModel, torque_vector
 

@@ -14,7 +14,7 @@ import numpy as np
 from femgear.case.units import FREQUENCY, SPEED
 from femgear.errors import CaseError
 from femgear.storage.dataset import RPM
-from femgear.system.series import FourierSeries
+from femgear.system.fourier import FourierSeries
 from femgear.system.shaft import ShaftSection
 from femgear.trains.drivetrain import section as drivetrain_section
 from femgear.trains.drivetrain.checks import check_spread, loose_motions, speed_ratios, with_drivers

@@ -36,7 +36,7 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.time.steps import AVERAGE_ACCELERATION, StepRule
-from femgear.system.series import FourierSeries
+from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.data import TorqueHistory, check_free_spin
 from femgear.trains.drivetrain.model import DrivetrainModel, contact_model
 

@@ -30,15 +30,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_count, checked_numbers
 from femgear.solvers.continuation.branches import Branch
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.system.elements import GearMeshes
-from femgear.system.entries import checked_count, checked_numbers
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
-from femgear.system.series import FourierSeries, constant
-from femgear.system.system import MechanicalSystem
+from femgear.system.fourier import FourierSeries, constant
+from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
 # deflections of drive and back contact in half backlashes
 DRIVE, BACK = 1.0, -1.0

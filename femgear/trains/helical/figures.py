@@ -1,13 +1,11 @@
 """Figures of a helical case: modes from the front and from the side, stiffness of the meshes, mesh forces.
 
-The first figures take the model and its response; those after them read modes.nc and dynamics.nc. `FIGURES`
-at the end ties the pictures of the report to their captions.
+They read modes.nc and dynamics.nc. `FIGURES` at the end ties the pictures of the report to their captions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +18,7 @@ from femgear.report.response import (
     excited_harmonics,
     fine_positions,
     name_kinds,
+    some_speeds,
     speed_sweep,
     transmission_error_spectrum,
 )
@@ -39,9 +38,7 @@ from femgear.report.style import (
     periodic,
     rpm,
 )
-from femgear.system.lumped import CENTRAL
-from femgear.system.mode_kinds import phasing
-from femgear.trains.helical.model import helical_motions
+from femgear.system.rigid_bodies import CENTRAL, gear_geometry
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 
@@ -50,13 +47,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from femgear.gears.planetary import PlanetarySet
-    from femgear.system.system import Modes
-    from femgear.trains.helical.model import ErrorResponse, HelicalSet
+    from femgear.trains.helical.model import HelicalSet
 
 _CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
 _BODIES = {"carrier": GREEN, "ring": BLACK, "sun": VERMILION, "planets": BLUE}
-# modes that are shown and that stand in a row, harmonics of mesh forces, speeds
-_SHOWN, _COLUMNS, _HARMONICS, _SPEEDS = 12, 4, 4, 4
+# modes that are shown and that stand in a row, harmonics of mesh forces
+_SHOWN, _COLUMNS, _HARMONICS = 12, 4, 4
 # half heights of the views over the ring's radius, and the largest magnification of small motions
 _FRONT, _SIDE, _MOST = 1.25, 0.4, 1e4
 # widths of lines that lie on each other in the side view
@@ -65,10 +61,8 @@ _WIDTHS = {"carrier": 1.6, "ring": 4.5, "sun": 3.2, "planets": 1.6}
 _MARKS = {"in phase": "o", "counter-phased": "s"}
 
 
-def helical_mode_shapes(
-    data: HelicalSet, modes: Modes, *, shown: Sequence[int] | None = None, scale: float = 0.16
-) -> Figure:
-    """Bodies at rest (grey) and displaced, each mode from the front and below it from the side.
+def draw_mode(front, side, data: HelicalSet | SimpleNamespace, moved: np.ndarray, scale: float) -> None:
+    """Draw both views of one mode, each at its own magnification.
 
     From the front: pitch circles, for the carrier the circle of planet centres, with a spoke that turns.
     From the side, seen along y: every body as the line of its diameter along x, which tilts about y and moves
@@ -76,48 +70,13 @@ def helical_mode_shapes(
 
     Parameters
     ----------
-    data : HelicalSet
-    modes : Modes
-        Of `femgear.trains.helical.model.helical_modes`.
-    shown : sequence of int, optional
-        Mode numbers from 0; the first twelve that are no rigid-body motions when omitted.
+    front, side : matplotlib.axes.Axes
+    data : HelicalSet, or its entries of `gear_geometry`
+    moved : (N + 3, 6) array
+        x, y, z, tilts and rotation of every body as arcs, in the axes of the set.
     scale : float
         Largest displacement of each view as a share of the ring's radius.
-
-    Returns
-    -------
-    Figure
-
-    Raises
-    ------
-    CaseError
-        No mode to show, or one that the modes do not have (E-MODES).
     """
-    if shown is None:
-        shown = np.flatnonzero(modes.frequency > 0.0)[:_SHOWN]
-    shown = [int(mode) for mode in shown]
-    if not shown or min(shown) < 0 or max(shown) >= len(modes.frequency):
-        raise CaseError(f"modes {shown} to draw", code="E-MODES", limit=f"0 to {len(modes.frequency) - 1}")
-    motions, names = _motions(data, modes.shape), phasing(helical_motions(data, modes.shape))
-    columns = min(_COLUMNS, len(shown))
-    rows = -(-len(shown) // columns)
-    figure, axes = new_figure(rows=2 * rows, columns=columns, width=2.7 * columns, height=4.3 * rows + 0.6)
-    axes[0].get_gridspec().set_height_ratios([_FRONT, _SIDE] * rows)
-    for ax in axes:
-        ax.set_axis_off()
-        ax.set_aspect("equal")
-    for place, mode in enumerate(shown):
-        row, column = divmod(place, columns)
-        front, side = (axes[(2 * row + i) * columns + column] for i in (0, 1))
-        draw_mode(front, side, data, motions[:, :, mode], scale)
-        text = f"mode {mode + 1}: {modes.frequency[mode]:.6g} Hz\n{modes.kind[mode]}\n{names[mode]}"
-        front.set_title(text, fontsize=SIZE - 2)
-    legend_below(figure, columns=5)
-    return figure
-
-
-def draw_mode(front, side, data: HelicalSet, moved: np.ndarray, scale: float) -> None:
-    """Both views of one mode, each at its own magnification."""
     sizes = [np.abs(moved[:, axis]).max() for axis in ([0, 1, 5], [2, 3, 4])]
     # a view without motion shows none
     views = [scale * data.ring_radius / max(size, max(sizes) / _MOST) for size in sizes]
@@ -128,22 +87,7 @@ def draw_mode(front, side, data: HelicalSet, moved: np.ndarray, scale: float) ->
     side.set_title(f"from the side, scale × {times}", fontsize=SIZE - 3, color="0.4")
 
 
-def _motions(data: HelicalSet, shape) -> np.ndarray:
-    """x, y, z, tilts and rotation (N + 3, 6, m) of all bodies in the axes of the set."""
-    found = helical_motions(data, shape)
-    plane, space, planets = found.central[:3], found.central[3:], found.planets
-    central = np.stack(
-        [*plane.swapaxes(0, 1)[:2], space[:, 2], space[:, 0], space[:, 1], plane[:, 2]], axis=1
-    )
-    cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
-    turned = planets.copy()
-    for first in (0, 3):
-        one, two = planets[:, first], planets[:, first + 1]
-        turned[:, first], turned[:, first + 1] = cosine * one - sine * two, sine * one + cosine * two
-    return np.concatenate([central, turned])
-
-
-def pitch_radii(data: HelicalSet) -> tuple[float, float, float]:
+def pitch_radii(data) -> tuple[float, float, float]:
     """Working pitch radii of ring, sun and planet [m]: their circles touch.
 
     The centre distance is divided as the base radii are. Where the meshes of a planet have two pitch circles,
@@ -154,7 +98,7 @@ def pitch_radii(data: HelicalSet) -> tuple[float, float, float]:
     return outer * ring, inner * sun, min(outer, inner) * planet
 
 
-def _bodies(data: HelicalSet):
+def _bodies(data):
     """Legend text, colour, centre, drawn radius and radius that turns arcs into angles, of every body.
 
     In the order of the coordinates; rotations and tilts are arcs on base circles.
@@ -164,11 +108,11 @@ def _bodies(data: HelicalSet):
     bases = (data.centre_distance, data.ring_radius, data.sun_radius)
     for name, radius, base in zip(CENTRAL, drawn, bases):
         yield name, _BODIES[name], 0j, radius, base
-    for centre in data.centre_distance * np.exp(1j * data.planet_angles):
+    for centre in data.centre_distance * np.exp(1j * np.asarray(data.planet_angles)):
         yield "planets", _BODIES["planets"], centre, planet, data.planet_radius
 
 
-def _draw_front(ax, data: HelicalSet, moved: np.ndarray) -> None:
+def _draw_front(ax, data, moved: np.ndarray) -> None:
     for (name, colour, centre, radius, base), (x, y, _, _, _, u) in zip(_bodies(data), moved):
         spoke = radius * np.exp(1j * (np.angle(centre) if centre else 0.0))
         style = {"linestyle": "--"} if name == "carrier" else {}
@@ -181,7 +125,7 @@ def _draw_front(ax, data: HelicalSet, moved: np.ndarray) -> None:
     _limits(ax, data, _FRONT)
 
 
-def _draw_side(ax, data: HelicalSet, moved: np.ndarray) -> None:
+def _draw_side(ax, data, moved: np.ndarray) -> None:
     ax.axhline(0.0, color="0.82", linewidth=1.0)
     for (name, colour, centre, radius, base), (_, _, z, _, tilt, _) in zip(_bodies(data), moved):
         ends = np.array([-radius, radius])
@@ -192,7 +136,7 @@ def _draw_side(ax, data: HelicalSet, moved: np.ndarray) -> None:
     _limits(ax, data, _SIDE)
 
 
-def _limits(ax, data: HelicalSet, high: float) -> None:
+def _limits(ax, data, high: float) -> None:
     ring = pitch_radii(data)[0]
     ax.set_xlim(-1.25 * ring, 1.25 * ring)
     ax.set_ylim(-high * ring, high * ring)
@@ -200,83 +144,6 @@ def _limits(ax, data: HelicalSet, high: float) -> None:
 
 def _xy(points):
     return points.real, points.imag
-
-
-def mesh_force_spectra(
-    response: ErrorResponse,
-    titles: Sequence[str],
-    *,
-    meshes: Sequence[tuple[str, int]] = (("sun-planet 1", 0),),
-    marks: Sequence[tuple[str, Sequence[float]]] = (),
-) -> Figure:
-    """Amplitude of dynamic mesh forces over the frequency of every harmonic, one panel a case.
-
-    Parameters
-    ----------
-    response : ErrorResponse
-        Of as many cases as there are titles.
-    titles : sequence of str
-    meshes : sequence of (text, column)
-        Columns of ``W`` to draw, up to four.
-    marks : sequence of (text, frequencies)
-        Natural frequencies [Hz] by kind, drawn as ticks along the lower edge.
-
-    Returns
-    -------
-    Figure
-
-    Raises
-    ------
-    CaseError
-        Another number of titles than of cases (E-SHAPE).
-    """
-    if len(titles) != len(response.force):
-        raise CaseError(
-            f"{len(titles)} titles for {len(response.force)} cases", code="E-SHAPE", limit="one a case"
-        )  # fmt: skip
-    columns = 2 if len(titles) > 1 else 1
-    rows = -(-len(titles) // columns)
-    figure, axes = new_figure(
-        rows=rows, columns=columns, width=5.2 * columns, height=2.2 * rows + 1.0, sharex=True, sharey=True
-    )  # fmt: skip
-    for ax, title, force in zip(axes, titles, response.force):
-        _draw_spectra(ax, response, force, meshes, marks)
-        label(ax, title=title)
-    for ax in axes[len(titles) :]:
-        ax.set_axis_off()
-    axes[0].set_xlim(0.0, response.mesh_frequency.max())
-    for ax in axes[max(len(titles) - columns, 0) : len(titles)]:
-        label(ax, "frequency of the harmonic [Hz]")
-    for ax in axes[: len(titles) : columns]:
-        label(ax, y="mesh force [N]")
-    legend_below(figure, columns=2 * columns if len(meshes) == 1 else columns + 1)
-    return figure
-
-
-def _draw_spectra(ax, response: ErrorResponse, force: np.ndarray, meshes, marks) -> None:
-    """Amplitudes of one case (F, H, n_columns), and the marks inside the axis."""
-    for i, h in enumerate(response.harmonics):
-        for dash, (text, column) in zip(DASHES, meshes):
-            hertz, size = h * response.mesh_frequency, np.abs(force[:, i, column])
-            name = f"harmonic {h}" + (f", {text}" if len(meshes) > 1 else "")
-            colour = COLOURS[i % len(COLOURS)]
-            ax.plot(hertz, size, color=colour, linestyle=dash, linewidth=1.3, label=name)
-    for marker, (text, found) in zip("|xo^", marks):
-        found = [hertz for hertz in found if 0.0 <= hertz <= response.mesh_frequency.max()]
-        ax.plot(found, np.full(len(found), 0.03), marker, color=BLACK, markersize=6, label=text,
-                linestyle="none", transform=ax.get_xaxis_transform(), clip_on=False)  # fmt: skip
-    ax.set_yscale("log")
-
-
-@dataclass(frozen=True)
-class _Radii:
-    """What the drawing of a mode needs of a set."""
-
-    ring_radius: float
-    sun_radius: float
-    planet_radius: float
-    centre_distance: float
-    planet_angles: np.ndarray
 
 
 def helical_modes_figures(
@@ -324,13 +191,7 @@ def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float 
     shown = np.flatnonzero(frequency > 0.0)[:_SHOWN]
     if not len(shown):
         raise CaseError("no mode to draw", code="E-MODES", limit="a mode that is no rigid-body motion")
-    data = _Radii(
-        gears.ring.base_radius,
-        gears.sun.base_radius,
-        gears.planet.base_radius,
-        gears.centre_distance,
-        np.asarray(gears.planet_angles),
-    )
+    data = SimpleNamespace(**gear_geometry(gears))
     planets = [data.planet_radius] * gears.n_planets
     radii = np.array([data.centre_distance, data.ring_radius, data.sun_radius, *planets])
     moved = modes["shape"].values.reshape(len(radii), 6, -1).copy()
@@ -338,7 +199,7 @@ def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float 
     columns = min(_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
     figure, axes = new_figure(rows=2 * rows, columns=columns, width=2.7 * columns, height=4.3 * rows + 0.6)
-    axes[0].get_gridspec().set_height_ratios([1.25, 0.4] * rows)
+    axes[0].get_gridspec().set_height_ratios([_FRONT, _SIDE] * rows)
     for ax in axes:
         ax.set_axis_off()
         ax.set_aspect("equal")
@@ -381,8 +242,7 @@ def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
     dynamics, modes : xarray.Dataset
         Contents of dynamics.nc, of which at most four speeds are drawn, and of modes.nc.
     """
-    count = dynamics.sizes["speed"]
-    speeds = sorted({round(i) for i in np.linspace(0, count - 1, min(count, _SPEEDS))})
+    speeds = some_speeds(dynamics.sizes["speed"])
     rows, columns = -(-len(speeds) // 2), min(len(speeds), 2)
     figure, axes = new_figure(
         rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=1.2 + 3.6 * rows, sharey=True
@@ -503,7 +363,7 @@ FIGURES = {
     "": STATIC[""],
     # static.nc holds the spur gears of the transverse section: nobody makes them, their set is not drawn
     "static": Figures(
-        STATIC["static"].captions
+        dict(STATIC["static"].captions)
         | {
             "helical_mesh_stiffness": (
                 "Stiffness and static transmission error of the meshes of planet 1 along the transverse "

@@ -1,15 +1,10 @@
-"""Helical planetary set of rigid bodies that move in space: data, matrices, meshes, modes, forced response.
+"""Helical planetary set of rigid bodies that move in space: data, excitation, modes, forced response.
 
 Carrier, ring, sun and N planets have three translations and three rotations each, 6 (N + 3) coordinates.
 A. Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
 springs along the tooth normals, supports and planet pins in all directions, without terms of the carrier's
-speed. Here all matrices follow from kinematics: every spring is a column of deflections ``w^T q`` and adds
-``k w w^T``; the meshes stay columns of W. As elements, `helical_problem`, they have a stiffness that changes,
-play and contact loss.
-
-Coordinates: x, y and z of the central members, planets radially outwards, tangentially and along z; tilts
-``w = r phi`` about the same two axes in the plane and ``u = r theta`` about z, all right-handed. r is the
-base radius of the gears and the radius of the circle of planet centres for the carrier.
+speed. The matrices are those of `femgear.system.assembler.gear_set_system`; with the meshes as elements,
+`helical_problem`, they have a stiffness that changes, play and contact loss.
 
 The mesh stiffness follows from that of spur teeth. A helical gear is cut across its axis into thin slices,
 each of them a spur gear that is turned by the helix against its neighbour, and the slices carry side by side
@@ -26,35 +21,26 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears import profile
 from femgear.solvers.linear.modal import residual_output, solve_modes, viscous_damping
-from femgear.system.assembler import mesh_elements
+from femgear.solvers.linear.receptance import MeshErrorResponse
+from femgear.system.assembler import check_mesh_columns, gear_set_system, mesh_elements
 from femgear.system.elements import GearMeshes
-from femgear.system.lumped import (
-    CENTRAL,
-    HelicalBody,
+from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis
+from femgear.system.rigid_bodies import (
+    ContactLines,
     HelicalSupport,
     PlanarTorque,
     RigidSet,
-    check_angles,
-    check_helical_body,
     check_support,
-    flank_sign,
     gear_geometry,
-    member_radius,
-    numbers,
-    refuse_helical,
-    torque_load,
 )
-from femgear.system.mode_kinds import SetMotions, body_motions, energy_shares, named_kinds, phase_basis
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.series import FourierSeries, StepSeries
-from femgear.system.system import MechanicalSystem, MeshExcitation, Modes
+from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -63,11 +49,6 @@ CONTACT_POINTS = ("pitch_point", "base_circles")
 # Rounded numbers miss each other by less than 1 %, other distances or angles than those of the gears by more.
 LARGEST_CLOSURE = 0.1
 
-CENTRAL_AXES = ("x", "y", "z", "tilt x", "tilt y", "u")
-PLANET_AXES = ("radial", "tangential", "z", "tilt radial", "tilt tangential", "u")
-
-KINDS = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}
-SPRINGS = ("radial", "axial", "tilt", "torsional")
 # Relative distance of frequencies that rounding alone makes.
 _ONE_FREQUENCY = 1e-9
 
@@ -107,6 +88,13 @@ class HelicalSet(RigidSet):
         `closure` tells by how much they do.
     """
 
+    directions: ClassVar[dict[str, tuple[int, ...]]] = {
+        "{}, radial": (0, 1),
+        "{}, axial": (2,),
+        "{}, tilt": (3, 4),
+        "{}, torsional": (5,),
+    }
+
     base_helix_angle: float
     planet_bearing: HelicalSupport
     contact_points: str = "pitch_point"
@@ -114,17 +102,16 @@ class HelicalSet(RigidSet):
     face_width: float = 0.0
 
     def __post_init__(self):
-        angles = np.atleast_1d(numbers("planet_angles", self.planet_angles))
-        arrays = {"planet_angles": angles}
-        for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
-            value = numbers(name, getattr(self, name))
-            arrays[name] = np.full(len(angles), value) if value.ndim == 0 else value
-        for name, array in arrays.items():
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-        for name in (*CENTRAL, "planet"):
-            check_helical_body(name, getattr(self, name))
-        check_set(self)
+        super().__post_init__()
+        if self.ring_radius <= self.planet_radius:
+            allowed = f"above the {self.planet_radius} m of the planets"
+            self.refuse("ring_radius", self.ring_radius, "m", allowed)
+        if not abs(self._numbers("base_helix_angle", 0)) < 0.5 * math.pi:
+            allowed = "between -pi/2 and pi/2"
+            self.refuse("base_helix_angle", self.base_helix_angle, "rad", allowed, remedy="give radians")
+        check_support("planet_bearing", self.planet_bearing, count=self.n_planets)
+        _check_contact(self)
+        _check_closure(self)
 
     @property
     def column_stiffness(self) -> np.ndarray:
@@ -141,52 +128,19 @@ class HelicalSet(RigidSet):
         """Of the planet bearings, (N, 6): radial, tangential, axial [N/m], two tilts, torsional [N m/rad]."""
         return np.broadcast_to(self.planet_bearing.stiffness, (self.n_planets, 6))
 
+    @property
+    def contact_lines(self) -> ContactLines:
+        """Helix, slices and contact points of the meshes."""
+        heights = tuple(self.slice_heights.tolist())
+        return ContactLines(self.base_helix_angle, heights, self.contact_points == "base_circles")
+
     def per_column(self, values) -> np.ndarray:
         """Values (2N, ...) of the meshes repeated for their slices, (2N S, ...)."""
         return np.repeat(np.asarray(values), self.slices, axis=0)
 
 
-def reduced_body(
-    radius: float, *, mass: float, polar: float, diametral: float, support: HelicalSupport | None = None
-) -> HelicalBody:
-    """Body from data on ``u = r theta`` and ``w = r phi``, as Kahraman (1994, Table 3) prints them.
-
-    Parameters
-    ----------
-    radius : float
-        r [m]: base radius of a gear, radius of the circle of planet centres for the carrier.
-    mass, polar, diametral : float
-        m, J / r^2 and I / r^2 [kg].
-    support : HelicalSupport, optional
-        In SI, see `reduced_support`.
-    """
-    support = HelicalSupport() if support is None else support
-    return HelicalBody(mass, polar * radius**2, diametral * radius**2, support)
-
-
-def reduced_support(
-    radius: float, *, radial: float = 0.0, axial: float = 0.0, tilt: float = 0.0, torsional: float = 0.0
-) -> HelicalSupport:
-    """Support from stiffnesses on translations, ``w = r phi`` and ``u = r theta``, all [N/m]."""
-    return HelicalSupport(radial, axial, tilt * radius**2, torsional * radius**2)
-
-
-def helical_from_set(
-    planetary_set: PlanetarySet,
-    *,
-    helix_angle: float,
-    sun: HelicalBody,
-    ring: HelicalBody,
-    carrier: HelicalBody,
-    planet: HelicalBody,
-    stiffness_sun_planet,
-    stiffness_planet_ring,
-    planet_bearing: HelicalSupport,
-    contact_points: str = "pitch_point",
-    slices: int = 1,
-    face_width: float = 0.0,
-) -> HelicalSet:
-    """Helical set with the radii and angles of a geared one.
+def helical_from_set(planetary_set: PlanetarySet, *, helix_angle: float, **data: Any) -> HelicalSet:
+    """Make a helical set with the radii and angles of a geared one.
 
     Parameters
     ----------
@@ -195,25 +149,11 @@ def helical_from_set(
     helix_angle : float
         beta at the reference circle [rad], positive for a right-handed sun; ``tan beta_b = tan beta cos
         alpha_t`` (ISO 21771, section 4.2.6).
-    sun, ring, carrier, planet, stiffness_sun_planet, stiffness_planet_ring, planet_bearing
-        See `HelicalSet`.
-    contact_points, slices, face_width
-        See `HelicalSet`.
+    **data
+        Bodies, stiffnesses, bearing, contact points and slices of `HelicalSet`.
     """
-    return HelicalSet(
-        sun=sun,
-        ring=ring,
-        carrier=carrier,
-        planet=planet,
-        base_helix_angle=math.atan(math.tan(helix_angle) * math.cos(planetary_set.sun.pressure_angle)),
-        stiffness_sun_planet=stiffness_sun_planet,
-        stiffness_planet_ring=stiffness_planet_ring,
-        planet_bearing=planet_bearing,
-        contact_points=contact_points,
-        slices=slices,
-        face_width=face_width,
-        **gear_geometry(planetary_set),
-    )
+    base = math.atan(math.tan(helix_angle) * math.cos(planetary_set.sun.pressure_angle))
+    return HelicalSet(base_helix_angle=base, **data, **gear_geometry(planetary_set))
 
 
 def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_width: float) -> np.ndarray:
@@ -237,260 +177,25 @@ def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_widt
     return np.array([[s.contact_ratio_sun_planet, overlap], [s.contact_ratio_planet_ring, overlap]])
 
 
-def body_masses(data: HelicalSet) -> np.ndarray:
-    """Generalised masses (N + 3, 6) [kg]: m three times, I / r^2 twice, J / r^2."""
-    bodies = [(getattr(data, name), member_radius(data, name)) for name in CENTRAL]
-    bodies += [(data.planet, data.planet_radius)] * data.n_planets
-    return np.array([[b.mass] * 3 + [b.diametral_inertia / r**2] * 2 + [b.inertia / r**2] for b, r in bodies])
-
-
-def check_set(data: HelicalSet) -> None:
-    """Refuse radii, angles, stiffnesses, slices and contact points (E-HELICAL)."""
-    for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
-        value = numbers(name, getattr(data, name), 0)
-        if not (math.isfinite(value) and value > 0.0):
-            refuse_helical(name, value, "m", "finite and above 0")
-    if data.ring_radius <= data.planet_radius:
-        refuse_helical(
-            "ring_radius", data.ring_radius, "m", f"above the {data.planet_radius} m of the planets"
-        )
-    for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
-        value = numbers(name, getattr(data, name), 0)
-        if not 0.0 < value < 0.5 * math.pi:
-            refuse_helical(name, value, "rad", "between 0 and pi/2", remedy="give radians")
-    if not abs(numbers("base_helix_angle", data.base_helix_angle, 0)) < 0.5 * math.pi:
-        allowed = "between -pi/2 and pi/2"
-        refuse_helical("base_helix_angle", data.base_helix_angle, "rad", allowed, remedy="give radians")
-    for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
-        values = getattr(data, name)
-        if values.shape != (data.n_planets,):
-            refuse_helical(name, f"{values.size} values", "", f"one number, or {data.n_planets}")
-        wrong = ~np.isfinite(values) | (values < 0.0)
-        if np.any(wrong):
-            refuse_helical(name, values[wrong][0], "N/m", "finite, 0 or more")
-    check_support("planet_bearing", data.planet_bearing, count=data.n_planets)
-    check_angles(data.planet_angles, code="E-HELICAL")
-    _check_contact(data)
-    _check_closure(data)
-
-
 def _check_contact(data: HelicalSet) -> None:
     if data.contact_points not in CONTACT_POINTS:
-        refuse_helical("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
+        data.refuse("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
     if isinstance(data.slices, bool) or int(data.slices) != data.slices or data.slices < 1:
-        refuse_helical("slices", data.slices, "", "a whole number of 1 or more")
+        data.refuse("slices", data.slices, "", "a whole number of 1 or more")
     if not (math.isfinite(data.face_width) and data.face_width >= 0.0):
-        refuse_helical("face_width", data.face_width, "m", "finite, 0 or more")
+        data.refuse("face_width", data.face_width, "m", "finite, 0 or more")
     if data.slices > 1 and not data.face_width:
-        refuse_helical("face_width", data.face_width, "m", "above 0 for several slices")
+        data.refuse("face_width", data.face_width, "m", "above 0 for several slices")
 
 
 def _check_closure(data: HelicalSet) -> None:
     worst = max(data.closure, key=abs)
     if abs(worst) > LARGEST_CLOSURE:
-        refuse_helical(
+        data.refuse(
             "centre_distance", data.centre_distance, "m",
             f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {LARGEST_CLOSURE:.0%}",
             remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
         )  # fmt: skip
-
-
-def helical_dofs(n_planets: int) -> tuple[str, ...]:
-    """Names of all 6 (N + 3) coordinates."""
-    central = [f"{body}: {axis}" for body in CENTRAL for axis in CENTRAL_AXES]
-    return (*central, *(f"planet {n + 1}: {axis}" for n in range(n_planets) for axis in PLANET_AXES))
-
-
-def helical_system(data: HelicalSet, *, torque: PlanarTorque | None = None) -> MechanicalSystem:
-    """Matrices of the set at standstill; the meshes are columns of ``W`` and not in ``K``.
-
-    Parameters
-    ----------
-    data : HelicalSet
-        Coordinates with an infinite stiffness are left out.
-    torque : PlanarTorque, optional
-        Its sign chooses the flanks of the mesh columns; without it those of a sun that drives
-        counter-clockwise. Mesh deflections are positive in compression.
-
-    Returns
-    -------
-    MechanicalSystem
-        ``C`` is zero. Columns of ``W``: the slices of mesh 1, of mesh 2 and so on.
-
-    Raises
-    ------
-    CaseError
-        A torque on a held member, or a set that cannot move at all (E-MECHANISM).
-    """
-    T, kept = free_motions(data), _kept(data)
-    if not T.shape[1]:
-        raise CaseError(
-            "infinite stiffnesses hold every motion of the set", code="E-MECHANISM",
-            remedy="give the support or the bearing of a body finite stiffnesses",
-        )  # fmt: skip
-    names = np.array(helical_dofs(data.n_planets))[kept]
-    return MechanicalSystem(
-        M=(T.T * body_masses(data).ravel()) @ T,
-        C=np.zeros((T.shape[1], T.shape[1])),
-        K=T.T @ _linear_stiffness(data) @ T,
-        W=T.T @ mesh_directions(data, flank_sign(data, torque)),
-        load=T.T @ torque_load(data, torque, kept),
-        dofs=tuple(str(name) for name in names),
-    )
-
-
-def mesh_directions(data: HelicalSet, flank: int = 1) -> np.ndarray:
-    """Mesh columns (6 (N + 3), 2N S): approach of the flanks along their common normal.
-
-    A rigid body whose centre moves by v and which rotates by phi moves its point c by ``v + phi x c``, so
-    that the flanks of gears 1 and 2 approach by ``n . (v_1 + phi_1 x c_1) - n . (v_2 + phi_2 x c_2)`` with
-    the normal n into gear 2. Seen from the planet's centre n is ``(sin alpha cos beta_b, +- cos alpha cos
-    beta_b, - sin beta_b)`` radially, tangentially and axially for the flanks of a sun that drives
-    counter-clockwise (`flank` = 1). The rotation about the own axis gives ``+- u cos beta_b``. With
-    ``contact_points = "base_circles"`` a sun and one planet have the mesh deflection of the helical pair of
-    M. Kubur et al., J. Mech. Des. 126, 2004, 398-406.
-
-    Parameters
-    ----------
-    data : HelicalSet
-    flank : {1, -1}
-    """
-    N, S = data.n_planets, data.slices
-    W = np.zeros((data.n_planets + 3, 6, 2 * N, S))
-    n = np.arange(N)
-    for mesh, gear in enumerate(("sun", "ring")):
-        central, planet = _local_columns(data, gear, flank)
-        W[CENTRAL.index(gear), :, mesh * N + n] = _turned(data, central)
-        W[3 + n, :, mesh * N + n] = planet
-    return W.reshape(6 * (N + 3), 2 * N * S)
-
-
-def pin_directions(data: HelicalSet) -> np.ndarray:
-    """Bearing columns (6 (N + 3), N, 6): motion of each planet less that of its pin.
-
-    Radial, tangential and axial [m], tilt about the radial and the tangential axis and rotation [rad].
-    A carrier that tilts by phi moves the pin along z by ``phi x a e_n``.
-    """
-    N, n = data.n_planets, np.arange(data.n_planets)
-    own = np.diag([1.0] * 3 + [1.0 / data.planet_radius] * 3)
-    # motion of the pin (6,) per local coordinate of the carrier (6,)
-    pin = np.diag([1.0] * 3 + [1.0 / data.centre_distance] * 3)
-    pin[1, 5], pin[2, 4] = 1.0, -1.0
-    W = np.zeros((N + 3, 6, N, 6))
-    W[3 + n, :, n] = own.T
-    W[CENTRAL.index("carrier")] = -_turned(data, pin.T).transpose(1, 0, 2)
-    return W.reshape(6 * (N + 3), N, 6)
-
-
-def free_motions(data: HelicalSet) -> np.ndarray:
-    """All coordinates (6 (N + 3), n) per unit of those that infinite stiffnesses leave free."""
-    N = data.n_planets
-    T, pins = np.eye(6 * (N + 3)), pin_directions(data)
-    for n, axis in zip(*np.nonzero(np.isinf(data.pin_stiffness))):
-        row = 18 + 6 * n + axis
-        T[row, :18] = -pins[:18, n, axis] / pins[row, n, axis]
-    return T[:, _kept(data)]
-
-
-def _local_columns(data: HelicalSet, gear: str, flank: int) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (6, S) of the central gear and of a planet in one mesh, in the planet's directions.
-
-    Gear 1 is the sun or, in the ring mesh, the planet.
-    """
-    external = gear == "sun"
-    alpha = data.pressure_angle_sun_planet if external else data.pressure_angle_planet_ring
-    side = flank if external else -flank
-    along = np.array([math.sin(alpha), side * math.cos(alpha)])
-    beta = data.base_helix_angle
-    normal = np.array([*(along * math.cos(beta)), -flank * math.sin(beta)])
-    r, r_p, a = getattr(data, f"{gear}_radius"), data.planet_radius, data.centre_distance
-    # speed of the point of each gear along the line of action per unit of its u
-    turn, turn_p = side, -flank
-    if data.contact_points == "base_circles":
-        foot = np.array([along[1], -along[0]])
-        point, point_p = turn * r * foot, turn_p * r_p * foot
-    else:
-        point = np.array([a * r / (r + r_p if external else r - r_p), 0.0])
-        point_p = point - (a, 0.0)
-    sign = 1.0 if external else -1.0
-    heights, around = data.slice_heights, math.cos(beta)
-    central = sign * _point_column(normal, point, heights, r, turn * around)
-    return central, -sign * _point_column(normal, point_p, heights, r_p, turn_p * around)
-
-
-def _point_column(normal, point, heights, radius: float, around: float) -> np.ndarray:
-    """``n . (v + phi x c)`` (6, S) for points at all heights; `around` is the factor of u."""
-    column = np.zeros((6, len(heights)))
-    column[:3], column[5] = normal[:, None], around
-    column[3] = (normal[2] * point[1] - normal[1] * heights) / radius
-    column[4] = (normal[0] * heights - normal[2] * point[0]) / radius
-    return column
-
-
-def _turned(data: HelicalSet, local: np.ndarray) -> np.ndarray:
-    """Coordinates (N, 6, k) of a central member of columns (6, k) in every planet's directions."""
-    cosine, sine = np.cos(data.planet_angles), np.sin(data.planet_angles)
-    turned = np.repeat(np.asarray(local, float)[None], data.n_planets, axis=0)
-    for first in (0, 3):
-        one, two = local[first], local[first + 1]
-        turned[:, first] = cosine[:, None] * one - sine[:, None] * two
-        turned[:, first + 1] = sine[:, None] * one + cosine[:, None] * two
-    return turned
-
-
-def _kept(data: HelicalSet) -> np.ndarray:
-    kept = [np.isfinite(getattr(data, name).support.stiffness) for name in CENTRAL]
-    return np.concatenate([*kept, np.isfinite(data.pin_stiffness).ravel()])
-
-
-def _linear_stiffness(data: HelicalSet) -> np.ndarray:
-    """Finite supports and planet bearings."""
-    diagonal = np.zeros((data.n_planets + 3, 6))
-    for row, name in enumerate(CENTRAL):
-        scale = np.array([1.0] * 3 + [member_radius(data, name)] * 3)
-        diagonal[row] = getattr(data, name).support.stiffness / scale**2
-    pins = pin_directions(data)
-    k = np.where(np.isfinite(data.pin_stiffness), data.pin_stiffness, 0.0)
-    K = np.einsum("ina,na,jna->ij", pins, k, pins, optimize=True)
-    return K + np.diag(np.where(np.isfinite(diagonal), diagonal, 0.0).ravel())
-
-
-def helical_meshes(
-    data: HelicalSet,
-    *,
-    stiffness: FourierSeries | StepSeries | MeshExcitation | None = None,
-    harmonics: int | None = None,
-    orders: tuple[int, ...] = (1,),
-    backlash: float | np.ndarray | None = None,
-    separates: bool = True,
-    smoothing: float = 0.0,
-) -> GearMeshes:
-    """The slices of the 2N meshes as elements, each of them separating by itself.
-
-    Parameters
-    ----------
-    data : HelicalSet
-    stiffness : FourierSeries, StepSeries or MeshExcitation, optional
-        Of the 2N S columns [N/m], or their record as from
-        `helical_excitation`; the constant stiffnesses of the set when not
-        given.
-    harmonics, orders
-        Of a record, see `femgear.system.elements.gear_meshes`.
-    backlash : float or (2N S,) array, optional
-        Play along the tooth normal [m]. None takes that of the record; without one, or where it is zero
-        there, the meshes have no back side.
-    separates, smoothing
-        See `femgear.system.elements.GearMeshes`.
-
-    Raises
-    ------
-    CaseError
-        A record without the number of its harmonics (E-HARMONICS), values for another number of columns
-        (E-SHAPE).
-    """
-    made = mesh_elements(stiffness, data.column_stiffness, harmonics, orders, record="record")
-    backlash = made.backlash if backlash is None else backlash
-    return replace(made, backlash=backlash, separates=separates, smoothing=smoothing)
 
 
 def helical_problem(
@@ -508,7 +213,7 @@ def helical_problem(
     ----------
     data : HelicalSet
     meshes : GearMeshes, optional
-        From `helical_meshes`; constant stiffnesses without back side when not given.
+        From `mesh_elements`; constant stiffnesses without back side when not given.
     torque : PlanarTorque, optional
     damping : float, (n_modes,) array or (n, n) array, optional
         Damping ratio of all modes, or one a mode, with mean stiffnesses; or the matrix ``C``.
@@ -518,28 +223,13 @@ def helical_problem(
     CaseError
         A load that accelerates the set (E-LOAD-BALANCE), arrays that do not fit (E-SHAPE).
     """
-    meshes = helical_meshes(data) if meshes is None else meshes
-    columns = np.arange(2 * data.n_planets * data.slices)
-    if not np.array_equal(meshes.columns[:, 0], columns):
-        raise CaseError(
-            f"meshes on columns {meshes.columns[:, 0].tolist()}", code="E-SHAPE", key="meshes",
-            limit=f"columns 0 to {len(columns) - 1} in order", remedy="make them with helical_meshes",
-        )  # fmt: skip
-    system = helical_system(data, torque=torque)
+    meshes = mesh_elements(data) if meshes is None else meshes
+    check_mesh_columns(data, meshes)
+    system = gear_set_system(data, torque=torque)
     reference = NonlinearSystem(system, (meshes,)).reference
     # refuses a load that nothing takes up before a solver drifts away with it
     solve_modes(system, reference)
     return NonlinearSystem(replace(system, C=viscous_damping(system, reference, damping)), (meshes,))
-
-
-def contact_line_width(face_width: float, base_helix_angle: float) -> float:
-    """``b / cos beta_b`` [m]: face width of the spur gear of the normal section whose record is sliced.
-
-    Its teeth are as long as the contact lines of the helical gear. With the stiffness c' per length along
-    the tooth normals, the mesh has ``c' b / cos beta_b`` along the normal, hence ``c' b cos beta_b`` in the
-    transverse section, as ISO 6336-1, method B, has it.
-    """
-    return face_width / math.cos(base_helix_angle)
 
 
 def helical_excitation(
@@ -558,9 +248,11 @@ def helical_excitation(
     Parameters
     ----------
     record : MeshExcitation or MeshCycle
-        Of the spur gears of the normal section with the face width `contact_line_width`, all of it loaded as
-        the whole helical mesh; stiffnesses and deflections along the tooth normals. Mesh phases are those at
-        mid-face. A `femgear.contact.cycle.MeshCycle` knows no backlash, which is then zero.
+        Of the spur gears of the normal section, all of it loaded as the whole helical mesh; stiffnesses and
+        deflections along the tooth normals. Their teeth are as long as the contact lines, so that the face
+        width is ``b / cos beta_b`` (ISO 6336-1, method B: ``c' b cos beta_b`` in the transverse section).
+        Mesh phases are those at mid-face. A `femgear.contact.cycle.MeshCycle` knows no backlash, which is
+        then zero.
     overlap_ratio : float or (n_meshes,) array
         eps_beta, 0 or more.
     slices : int
@@ -646,13 +338,20 @@ def _overlap(overlap_ratio, meshes: int) -> np.ndarray:
 
 
 def helical_modes(
-    data: HelicalSet, *, mesh_stiffness=None, damping_ratio: float = 0.0, max_frequency: float | None = None
+    data: HelicalSet,
+    *,
+    system: MechanicalSystem | None = None,
+    mesh_stiffness=None,
+    damping_ratio: float = 0.0,
+    max_frequency: float | None = None,
 ) -> Modes:
-    """Modes of the set at standstill, with their kinds.
+    """Solve for the modes of the set at standstill, with their kinds.
 
     Parameters
     ----------
     data : HelicalSet
+    system : MechanicalSystem, optional
+        `gear_set_system` of the set, with the flanks that a torque loads; without torque when not given.
     mesh_stiffness : (2N S,) array, optional
         Of the columns [N/m]; that of the set when not given.
     damping_ratio : float
@@ -663,153 +362,26 @@ def helical_modes(
     Returns
     -------
     Modes
-        ``kind`` from `helical_kinds`; modes of one frequency have one phasing each.
+        ``kind`` from `gear_set_kinds`; modes of one frequency have one phasing each.
     """
+    system = gear_set_system(data) if system is None else system
     stiffness = data.column_stiffness if mesh_stiffness is None else mesh_stiffness
-    modes = solve_modes(
-        helical_system(data), stiffness, damping_ratio=damping_ratio, max_frequency=max_frequency
-    )
+    modes = solve_modes(system, stiffness, damping_ratio=damping_ratio, max_frequency=max_frequency)
     # tilts of the planets that no mesh feels have one frequency in several classes
-    Q = phase_basis(helical_motions(data, modes.shape), modes.frequency, tolerance=_ONE_FREQUENCY)
+    Q = phase_basis(gear_set_motions(data, modes.shape), modes.frequency, tolerance=_ONE_FREQUENCY)
+    shape = modes.shape @ Q
     return replace(
         modes,
-        shape=modes.shape @ Q,
+        shape=shape,
         mesh_deflection=modes.mesh_deflection @ Q,
-        modal_load=Q.T @ modes.modal_load,
-        kind=helical_kinds(data, modes.shape @ Q, frequency=modes.frequency),
+        modal_load=None if modes.modal_load is None else Q.T @ modes.modal_load,
+        kind=gear_set_kinds(data, shape, frequency=modes.frequency),
     )
-
-
-def helical_kinds(data: HelicalSet, shape, *, frequency) -> tuple[str, ...]:
-    """Kind of every mode from its shape.
-
-    T. Eritenel and R. G. Parker (J. Sound Vib. 325, 2009, 397-420) for equal planets at equal angles: in a
-    rotational-axial mode the central members rotate and move along z, and all planets move alike; in a
-    translational-tilting mode they move and tilt in the plane; in a planet mode they rest. With four planets
-    these are the modes that Kahraman (1994) calls in-phase, sequentially phased and counter-phased; the
-    phasing itself comes from `femgear.system.mode_kinds.phasing` of `helical_motions`.
-
-    Parameters
-    ----------
-    data : HelicalSet
-    shape : (n, m) array
-        In the coordinates of `helical_system`.
-    frequency : (m,) array
-        Zero for rigid-body modes.
-
-    Returns
-    -------
-    tuple of str
-        ``rigid``; ``rotational-axial``, ``translational-tilting`` or ``planet`` where at least 99 % of the
-        kinetic energy belongs to that class; else ``mixed``.
-
-    Raises
-    ------
-    CaseError
-        Shapes of another system (E-SHAPE).
-    """
-    named = named_kinds(class_shares(data, shape), frequency)
-    return tuple(KINDS.get(kind, kind) for kind in named)
-
-
-def class_shares(data: HelicalSet, shape) -> np.ndarray:
-    """Shares (3, m) of rotational-axial, translational-tilting and planet motion in the kinetic energy."""
-    return energy_shares(helical_motions(data, shape))
-
-
-def helical_motions(data: HelicalSet, shape) -> SetMotions:
-    """Motions of all bodies, held ones and planets tied to their pins included.
-
-    The central members stand twice: x, y and rotation, then tilt about x, tilt about y and z, which turn with
-    the frame as those do. Planets have all six motions.
-
-    Parameters
-    ----------
-    data : HelicalSet
-    shape : (n, m) array
-        In the coordinates of `helical_system`.
-
-    Raises
-    ------
-    CaseError
-        Shapes of another system (E-SHAPE).
-    """
-    full, mass = body_motions(data, free_motions(data), shape), body_masses(data)
-    plane, space = [0, 1, 5], [3, 4, 2]
-    central = np.concatenate([full[:3, plane], full[:3, space]])
-    central_mass = np.concatenate([mass[:3, plane], mass[:3, space]])
-    return SetMotions(central, central_mass, full[3:], mass[3:], data.planet_angles)
-
-
-def helical_springs(data: HelicalSet, *, mesh_stiffness=None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the set by name.
-
-    Parameters
-    ----------
-    data : HelicalSet
-    mesh_stiffness : (2N S,) array, optional
-        Of the columns [N/m]; that of the set when not given.
-
-    Returns
-    -------
-    dict of str to (columns (n, g), stiffness (g,))
-        Meshes one by one (a column a slice); of planet bearings and of supports of the central members
-        ``radial`` (two columns), ``axial``, ``tilt`` (two) and ``torsional``, in [m] and [rad]; what is held
-        or free has no spring.
-    """
-    T, N = free_motions(data), data.n_planets
-    k = np.asarray(data.column_stiffness if mesh_stiffness is None else mesh_stiffness, float)
-    meshes = (T.T @ mesh_directions(data)).reshape(T.shape[1], 2 * N, data.slices)
-    names = [f"sun-planet {n + 1}" for n in range(N)] + [f"planet {n + 1}-ring" for n in range(N)]
-    k = k.reshape(2 * N, data.slices)
-    springs = {name: (meshes[:, j], k[j]) for j, name in enumerate(names)}
-    pins = pin_directions(data)
-    for n in range(N):
-        springs |= _by_direction(f"bearing of planet {n + 1}", T.T @ pins[:, n], data.pin_stiffness[n])
-    for row, name in enumerate(CENTRAL):
-        scale = np.array([1.0] * 3 + [member_radius(data, name)] * 3)
-        columns = T[6 * row : 6 * row + 6].T / scale
-        springs |= _by_direction(f"support of the {name}", columns, getattr(data, name).support.stiffness)
-    return springs
-
-
-def _by_direction(name: str, columns: np.ndarray, stiffness: np.ndarray) -> dict:
-    """Springs (two radial, axial, two tilts, torsional) that are finite and not zero."""
-    there = np.isfinite(stiffness) & (stiffness > 0.0)
-    places = ([0, 1], [2], [3, 4], [5])
-    return {
-        f"{name}, {direction}": (columns[:, rows], stiffness[rows])
-        for direction, rows in zip(SPRINGS, places)
-        if there[rows[0]]
-    }
-
-
-@dataclass(frozen=True)
-class ErrorResponse:
-    """Response of several cases to transmission errors on harmonics of the mesh frequency.
-
-    Parameters
-    ----------
-    mesh_frequency : (F,) array
-        [Hz]
-    harmonics : (H,) int array
-    deflection : (n_cases, F, H, n_columns) complex array
-        ``W^T q`` [m]: the dynamic transmission error of every mesh or slice.
-    force : (n_cases, F, H, n_columns) complex array
-        Dynamic mesh force ``k (W^T q - e)`` [N].
-    output : (n_cases, F, H, n_outputs) complex array
-    """
-
-    mesh_frequency: np.ndarray
-    harmonics: np.ndarray
-    deflection: np.ndarray
-    force: np.ndarray
-    output: np.ndarray
 
 
 def modal_error_response(
     system: MechanicalSystem, modes: Modes, mesh_frequency, error, *, harmonics=None, outputs=None
-) -> ErrorResponse:
+) -> MeshErrorResponse:
     """Response to transmission errors ``e_j(t) = Re sum_h error_jh exp(i h omega_m t)`` by summing modes.
 
     ``q = sum phi (phi^T W k e) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega)``, with the static
@@ -832,6 +404,12 @@ def modal_error_response(
         Whole numbers from 1; 1 to H when not given.
     outputs : (n_outputs, n) array, optional
         ``L``, such as the rows of `spring_loads`; none when not given.
+
+    Returns
+    -------
+    MeshErrorResponse
+        With a first axis of the cases: deflection and force (n_cases, F, H, n_columns), output (n_cases, F,
+        H, n_outputs).
 
     Raises
     ------
@@ -860,7 +438,7 @@ def modal_error_response(
         answer[:, :, h] = (gain[:, h] * modal[:, None, h]) @ left.T + static[:, None, h]
     deflection, output = answer[..., : len(k)], answer[..., len(k) :]
     force = k * (deflection - error.transpose(0, 2, 1)[:, None])
-    return ErrorResponse(frequency, harmonics, deflection, force, output)
+    return MeshErrorResponse(frequency, harmonics, deflection, force, output)
 
 
 def phased_errors(amplitudes, phases) -> np.ndarray:
@@ -884,8 +462,8 @@ def spring_loads(springs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[
     Parameters
     ----------
     springs : mapping of str to (columns (n, g), stiffness (g,))
-        From `helical_springs` or `femgear.system.assembler.planar_springs`; those of meshes give ``k W^T q``
-        without the transmission error, whose force is in `ErrorResponse.force`.
+        From `femgear.system.assembler.gear_set_springs`; those of meshes give ``k W^T q``
+        without the transmission error, whose force is in `MeshErrorResponse.force`.
 
     Returns
     -------

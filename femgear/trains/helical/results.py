@@ -22,12 +22,12 @@ from femgear.storage.dataset import (
     RPM,
     complex_entries,
     dataset,
-    in_space,
     response_entries,
 )
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import contact_ratios
-from femgear.trains.helical.virtual_gears import SectionStiffness
+from femgear.trains.helical.setup import SectionStiffness
+from femgear.trains.rigid import modes_entries, stiffness_text, torsion_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,9 +65,43 @@ class HelicalModesResult:
     whole: MeshExcitation | None = None
 
     def dataset(self) -> xr.Dataset:
-        """Contents of modes.nc."""
+        """Contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
+        from femgear.system.assembler import free_motions
 
-        return helical_modes_dataset(self)
+        modes, data = self.modes, self.data
+        meshes = (2 * data.n_planets, data.slices)
+        deflection = modes.mesh_deflection.reshape(*meshes, -1).mean(axis=1)
+        variables, coords = modes_entries(data, modes, free_motions(data), AXES, self.phasing)
+        variables |= {
+            "mesh_stiffness": (
+                ("mesh",), modes.mesh_stiffness.reshape(meshes).sum(axis=1), "N/m",
+                "mean mesh stiffness along the tooth normals",
+            ),
+            "mesh_deflection": (
+                ("mesh", "mode"), deflection, "kg^-1/2",
+                "mesh deflection of the mode along the tooth normals",
+            ),
+        }  # fmt: skip
+        coords = _coordinates(self) | coords
+        if self.whole is not None:
+            along, whole = np.cos(data.base_helix_angle), self.whole
+            where = ("mesh", "position")
+            variables["helical_stiffness"] = (
+                where, whole.stiffness * along**2, "N/m",
+                "mesh stiffness along the transverse line of action",
+            )  # fmt: skip
+            variables["helical_ste"] = (
+                where, whole.deflection / along, "m",
+                "static transmission error along the transverse line of action, centres fixed",
+            )  # fmt: skip
+            position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
+            coords["position"] = (("position",), position, "1", "position in mesh periods")
+        return dataset(
+            variables,
+            coords=coords,
+            attrs={"title": "modes of the helical set at standstill", "unknowns": len(modes.shape)}
+            | _attributes(self),
+        )
 
 
 @dataclass(frozen=True)
@@ -86,100 +120,47 @@ class HelicalDynamicsResult:
     loads: dict[str, np.ndarray]
 
     def dataset(self) -> xr.Dataset:
-        """Contents of dynamics.nc."""
-
-        return helical_dynamics_dataset(self)
-
-
-def helical_modes_dataset(result: HelicalModesResult) -> xr.Dataset:
-    """Contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
-    from femgear.trains.helical.model import free_motions
-
-    modes, data = result.modes, result.data
-    shape, dofs = in_space(data, free_motions(data) @ modes.shape, AXES)
-    meshes = (2 * data.n_planets, data.slices)
-    deflection = modes.mesh_deflection.reshape(*meshes, -1).mean(axis=1)
-    variables = {
-        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
-        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
-        "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
-        "phasing": (("mode",), list(result.phasing), "1", "phasing of the planets in the mode"),
-        "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
-        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
-        "mesh_stiffness": (
-            ("mesh",), modes.mesh_stiffness.reshape(meshes).sum(axis=1), "N/m",
-            "mean mesh stiffness along the tooth normals",
-        ),
-        "mesh_deflection": (
-            ("mesh", "mode"), deflection, "kg^-1/2", "mesh deflection of the mode along the tooth normals",
-        ),
-    }  # fmt: skip
-    coords = _coordinates(result) | {
-        "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-        "dof": (("dof",), dofs, "1", "degree of freedom"),
-    }
-    if result.whole is not None:
-        along, whole = np.cos(data.base_helix_angle), result.whole
-        where = ("mesh", "position")
-        variables["helical_stiffness"] = (
-            where, whole.stiffness * along**2, "N/m", "mesh stiffness along the transverse line of action",
+        """Contents of dynamics.nc of a helical case."""
+        response, basis, lines = self.response, self.modes, ("speed", "mesh", "harmonic")
+        data = basis.data
+        whole = (len(response.mesh_frequency), 2 * data.n_planets, data.slices, -1)
+        force, deflection = response.force.reshape(whole), response.deflection.reshape(whole)
+        pin, support = self.loads["pin"], self.loads["support"]
+        along = np.cos(data.base_helix_angle)
+        on_planet, on_member = (
+            ("speed", "planet", "direction", "harmonic"),
+            ("speed", "member", "axis", "harmonic"),
+        )
+        entries = (
+            (
+                "dte", lines, deflection.mean(axis=2) / along, "m",
+                "dynamic transmission error along the transverse line of action at mid-face",
+            ),
+            ("mesh_force", lines, force.sum(axis=2), "N", "dynamic mesh force along the tooth normals"),
+            (
+                "mesh_deflection", lines, deflection.mean(axis=2), "m",
+                "deflection of the mesh spring along the tooth normals at mid-face",
+            ),
+            (
+                "slice_force", ("speed", "mesh", "slice", "harmonic"), force, "N",
+                "dynamic force of a slice along the tooth normals",
+            ),
+            ("pin_force", on_planet, pin[:, :, :3], "N", "force of the pin on the planet"),
+            ("pin_moment", on_planet, pin[:, :, 3:], "N m", "moment of the pin on the planet"),
+            ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),
+            ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
         )  # fmt: skip
-        variables["helical_ste"] = (
-            where, whole.deflection / along, "m",
-            "static transmission error along the transverse line of action, centres fixed",
-        )  # fmt: skip
-        position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
-        coords["position"] = (("position",), position, "1", "position in mesh periods")
-    return dataset(
-        variables,
-        coords=coords,
-        attrs={"title": "modes of the helical set at standstill", "unknowns": len(modes.shape)}
-        | _attributes(result),
-    )
-
-
-def helical_dynamics_dataset(result: HelicalDynamicsResult) -> xr.Dataset:
-    """Contents of dynamics.nc of a helical case."""
-    response, basis, lines = result.response, result.modes, ("speed", "mesh", "harmonic")
-    data = basis.data
-    whole = (len(response.mesh_frequency), 2 * data.n_planets, data.slices, -1)
-    force, deflection = response.force.reshape(whole), response.deflection.reshape(whole)
-    pin, support = result.loads["pin"], result.loads["support"]
-    along = np.cos(data.base_helix_angle)
-    on_planet, on_member = (
-        ("speed", "planet", "direction", "harmonic"),
-        ("speed", "member", "axis", "harmonic"),
-    )
-    entries = (
-        (
-            "dte", lines, deflection.mean(axis=2) / along, "m",
-            "dynamic transmission error along the transverse line of action at mid-face",
-        ),
-        ("mesh_force", lines, force.sum(axis=2), "N", "dynamic mesh force along the tooth normals"),
-        (
-            "mesh_deflection", lines, deflection.mean(axis=2), "m",
-            "deflection of the mesh spring along the tooth normals at mid-face",
-        ),
-        (
-            "slice_force", ("speed", "mesh", "slice", "harmonic"), force, "N",
-            "dynamic force of a slice along the tooth normals",
-        ),
-        ("pin_force", on_planet, pin[:, :, :3], "N", "force of the pin on the planet"),
-        ("pin_moment", on_planet, pin[:, :, 3:], "N m", "moment of the pin on the planet"),
-        ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),
-        ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
-    )  # fmt: skip
-    return dataset(
-        response_entries(result) | complex_entries(entries),
-        coords=_coordinates(basis) | _lines(result),
-        attrs={
-            "title": "periodic response of the helical set by the spectral method",
-            "message": response.message,
-            "ring_teeth": basis.planetary_set.ring.teeth,
-            "fourier_convention": FOURIER,
-        }
-        | _attributes(basis),
-    )
+        return dataset(
+            response_entries(self) | complex_entries(entries),
+            coords=_coordinates(basis) | _lines(self),
+            attrs={
+                "title": "periodic response of the helical set by the spectral method",
+                "message": response.message,
+                "ring_teeth": basis.planetary_set.ring.teeth,
+                "fourier_convention": FOURIER,
+            }
+            | _attributes(basis),
+        )
 
 
 def _lines(result: HelicalDynamicsResult) -> dict[str, tuple]:
@@ -263,24 +244,19 @@ def _bodies(case: HelicalCase) -> Iterator[tuple[str, ...]]:
         ("planet (pin)", planet, planet.bearing_stiffness),
     ):
         space = getattr(helical, name.partition(" ")[0])
-        torsional = space.torsional_stiffness
-        held = "held" if name == case.operation.fixed else "0"
         yield (
             name,
             f"{one.mass:.6g}",
             f"{one.inertia:.6g}, {space.diametral_inertia:.6g}",
             f"{radial:.6g}, {space.axial_stiffness:.6g}",
-            f"{space.tilt_stiffness:.6g}, {held if torsional is None else f'{torsional:.6g}'}",
+            f"{space.tilt_stiffness:.6g}, {torsion_text(case, name, space.torsional_stiffness)}",
         )
 
 
 def _model(case: HelicalCase, s: PlanetarySet) -> tuple[str, ...]:
     helical, given = case.helical, case.helical.mesh_stiffness
     if given is not None:
-        text = (
-            f"mesh stiffness along the tooth normals: sun-planet {given.sun_planet:.6g}, planet-ring "
-            f"{given.planet_ring:.6g} N/m, as given"
-        )
+        text = f"mesh stiffness along the tooth normals: {stiffness_text(given)}"
     elif helical.section == "normal":
         teeth = "/".join(str(z) for z in virtual_teeth(s, helical.helix_angle))
         text = f"mesh stiffness: of the static solution, teeth as stiff as those of virtual gears {teeth}"

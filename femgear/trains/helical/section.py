@@ -6,12 +6,17 @@ import math
 from collections.abc import Iterator
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
-from femgear.case.fields import Count, Quantity
+from femgear.case.fields import Count, Quantity, Section
 from femgear.case.sections import MeshStiffnessSection, RigidCase
 from femgear.case.units import ANGLE, INERTIA, MASS, STIFFNESS, TORSION
 from femgear.errors import CaseError
+from femgear.trains.rigid import (
+    entries_without_effect,
+    flank_entries,
+    listed,
+    rigid_refusals,
+    unheld_member,
+)
 
 LARGEST_HELIX = math.radians(45.0)
 MOST_SLICES = 30
@@ -26,11 +31,7 @@ Turning = Quantity(TORSION, 0.0, 1e13)
 Diametral = Quantity(INERTIA, 1e-12, 1e8)
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class _Supported(_Section):
+class _Supported(Section):
     """What a body needs beyond its mass, polar inertia and radial support to move in space."""
 
     diametral_inertia: Diametral
@@ -59,7 +60,7 @@ class HelicalRingSection(_Supported):
     support_stiffness: Stiffness
 
 
-class HelicalSection(_Section):
+class HelicalSection(Section):
     """Helical teeth on rigid bodies that move in space: sun, ring, carrier and planets.
 
     With this section module, pressure angle, racks and profile shifts are those of the normal section, and a
@@ -91,13 +92,12 @@ def helical_notices(data: dict) -> Iterator[str]:
     data : dict
         Tables of a case file that was checked, with a section helical.
     """
-    unused = [name for name in ("motor", "brake", "housing") if name in data]
-    unused += [f"ring.{key}" for key in ("foundation_radial", "foundation_tangential") if key in data["ring"]]
+    unused = entries_without_effect(data)
     unused += [f"static.{key}" for key in ("stresses", "back_flanks") if key in data.get("static", {})]
     if data["planet"].get("bearing_clearance"):
         unused.append("planet.bearing_clearance")
     if unused:
-        yield f"{_listed(unused)} no effect in this helical case"
+        yield f"{listed(unused)} no effect in this helical case"
     if data["helical"].get("contact_points") == "base_circles":
         yield (
             '[W-CONTACT-POINTS] helical.contact_points: with "base_circles" the mesh forces on both gears do '
@@ -108,12 +108,10 @@ def helical_notices(data: dict) -> Iterator[str]:
         given = [name for name in ("static", "dynamics") if name in data]
         if "section" in data["helical"]:
             given.append("helical.section")
-        for name in ("sun", "planet", "ring", "carrier"):
-            keys = ("modifications", "errors", "individual")
-            given += [f"{name}.{key}" for key in keys if data.get(name, {}).get(key)]
+        given += flank_entries(data)
         if given:
             yield (
-                f"{_listed(given)} no effect while helical.mesh_stiffness is given: it leaves nothing that "
+                f"{listed(given)} no effect while helical.mesh_stiffness is given: it leaves nothing that "
                 "excites, and modes are all that is computed"
             )
     else:
@@ -138,10 +136,6 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
 
 
-def _listed(names: list[str]) -> str:
-    return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
-
-
 class HelicalCase(RigidCase):
     """A planetary gear set of rigid bodies with helical gears, which move in space."""
 
@@ -164,29 +158,11 @@ def check_helical(case: HelicalCase) -> Iterator[CaseError]:
             limit="above 0 deg up to 45 deg",
             remedy="leave the section helical out",
         )
-    if case.static.members == "elastic":
-        yield CaseError(
-            "the supports belong to the helical model: the static solution is that of the gears alone",
-            code="E-CHOICE",
-            key="static.members",
-            value="elastic",
-            limit='"fixed" in a helical case',
-            remedy="leave static.members out",
-        )
-    if case.operation.torque == 0.0:
-        yield CaseError(
-            "without torque no tooth carries load, so there is no mesh stiffness",
-            code="E-NO-LOAD",
-            key="operation.torque",
-            limit="not zero in a helical case",
-        )
+    yield from rigid_refusals(case, "helical", without_torque=", so there is no mesh stiffness")
     fixed = case.operation.fixed
     if getattr(helical, fixed).torsional_stiffness == 0.0:
-        yield CaseError(
-            f"the {fixed} is the fixed member but nothing keeps it from turning",
-            code="E-MECHANISM",
-            key=f"helical.{fixed}.torsional_stiffness",
-            value="0 N m/rad",
-            limit="above 0 N m/rad",
-            remedy="leave the entry out to hold the member, or hold another one",
+        yield unheld_member(
+            case,
+            f"helical.{fixed}.torsional_stiffness",
+            "leave the entry out to hold the member, or hold another one",
         )

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +13,10 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
+from femgear.errors import CaseError
 from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
-from femgear.trains.helical.checks import check_helical_case
 from femgear.trains.helical.results import (
     HelicalDynamicsResult,
     HelicalModesResult,
@@ -25,27 +24,33 @@ from femgear.trains.helical.results import (
     describe_helical_static,
 )
 from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
-from femgear.trains.helical.virtual_gears import (
+from femgear.trains.helical.setup import (
     SectionStiffness,
     base_helix_angle,
+    check_helical_case,
     helical_data,
     normal_record,
     overlap_ratio,
-    rotation_sense,
     section_stiffness,
     shared_load,
-    torque_of,
 )
 from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.rigid import (
+    driving_torque,
+    member_speeds,
+    modes_verdict,
+    needed,
+    rotation_sense,
+)
 from femgear.trains.static import stages as static_stages
 from femgear.trains.static.description import describe_case, set_warnings
 from femgear.trains.static.results import StaticResult
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
-    from femgear.system.system import MechanicalSystem, Response
-    from femgear.trains.helical.model import HelicalSet
+    from femgear.system.system import Response
 
+_NOTHING_EXCITES = "a given helical.mesh_stiffness does not vary: nothing excites the set"
 _SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "tooth_loads")
 
 
@@ -88,13 +93,16 @@ def solve_helical_modes(
     CaseError
         What `check_helical_case` refuses.
     """
-    from femgear.system.lumped import flank_sign
-    from femgear.trains.helical.model import helical_excitation, helical_system
+    from femgear.system.assembler import gear_set_system
+    from femgear.system.mode_kinds import gear_set_motions, phasing
+    from femgear.system.rigid_bodies import flank_sign
+    from femgear.trains.helical.model import helical_excitation, helical_modes
 
     gears = planetary_set(case)
     check_helical_case(case, gears)
     excitation, whole = None, None
     if case.helical.mesh_stiffness is None:
+        static = needed(static, "static")
         check_entries(static.entries, static_entries(_drive_flanks(case)), "static solution")
         factor = np.ones(2)
         if case.helical.section == "normal":
@@ -109,10 +117,13 @@ def solve_helical_modes(
         whole = shared_load(helical_excitation(record, overlap))
         excitation = helical_excitation(record, overlap, slices=case.helical.slices, hand=hand)
     data = helical_data(case, gears, None if whole is None else whole.stiffness.mean(axis=1))
-    torque = torque_of(case)
-    system, flank = helical_system(data, torque=torque), flank_sign(data, torque)
+    torque = driving_torque(case)
+    system, flank = gear_set_system(data, torque=torque), flank_sign(data, torque)
     stiffness = data.column_stiffness if excitation is None else excitation.stiffness.mean(axis=1)
-    modes, phases = _named_modes(data, system, stiffness, case.dynamics.damping_ratio)
+    modes = helical_modes(
+        data, system=system, mesh_stiffness=stiffness, damping_ratio=case.dynamics.damping_ratio
+    )
+    phases = phasing(gear_set_motions(data, modes.shape))
     return HelicalModesResult(gears, data, system, modes, phases, flank, section, excitation, whole)
 
 
@@ -126,15 +137,13 @@ def solve_helical_dynamics(
     ------
     ConvergenceError
     """
-    from femgear.gears.kinematics import speeds
     from femgear.solvers.periodic.spectral import solve_spectral
     from femgear.solvers.stability.parametric import stability as floquet_verdict
 
+    if modes.excitation is None:
+        raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness")
     operation, dynamics = case.operation, case.dynamics
-    turning = tuple(
-        speeds(modes.planetary_set, input=operation.input, fixed=operation.fixed, speed=speed)
-        for speed in operation.speeds
-    )
+    turning = tuple(member_speeds(case, modes.planetary_set, speed) for speed in operation.speeds)
     frequency = np.array([one.mesh_frequency for one in turning])
     response = solve_spectral(
         modes.modes,
@@ -156,30 +165,11 @@ def solve_helical_dynamics(
     )
 
 
-def _named_modes(data: HelicalSet, system: MechanicalSystem, stiffness, ratio: float):
-    """All modes, those of one frequency with one phasing each, and the phasing."""
-    from femgear.solvers.linear.modal import solve_modes
-    from femgear.system.mode_kinds import phase_basis, phasing
-    from femgear.trains.helical.model import helical_kinds, helical_motions
-
-    modes = solve_modes(system, stiffness, damping_ratio=ratio)
-    Q = phase_basis(helical_motions(data, modes.shape), modes.frequency, tolerance=1e-9)
-    shape = modes.shape @ Q
-    named = replace(
-        modes,
-        shape=shape,
-        mesh_deflection=modes.mesh_deflection @ Q,
-        modal_load=Q.T @ modes.modal_load,
-        kind=helical_kinds(data, shape, frequency=modes.frequency),
-    )
-    return named, phasing(helical_motions(data, shape))
-
-
 def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:
     """Loads of pins on planets and of supports on central members, harmonics (speeds, ..., 6, H + 1)."""
     from femgear.solvers.linear.modal import output_load, output_response, residual_output
-    from femgear.system.lumped import CENTRAL, member_radius
-    from femgear.trains.helical.model import free_motions, mesh_directions, pin_directions
+    from femgear.system.assembler import free_motions, mesh_directions, pin_directions
+    from femgear.system.rigid_bodies import CENTRAL, member_radius
 
     data, system, basis = result.data, result.system, result.modes
     T, pins, N = free_motions(data), pin_directions(data), data.n_planets
@@ -222,6 +212,10 @@ def _figures() -> Mapping[str, Figures]:
     return FIGURES
 
 
+def _check_gears(case: HelicalCase) -> None:
+    planetary_set(case)
+
+
 def _given(case: HelicalCase) -> bool:
     return case.helical.mesh_stiffness is not None
 
@@ -247,7 +241,7 @@ HELICAL = Train(
                 if _given(case)
                 else ""
             ),
-            check=planetary_set,
+            check=_check_gears,
         ),
         Stage(
             name="modes",
@@ -255,9 +249,7 @@ HELICAL = Train(
             solve=lambda case, results, context: solve_helical_modes(
                 case, results.get("static"), cache=context.cache
             ),
-            verdict=lambda result: {
-                "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
-            },
+            verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=lambda case: () if _given(case) else ("static",),
             check=lambda case: check_helical_case(case, planetary_set(case)),
@@ -271,9 +263,7 @@ HELICAL = Train(
             verdict=static_stages.response_verdict,
             describe=lambda results: describe_response(results.dynamics),
             unavailable=lambda case: (
-                "a given helical.mesh_stiffness does not vary: nothing excites the set"
-                if _given(case)
-                else ""
+                _NOTHING_EXCITES if _given(case) else ""
             ),
             needs=lambda case: ("modes",),
         ),

@@ -24,10 +24,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.errors import CaseError
-from femgear.system.assembler import free_motions, mesh_directions, planar_dofs, planar_springs, planar_system
-from femgear.system.entries import checked_count, checked_numbers
-from femgear.system.lumped import (
+from femgear.errors import CaseError, checked_count, checked_numbers
+from femgear.system.assembler import (
+    dof_names,
+    free_motions,
+    gear_set_springs,
+    gear_set_system,
+    mesh_directions,
+)
+from femgear.system.fourier import FourierSeries
+from femgear.system.rigid_bodies import (
     CENTRAL,
     PlanarSet,
     PlanarTorque,
@@ -36,7 +42,6 @@ from femgear.system.lumped import (
     planar_from_set,
     torque_shares,
 )
-from femgear.system.series import FourierSeries
 from femgear.system.system import MechanicalSystem
 
 if TYPE_CHECKING:
@@ -274,7 +279,7 @@ def stage_of_set(planetary_set: PlanetarySet, *, fixed: str | None = "ring", ang
     fixed, angle
         See `Stage`.
     lumped
-        Bodies and stiffnesses, see `femgear.system.lumped.planar_from_set`.
+        Bodies and stiffnesses, see `femgear.system.rigid_bodies.planar_from_set`.
     """
     s = planetary_set
     return Stage(
@@ -606,7 +611,7 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
     check_turns(data)
     turning = turning_couplings(data, speed)
     carrier = train_speeds(data, speed).carrier if speed else np.zeros(len(data.stages))
-    parts = [planar_system(one.data, carrier_speed=w) for one, w in zip(data.stages, carrier.tolist())]
+    parts = [gear_set_system(one.data, carrier_speed=w) for one, w in zip(data.stages, carrier.tolist())]
     Z = joined_motions(data)
     K = block_diag(*(part.K for part in parts)) + _centrifugal_stiffness(data, carrier)
     for number, coupling in enumerate(data.couplings):
@@ -686,7 +691,7 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
 def joined_motions(data: MultistageSet) -> np.ndarray:
     """Coordinates of all stages (n_stages, n) per unit of those that rigid couplings leave free.
 
-    The rows are those of the `planar_system` of every stage, one after the other. Of two joined coordinates
+    The rows are those of the `gear_set_system` of every stage, one after the other. Of two joined coordinates
     that of the earlier place stays.
     """
     size = sum(free_motions(stage.data).shape[1] for stage in data.stages)
@@ -715,11 +720,11 @@ def multistage_springs(data: MultistageSet) -> dict[str, tuple[np.ndarray, np.nd
     Returns
     -------
     dict of str to (columns (n, g), stiffness (g,))
-        Those of `planar_springs` of every stage, and the elastic couplings.
+        Those of `gear_set_springs` of every stage, and the elastic couplings.
     """
     Z, springs = joined_motions(data), {}
     for number, (stage, rows) in enumerate(zip(data.stages, stage_slices(data)), 1):
-        for name, (columns, stiffness) in planar_springs(stage.data).items():
+        for name, (columns, stiffness) in gear_set_springs(stage.data).items():
             springs[f"stage {number} {name}"] = (Z[rows].T @ columns, stiffness)
     for coupling in data.couplings:
         columns, stiffness = _springs(data, coupling, lateral=True)
@@ -826,7 +831,7 @@ def _names(data: MultistageSet, Z: np.ndarray) -> tuple[str, ...]:
     for number, stage in enumerate(data.stages, 1):
         T = free_motions(stage.data)
         own = np.argmax(T == 1.0, axis=0)
-        all_names = planar_dofs(stage.data.n_planets)
+        all_names = dof_names(stage.data)
         names += [f"stage {number} {all_names[row]}" for row in own]
     return tuple(names[row] for row in np.argmax(Z == 1.0, axis=0))
 

@@ -13,15 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_numbers
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
 from femgear.solvers.linear.receptance import MeshErrorResponse, modal_response
-from femgear.system.assembler import planar_meshes, planar_system
+from femgear.system.assembler import gear_set_system, mesh_elements
 from femgear.system.elements import GearMeshes
-from femgear.system.entries import checked_numbers
-from femgear.system.mode_kinds import class_energies, named_kinds, planar_motions
-from femgear.system.nonlinear import NonlinearSystem
-from femgear.system.system import MechanicalSystem, Modes
+from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
+from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 from femgear.trains.multistage.model import (
     MultistageSet,
     Stage,
@@ -110,7 +108,7 @@ def stage_masses(data: MultistageSet) -> np.ndarray:
     Z = joined_motions(data)
     return np.array(
         [
-            Z[rows].T @ planar_system(stage.data).M @ Z[rows]
+            Z[rows].T @ gear_set_system(stage.data).M @ Z[rows]
             for stage, rows in zip(data.stages, stage_slices(data))
         ]
     )
@@ -141,7 +139,7 @@ def multistage_kinds(data: MultistageSet, shape, *, frequency) -> tuple[str, ...
     full = joined_motions(data) @ np.asarray(shape)
     classes, total = 0.0, 0.0
     for stage, rows in zip(data.stages, stage_slices(data)):
-        motions = planar_motions(stage.data, full[rows])
+        motions = gear_set_motions(stage.data, full[rows])
         central = np.einsum("ba,bam->m", motions.central_mass, np.abs(motions.central) ** 2)
         classes = classes + class_energies(motions)
         total = total + central + (np.abs(motions.weighted) ** 2).sum(axis=(0, 1))
@@ -298,7 +296,7 @@ def multistage_problem(
     ----------
     data : MultistageSet
     meshes : mapping of int to GearMeshes, optional
-        By stage (from 1), from `planar_meshes` of its set with orders ``(1,)`` of the stage's own mesh
+        By stage (from 1), from `mesh_elements` of its set with orders ``(1,)`` of the stage's own mesh
         frequency; a stage that is not named has constant stiffnesses and meshes that part.
     torque : float
         On the input [N m], see `multistage_system`.
@@ -314,7 +312,7 @@ def multistage_problem(
     -------
     NonlinearSystem
         Its base frequencies are those of `base_frequencies`, its lines those of
-        `femgear.system.series.harmonic_lines` with as many bases, or any combination of their orders.
+        `femgear.system.fourier.harmonic_lines` with as many bases, or any combination of their orders.
 
     Raises
     ------
@@ -378,12 +376,12 @@ def _stage_elements(data: MultistageSet, meshes: dict[int, GearMeshes], forward,
     """The meshes of all stages on their columns, each with its own base frequency."""
     elements = []
     for number, (stage, columns) in enumerate(zip(data.stages, mesh_columns(data)), 1):
-        made = meshes.pop(number, None) or planar_meshes(stage.data)
+        made = meshes.pop(number, None) or mesh_elements(stage.data)
         if not np.array_equal(made.columns[:, 0], np.arange(len(columns))):
             raise CaseError(
                 f"meshes of stage {number} on columns {made.columns[:, 0].tolist()}", code="E-SHAPE",
                 key=f"meshes[{number}]", limit=f"columns 0 to {len(columns) - 1} in order",
-                remedy="make them with planar_meshes of the stage's set",
+                remedy="make them with mesh_elements of the stage's set",
             )  # fmt: skip
         sense = 1 if forward[number - 1] else -1
         own = {name: _on_base(getattr(made, name), number - 1, bases, sense)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import set_deviations
 from femgear.errors import CaseError, ConvergenceError
 from femgear.storage.dataset import RPM
 from femgear.trains.planar.section import PlanarCase
+from femgear.trains.rigid import check_one_period, needed
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -35,8 +34,6 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
     CaseError
         E-BACKLASH: back flanks without play. E-PERIODS: a static record of several mesh periods.
     """
-    from femgear.gears.deviations import common_period
-
     planar = case.planar
     play = min(gears.backlash_sun_planet, gears.backlash_planet_ring)
     # play of a rounding error is none
@@ -50,17 +47,8 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
             remedy="give planar.line_backlash or set.backlash, or write planar.back_flanks = false",
             file=case.location("planar.back_flanks"),
         )
-    if planar.mesh_stiffness is not None:
-        return
-    periods, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
-    if periods > 1:
-        raise CaseError(
-            f"the errors of this set span {periods} mesh periods; the planar model takes one",
-            code="E-PERIODS",
-            key="operation.speeds",
-            limit="errors that repeat with every tooth",
-            remedy="run with --only static, or leave pitch errors and runouts out",
-        )
+    if planar.mesh_stiffness is None:
+        check_one_period(case, gears, "planar")
 
 
 def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -> None:
@@ -113,7 +101,7 @@ def check_branch_damping(case: PlanarCase, model: PlanarModel) -> None:
     CaseError
         E-RESONANCE.
     """
-    wanted = case.planar.branch
+    wanted = needed(case.planar.branch, "planar.branch")
     bare = _undamped(case, model)
     bare = bare[(bare >= wanted.start) & (bare <= wanted.to)]
     if len(bare):

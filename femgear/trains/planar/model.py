@@ -24,19 +24,20 @@ from femgear.solvers.periodic.harmonic_balance import displacements
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.system.assembler import (
+    check_mesh_columns,
     column_groups,
     free_motions,
+    gear_set_system,
     mesh_directions,
+    mesh_elements,
     pin_directions,
-    planar_meshes,
-    planar_system,
 )
 from femgear.system.elements import GearMeshes, RadialBearings
-from femgear.system.lumped import CENTRAL, PlanarSet, PlanarTorque, flank_sign
-from femgear.system.mode_kinds import energy_shares, named_kinds, planar_motions
-from femgear.system.nonlinear import HarmonicForce, NonlinearSystem, element_forces
-from femgear.system.series import FourierSeries, StepSeries, line_tail, series_of
-from femgear.system.system import Modes
+from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, line_tail, series_of
+from femgear.system.mode_kinds import gear_set_kinds
+from femgear.system.rigid_bodies import CENTRAL, PlanarSet, PlanarTorque, flank_sign
+from femgear.system.system import HarmonicForce, Modes, NonlinearSystem, element_forces
+from femgear.system.transmission_errors import tooth_lines
 
 # natural frequencies closer than this, relative to the frequency, count as one
 _SAME = 1e-3
@@ -125,7 +126,7 @@ def planar_problem(
     ----------
     data : PlanarSet
     meshes : GearMeshes, optional
-        From `planar_meshes`; constant stiffnesses without back side when not given.
+        From `mesh_elements`; constant stiffnesses without back side when not given.
     back_flanks : bool
         The back flanks act on their own lines of action, with the stiffness of the drive side, so that teeth
         can wedge; otherwise they act on the line of the drive flanks.
@@ -137,7 +138,7 @@ def planar_problem(
         Radial (outwards) and tangential (counter-clockwise) displacement of the pins [m], from which the
         coordinates of the planets then count. Not to be given again when the static record holds them.
     carrier_speed : float
-        See `planar_system`.
+        See `gear_set_system`.
     damping : float, (n_modes,) array or (n, n) array, optional
         Damping ratio of all modes, or one a mode, at standstill with mean stiffnesses and closed bearings;
         or the matrix ``C``.
@@ -151,22 +152,18 @@ def planar_problem(
     bearings = clearances.bearings if clearances else ()
     pins = np.zeros((data.n_planets, 2)) if pin_errors is None else _pins(data, pin_errors)
     groups = column_groups(data, back_flanks=back_flanks, bearings=bearings)
-    meshes = planar_meshes(data) if meshes is None else meshes
-    if not np.array_equal(meshes.columns[:, 0], groups["meshes"]):
-        raise CaseError(
-            f"meshes on columns {meshes.columns[:, 0].tolist()}", code="E-SHAPE", key="meshes",
-            limit=f"columns 0 to {2 * data.n_planets - 1} in order", remedy="make them with planar_meshes",
-        )  # fmt: skip
+    meshes = mesh_elements(data) if meshes is None else meshes
+    check_mesh_columns(data, meshes)
     elements = _mesh_elements(data, meshes, pins, flank_sign(data, torque), groups)
     elements += _bearing_elements(data, clearances, groups)
     options = {"torque": torque, "back_flanks": back_flanks, "bearings": bearings}
-    still = planar_system(data, **options)
+    still = gear_set_system(data, **options)
     reference = NonlinearSystem(still, elements).reference
     # teeth in the middle of the drive flanks do not touch their back flanks
     reference[groups.get("back flanks", np.arange(0))] = 0.0
     # refuses a load that nothing takes up before a solver drifts away with it
     solve_modes(still, reference)
-    system = planar_system(data, carrier_speed=carrier_speed, **options)
+    system = gear_set_system(data, carrier_speed=carrier_speed, **options)
     steady, forces = _weight(data, gravity)
     load = system.load + steady + _pin_inertia(data, pins, carrier_speed)
     system = replace(system, load=load, C=viscous_damping(still, reference, damping))
@@ -196,21 +193,17 @@ def phased_series(sun_planet, planet_ring, phases, *, mean, orders: tuple[int, .
         Multiples of the base frequencies that make the mesh frequency.
     """
     phases, mean = np.asarray(phases, float), np.asarray(mean, float)
-    waves = [np.atleast_1d(np.asarray(wave, complex)) for wave in (sun_planet, planet_ring)]
     if phases.ndim != 1 or len(phases) % 2 or phases.shape != mean.shape:
         raise CaseError(
             f"{phases.size} phases and {mean.size} mean stiffnesses", code="E-SHAPE", limit="2N of each"
         )
-    count = max(len(wave) for wave in waves)
-    table = np.array([np.pad(wave, (0, count - len(wave))) for wave in waves])
-    shift = np.exp(2j * np.pi * phases[:, None] * np.arange(1, count + 1))
-    lines = np.repeat(table, len(phases) // 2, axis=0) * shift
+    lines = tooth_lines(sun_planet, planet_ring, phases)
     return FourierSeries(mean[:, None] * np.column_stack([np.ones(len(phases)), lines]), orders)
 
 
 def _mesh_elements(data: PlanarSet, meshes: GearMeshes, pins, flank: int, groups) -> tuple[GearMeshes, ...]:
     """The meshes with the approach by the pins, and the back flanks on their own lines."""
-    drive = replace(meshes, deflection=_raised(meshes.deflection, -pin_deflections(data, pins, flank=flank)))
+    drive = replace(meshes, deflection=_raised(meshes.state[0], -pin_deflections(data, pins, flank=flank)))
     if "back flanks" not in groups:
         return (drive,)
     if not np.all(np.isfinite(meshes.backlash)) or not meshes.separates:
@@ -218,17 +211,19 @@ def _mesh_elements(data: PlanarSet, meshes: GearMeshes, pins, flank: int, groups
             "back flanks need the backlash of every mesh, and meshes that separate", code="E-BACKLASH",
             key="backlash", remedy="give a finite backlash, or leave the back flanks out",
         )  # fmt: skip
-    start = _raised(_negative(_unloaded(meshes)), meshes.backlash - pin_deflections(data, pins, flank=-flank))
+    behind = meshes.backlash - pin_deflections(data, pins, flank=-flank)
+    start = _raised(_unloaded(meshes), behind, sign=-1.0)
     back = replace(meshes, columns=groups["back flanks"], deflection=start, force=None, backlash=np.inf)
     return replace(drive, backlash=np.inf), back
 
 
-def _unloaded(meshes: GearMeshes) -> FourierSeries | StepSeries:
+def _unloaded(meshes: GearMeshes) -> Series:
     """Deflection at which the mesh line carries nothing, ``deflection - force / k``."""
-    series = (meshes.stiffness, meshes.deflection, meshes.force)
-    if isinstance(meshes.force, FourierSeries) and not np.any(meshes.force.amplitudes):
-        return meshes.deflection
-    if any(isinstance(one, StepSeries) for one in series):
+    deflection, force = meshes.state
+    if isinstance(force, FourierSeries) and not np.any(force.amplitudes):
+        return deflection
+    series = [one for one in (meshes.stiffness, deflection, force) if isinstance(one, FourierSeries)]
+    if len(series) < 3:
         raise CaseError(
             "back flanks cannot follow a stepwise record that holds mesh forces", code="E-BACKLASH",
             remedy="give Fourier series, or the unloaded deflection with no force",
@@ -237,43 +232,35 @@ def _unloaded(meshes: GearMeshes) -> FourierSeries | StepSeries:
     count = max(one.amplitudes.shape[1] for one in series)
     phase = 2.0 * np.pi * np.arange(16 * count)[:, None] / (16 * count)
     k, deflection, force = (replace(one, orders=(1,)).at(phase) for one in series)
-    return series_of((deflection - force / k).T, 4 * count, orders=meshes.stiffness.orders)
+    return series_of((deflection - force / k).T, 4 * count, orders=series[0].orders)
 
 
-def _negative(series):
+def _raised(series: Series, offset, *, sign: float = 1.0) -> Series:
+    """The series times a sign, with a constant (2N,) added."""
     if isinstance(series, StepSeries):
-        return replace(series, values=-series.values)
-    return replace(series, amplitudes=-series.amplitudes)
-
-
-def _raised(series, offset):
-    """The series with a constant (2N,) added."""
-    if isinstance(series, StepSeries):
-        return replace(series, values=series.values + offset[:, None])
-    amplitudes = series.amplitudes.copy()
+        return replace(series, values=sign * series.values + offset[:, None])
+    if isinstance(series, SummedSeries):
+        offsets = [offset] + [np.zeros_like(offset)] * (len(series.parts) - 1)
+        parts = (_raised(one, part, sign=sign) for one, part in zip(series.parts, offsets))
+        return SummedSeries(tuple(one for one in parts if isinstance(one, FourierSeries)))
+    amplitudes = sign * series.amplitudes
     amplitudes[:, 0] += offset
     return replace(series, amplitudes=amplitudes)
 
 
 def _bearing_elements(data: PlanarSet, clearances: Clearances | None, groups) -> tuple[RadialBearings, ...]:
     elements = []
-    for name in clearances.bearings if clearances else ():
+    if clearances is None:
+        return ()
+    for name in clearances.bearings:
         stiffness = data.planet_bearing if name == "planets" else getattr(data, name).support
         if np.any(np.asarray(stiffness) == 0.0):
             raise CaseError(
                 f"the bearing of the {name} has a clearance but no stiffness", code="E-BEARING",
                 remedy="give it a support stiffness, or leave the clearance out",
             )  # fmt: skip
-        clearance = getattr(clearances, name)
-        elements.append(
-            RadialBearings(
-                groups[name],
-                stiffness,
-                clearance,
-                springs=clearances.springs,
-                smoothing=clearances.smoothing,
-            )
-        )
+        options = {"springs": clearances.springs, "smoothing": clearances.smoothing}
+        elements.append(RadialBearings(groups[name], stiffness, getattr(clearances, name), **options))
     return tuple(elements)
 
 
@@ -294,7 +281,7 @@ def _weight(data: PlanarSet, gravity: Gravity | None) -> tuple[np.ndarray, tuple
     force[:, 1] = -1j * force[:, 0]
     reduced = T.T @ force.ravel()
     if gravity.orders is None:
-        return reduced.real, ()
+        return np.real(reduced), ()
     return np.zeros(T.shape[1]), (HarmonicForce(reduced.conj(), gravity.orders),)
 
 
@@ -445,44 +432,11 @@ def planar_modes(data: PlanarSet, *, mesh_stiffness=None, damping_ratio: float =
     Returns
     -------
     Modes
-        ``kind`` from `planar_kinds`.
+        ``kind`` from `gear_set_kinds`.
     """
     stiffness = data.mesh_stiffness if mesh_stiffness is None else mesh_stiffness
-    modes = solve_modes(planar_system(data), stiffness, damping_ratio=damping_ratio)
-    return replace(modes, kind=planar_kinds(data, modes.shape, frequency=modes.frequency))
-
-
-def planar_kinds(data: PlanarSet, shape, *, frequency) -> tuple[str, ...]:
-    """Kind of every mode from its shape.
-
-    Parameters
-    ----------
-    data : PlanarSet
-    shape : (n, m) array
-        In the coordinates of `planar_system`.
-    frequency : (m,) array
-        Zero for rigid-body modes.
-
-    Returns
-    -------
-    tuple of str
-        ``rigid``; ``rotational``, ``translational`` or ``planet`` where at least 99 % of the kinetic energy
-        belongs to that class; else ``mixed``, as for most modes of unequally spaced planets.
-
-    Raises
-    ------
-    CaseError
-        Shapes of another system (E-SHAPE).
-    """
-    return named_kinds(class_shares(data, shape), frequency)
-
-
-def class_shares(data: PlanarSet, shape) -> np.ndarray:
-    """Shares (3, m) of rotational, translational and planet motion in the kinetic energy.
-
-    See `femgear.system.mode_kinds.class_energies`, also for unequal spacing.
-    """
-    return energy_shares(planar_motions(data, shape))
+    modes = solve_modes(gear_set_system(data), stiffness, damping_ratio=damping_ratio)
+    return replace(modes, kind=gear_set_kinds(data, modes.shape, frequency=modes.frequency))
 
 
 @dataclass(frozen=True, eq=False)
@@ -549,7 +503,7 @@ class MotionLines:
         Largest deflection of a mesh [m].
     force_tail : float
         Share of the fluctuating force in the upper half of the lines, of the kind of mesh, sun-planet or
-        planet-ring with both flanks, that has more of it; see `femgear.system.series.line_tail`.
+        planet-ring with both flanks, that has more of it; see `femgear.system.fourier.line_tail`.
     """
 
     member: np.ndarray
@@ -606,7 +560,7 @@ def weight_curve(
 
 
 def judged_branch(
-    problem: NonlinearSystem, branch: Branch, *, progress: Callable[[int, int], None] | None = None
+    problem: NonlinearSystem, branch: Branch, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Branch:
     """A branch with Floquet verdicts: coarse first, fine where that is open or near the unit circle.
 
@@ -628,8 +582,7 @@ def judged_branch(
         for i, verdict in zip(close, fine):
             verdicts[i] = verdict
         found += verdicts
-        if progress is not None:
-            progress(len(found), len(solutions))
+        progress(len(found), len(solutions))
     judged = tuple(replace(solution, verdict=verdict) for solution, verdict in zip(solutions, found))
     return replace(branch, solutions=judged, stability=True)
 
@@ -655,7 +608,7 @@ def motion_lines(model: PlanarModel, solution: PeriodicSolution) -> MotionLines:
     if model.planet_clearance:
         pin_force = -solution.force[groups["planets"]]
     else:
-        pin_force = -data.planet_bearing[:, None, None] * x[6:].reshape(N, 2, -1)
+        pin_force = -data.pin_stiffness[..., None] * x[6:].reshape(N, 2, -1)
     back = np.zeros((2 * N, x.shape[1]), complex)
     if model.back_flanks:
         back = solution.force[groups["back flanks"]]
@@ -664,8 +617,8 @@ def motion_lines(model: PlanarModel, solution: PeriodicSolution) -> MotionLines:
         bearing = -solution.force[groups["carrier bearing"][0]]
     member, mesh = x[:6].reshape(3, 2, -1), solution.force[groups["meshes"]]
     wave = np.exp(1j * (_phases(solution.orders) @ solution.orders.T))
-    path = (member @ wave.T).real
-    deflection = (wave @ solution.deflection[groups["meshes"]].T).real
+    path = np.real(member @ wave.T)
+    deflection = np.real(wave @ solution.deflection[groups["meshes"]].T)
     kinds = (np.vstack([mesh[part], back[part]]) for part in (slice(0, N), slice(N, 2 * N)))
     return MotionLines(
         member,
@@ -693,7 +646,7 @@ def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple
     theta : (n, n_bases) array
         Phases of the base frequencies [rad].
     """
-    x = (np.exp(1j * (theta @ solution.orders.T)) @ solution.deflection.T).real
+    x = np.real(np.exp(1j * (theta @ solution.orders.T)) @ solution.deflection.T)
     force, groups = element_forces(model.problem, x, theta)[0], model.groups
     drive = force[:, groups["meshes"]]
     return drive, force[:, groups["back flanks"]] if model.back_flanks else np.zeros_like(drive)
@@ -740,7 +693,7 @@ def column_contact(problem: NonlinearSystem, solution: PeriodicSolution) -> np.n
     A smoothed contact counts as closed beyond half its force scale, the force at the corner itself.
     """
     theta = _phases(solution.orders)
-    x = (np.exp(1j * (theta @ solution.orders.T)) @ solution.deflection.T).real
+    x = np.real(np.exp(1j * (theta @ solution.orders.T)) @ solution.deflection.T)
     force = element_forces(problem, x, theta)[0]
     out = np.full((2, x.shape[1]), np.nan)
     for element in problem.elements:

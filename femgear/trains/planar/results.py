@@ -16,7 +16,8 @@ import numpy as np
 
 from femgear.case.sections import output_member
 from femgear.report.tables import Block
-from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset, in_space
+from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset
+from femgear.trains.rigid import modes_entries, stiffness_text, torsion_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from femgear.solvers.continuation.branches import Branch
     from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
     from femgear.storage.results import Results
-    from femgear.system.lumped import PlanarSet
+    from femgear.system.rigid_bodies import PlanarSet
     from femgear.system.system import Modes
     from femgear.trains.planar.model import MotionLines, PlanarModel
     from femgear.trains.planar.section import PlanarCase
@@ -48,6 +49,15 @@ _STABLE = {1: "yes", 0: "no", -1: "not known"}
 
 _BODIES = ("", "mass [kg]", "inertia [kg m^2]", "support [N/m]", "torsional support [N m/rad]")
 
+# what is known of a solution at every speed
+_OF_SOLUTIONS = {
+    "converged": "whether the solution satisfies its tolerance",
+    "iterations": "iterations of Newton's method",
+    "residual": "relative residual of the harmonic equations",
+    "tail": "share of the amplitude in the upper half of the lines",
+    "spectral_radius": "spectral radius of the fixed point",
+}
+
 # pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces
 _BY_STABILITY = ("weight_response", "tooth_contact")
 _OF_RESPONSE = (
@@ -67,9 +77,27 @@ class PlanarModesResult:
     modes: Modes
 
     def dataset(self) -> xr.Dataset:
-        """Contents of modes.nc."""
+        """Contents of modes.nc of a planar case: axes and rotations of all bodies, no elastic ring."""
+        from femgear.system.assembler import free_motions
 
-        return planar_modes_dataset(self)
+        modes, gears = self.modes, self.planetary_set
+        n, axes = 2 * gears.n_planets, ("x", "y", "rotation")
+        variables, coords = modes_entries(self.data, modes, free_motions(self.data), axes)
+        variables |= {
+            "mesh_stiffness": (("mesh",), modes.mesh_stiffness[:n], "N/m", "mean mesh stiffness"),
+            "mesh_deflection": (
+                ("mesh", "mode"), modes.mesh_deflection[:n], "kg^-1/2", "mesh deflection of the mode",
+            ),
+        }  # fmt: skip
+        return dataset(
+            variables,
+            coords=coords | {"mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh")},
+            attrs={
+                "title": "modes of the planar set at standstill, bearings closed, back flanks open",
+                "unknowns": len(modes.shape),
+                "planet_angles": np.asarray(gears.planet_angles),
+            },
+        )
 
 
 @dataclass(frozen=True)
@@ -85,8 +113,43 @@ class BranchResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of branch.nc."""
-
-        return branch_dataset(self)
+        branch, point = self.branch, ("point",)
+        hertz = branch.parameter / (2.0 * np.pi)
+        known = len(branch.verdicts) > 0
+        folds, crossings = np.zeros((2, len(hertz)), bool)
+        folds[branch.folds], crossings[branch.branch_points] = True, True
+        carrier = self.sense * branch.parameter
+        stable = np.array([_state(one) for one in branch.verdicts] if known else [-1] * len(hertz))
+        variables = {
+            "weight_frequency": (point, hertz, "Hz", "frequency of the weight in the carrier frame"),
+            "carrier_speed": (point, carrier, "rad/s", "speed of the carrier, counter-clockwise positive"),
+            "fold": (point, folds, "1", "whether the point is a limit point"),
+            "branch_point": (point, crossings, "1", "whether another branch crosses"),
+            "tail": (point, branch.tail, "1", "share of the amplitude in the upper half of the harmonics"),
+            "spectral_radius": (point, branch.spectral_radius, "1", "spectral radius of the fixed point"),
+            "residual": (point, branch.residual, "1", "relative residual of the harmonic equations"),
+            "converged": (point, branch.converged, "1", "whether the solution satisfies its tolerance"),
+        }  # fmt: skip
+        variables |= _stability(branch, stable) | _flank_forces(self, stable)
+        variables |= _motions(self.lines, "point", "harmonic")
+        coords = _coordinates(self.planetary_set) | {
+            "point": (point, np.arange(len(hertz)), "1", "point along the branch"),
+            "harmonic": (("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
+            "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
+        }
+        data = dataset(
+            variables,
+            coords=coords,
+            attrs={
+                "title": "periodic responses to the weight",
+                "message": self.ending,
+                "complete": int(branch.complete),
+                "stability": "Floquet multipliers" if known else "not computed",
+                "fourier_convention": FOURIER,
+            },
+        )
+        data["stable"].attrs |= {"flag_values": [1, 0, -1], "flag_meanings": "stable not_stable not_known"}
+        return data
 
 
 @dataclass(frozen=True)
@@ -101,82 +164,40 @@ class PlanarResponseResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of response.nc."""
-
-        return response_dataset(self)
-
-
-def planar_modes_dataset(result: PlanarModesResult) -> xr.Dataset:
-    """Contents of modes.nc of a planar case: axes and rotations of all bodies, no elastic ring."""
-    from femgear.system.assembler import free_motions
-
-    modes, gears = result.modes, result.planetary_set
-    shape, dofs = in_space(result.data, free_motions(result.data) @ modes.shape, ("x", "y", "rotation"))
-    n = 2 * gears.n_planets
-    variables = {
-        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
-        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
-        "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
-        "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
-        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
-        "mesh_stiffness": (("mesh",), modes.mesh_stiffness[:n], "N/m", "mean mesh stiffness"),
-        "mesh_deflection": (
-            ("mesh", "mode"), modes.mesh_deflection[:n], "kg^-1/2", "mesh deflection of the mode",
-        ),
-    }  # fmt: skip
-    return dataset(
-        variables,
-        coords={
-            "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-            "dof": (("dof",), dofs, "1", "degree of freedom"),
-            "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
-        },
-        attrs={
-            "title": "modes of the planar set at standstill, bearings closed, back flanks open",
-            "unknowns": len(modes.shape),
-            "planet_angles": np.asarray(gears.planet_angles),
-        },
-    )
-
-
-def branch_dataset(result: BranchResult) -> xr.Dataset:
-    """Contents of branch.nc."""
-    branch, point = result.branch, ("point",)
-    hertz = branch.parameter / (2.0 * np.pi)
-    known = len(branch.verdicts) > 0
-    folds, crossings = np.zeros((2, len(hertz)), bool)
-    folds[branch.folds], crossings[branch.branch_points] = True, True
-    carrier = result.sense * branch.parameter
-    stable = np.array([_state(one) for one in branch.verdicts] if known else [-1] * len(hertz))
-    variables = {
-        "weight_frequency": (point, hertz, "Hz", "frequency of the weight in the carrier frame"),
-        "carrier_speed": (point, carrier, "rad/s", "speed of the carrier, counter-clockwise positive"),
-        "fold": (point, folds, "1", "whether the point is a limit point"),
-        "branch_point": (point, crossings, "1", "whether another branch crosses"),
-        "tail": (point, branch.tail, "1", "share of the amplitude in the upper half of the harmonics"),
-        "spectral_radius": (point, branch.spectral_radius, "1", "spectral radius of the fixed point"),
-        "residual": (point, branch.residual, "1", "relative residual of the harmonic equations"),
-        "converged": (point, branch.converged, "1", "whether the solution satisfies its tolerance"),
-    }  # fmt: skip
-    variables |= _stability(branch, stable) | _flank_forces(result, stable)
-    variables |= _motions(result.lines, "point", "harmonic")
-    coords = _coordinates(result.planetary_set) | {
-        "point": (point, np.arange(len(hertz)), "1", "point along the branch"),
-        "harmonic": (("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
-        "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
-    }
-    data = dataset(
-        variables,
-        coords=coords,
-        attrs={
-            "title": "periodic responses to the weight",
-            "message": result.ending,
-            "complete": int(branch.complete),
-            "stability": "Floquet multipliers" if known else "not computed",
-            "fourier_convention": FOURIER,
-        },
-    )
-    data["stable"].attrs |= {"flag_values": [1, 0, -1], "flag_meanings": "stable not_stable not_known"}
-    return data
+        found, speed = self.solutions, ("speed",)
+        mesh = [one.mesh_frequency for one in self.speeds]
+        variables = {
+            "carrier_speed": (
+                speed, [one.carrier for one in self.speeds], "rad/s",
+                "speed of the carrier, counter-clockwise positive",
+            ),
+            "mesh_frequency": (speed, mesh, "Hz", "mesh frequency"),
+            "frequency": (
+                ("speed", "line"), [one.line_frequency / (2 * np.pi) for one in found], "Hz",
+                "frequency of the line in the carrier frame",
+            ),
+        }  # fmt: skip
+        variables |= {
+            name: (speed, [getattr(one, name) for one in found], "1", text)
+            for name, text in _OF_SOLUTIONS.items()
+        }
+        variables |= _motions(self.lines, "speed", "line")
+        orders, line = found[0].orders, ("line",)
+        coords = _coordinates(self.planetary_set) | {
+            "speed": (speed, self.input_speed / RPM, "rpm", "speed of the input"),
+            "carrier_order": (line, orders[:, 0], "1", "multiple of the carrier's frequency"),
+            "mesh_order": (line, orders[:, 1], "1", "multiple of the mesh frequency"),
+        }
+        return dataset(
+            variables,
+            coords=coords,
+            attrs={
+                "title": "responses to weight and mesh frequency together",
+                "message": " ".join(dict.fromkeys(one.message for one in found)),
+                "mesh_lines": int(np.any(orders[:, 1] != 0)),
+                "fourier_convention": FOURIER,
+            },
+        )
 
 
 def _stability(branch: Branch, stable: np.ndarray) -> dict[str, tuple]:
@@ -230,53 +251,6 @@ def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
 def _nearest(verdict: FloquetVerdict) -> float:
     return (
         float(np.abs(verdict.multipliers - 1.0).min(initial=np.inf)) if len(verdict.multipliers) else np.nan
-    )
-
-
-def response_dataset(result: PlanarResponseResult) -> xr.Dataset:
-    """Contents of response.nc."""
-    found, speed = result.solutions, ("speed",)
-    mesh = [one.mesh_frequency for one in result.speeds]
-    variables = {
-        "carrier_speed": (
-            speed, [one.carrier for one in result.speeds], "rad/s",
-            "speed of the carrier, counter-clockwise positive",
-        ),
-        "mesh_frequency": (speed, mesh, "Hz", "mesh frequency"),
-        "frequency": (
-            ("speed", "line"), [one.line_frequency / (2 * np.pi) for one in found], "Hz",
-            "frequency of the line in the carrier frame",
-        ),
-        "converged": (
-            speed, [one.converged for one in found], "1", "whether the solution satisfies its tolerance",
-        ),
-        "iterations": (speed, [one.iterations for one in found], "1", "iterations of Newton's method"),
-        "residual": (
-            speed, [one.residual for one in found], "1", "relative residual of the harmonic equations",
-        ),
-        "tail": (
-            speed, [one.tail for one in found], "1", "share of the amplitude in the upper half of the lines",
-        ),
-        "spectral_radius": (
-            speed, [one.spectral_radius for one in found], "1", "spectral radius of the fixed point",
-        ),
-    }  # fmt: skip
-    variables |= _motions(result.lines, "speed", "line")
-    orders, line = found[0].orders, ("line",)
-    coords = _coordinates(result.planetary_set) | {
-        "speed": (speed, result.input_speed / RPM, "rpm", "speed of the input"),
-        "carrier_order": (line, orders[:, 0], "1", "multiple of the carrier's frequency"),
-        "mesh_order": (line, orders[:, 1], "1", "multiple of the mesh frequency"),
-    }
-    return dataset(
-        variables,
-        coords=coords,
-        attrs={
-            "title": "responses to weight and mesh frequency together",
-            "message": " ".join(dict.fromkeys(one.message for one in found)),
-            "mesh_lines": int(np.any(orders[:, 1] != 0)),
-            "fourier_convention": FOURIER,
-        },
     )
 
 
@@ -346,9 +320,7 @@ def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
 def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
     planar = case.planar
     for name, one in (("sun", case.sun), ("ring", planar.ring), ("carrier", case.carrier)):
-        given = getattr(planar.torsion, name)
-        held = "held" if name == case.operation.fixed else "0"
-        torsion = held if given is None else f"{given:.6g}"
+        torsion = torsion_text(case, name, getattr(planar.torsion, name))
         yield name, f"{one.mass:.6g}", f"{one.inertia:.6g}", f"{one.support_stiffness:.6g}", torsion
     planet = case.planet
     bearing = f"{planet.bearing_stiffness:.6g} (bearing)"
@@ -357,10 +329,7 @@ def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
 
 def _stiffness(case: PlanarCase) -> str:
     given = case.planar.mesh_stiffness
-    if given is None:
-        return "mesh stiffness: of the static solution"
-    values = f"sun-planet {given.sun_planet:.6g}, planet-ring {given.planet_ring:.6g} N/m"
-    return f"mesh stiffness: {values}, as given"
+    return f"mesh stiffness: {'of the static solution' if given is None else stiffness_text(given)}"
 
 
 def _play(case: PlanarCase, planetary: PlanetarySet) -> str:
@@ -570,19 +539,18 @@ def _kind_of_lines(data: xr.Dataset) -> str:
 
 def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
     """Natural frequencies that the case calls published, beside the nearest mode of the kind."""
-    planar = case.planar
-    entries = [one for one in planar.published if one.frequency is not None] if planar else []
+    entries = [(one, one.frequency) for one in case.planar.published if one.frequency is not None]
     if not entries:
         return None
     kinds, found = np.array([str(kind) for kind in data["kind"].values]), data["frequency"].values
     rows = []
-    for one in entries:
+    for one, hertz in entries:
         same = found[kinds == one.kind]
-        near = same[np.argmin(np.abs(same - one.frequency))] if len(same) else np.nan
-        difference = f"{100 * (near / one.frequency - 1):+.2f}" if len(same) else "-"
-        rows.append(
-            (one.kind, f"{one.frequency:.6g}", f"{near:.6g}" if len(same) else "none", difference, one.source)
-        )
+        near, difference = "none", "-"
+        if len(same):
+            nearest = same[np.argmin(np.abs(same - hertz))]
+            near, difference = f"{nearest:.6g}", f"{100 * (nearest / hertz - 1):+.2f}"
+        rows.append((one.kind, f"{hertz:.6g}", near, difference, one.source))
     header = ("kind", "published [Hz]", "nearest here [Hz]", "difference [%]", "source")
     return Block("Published natural frequencies", header, tuple(rows))
 

@@ -8,18 +8,23 @@ from typing import Annotated, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     StrictBool,
     model_validator,
 )
 
-from femgear.case.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
 from femgear.case.units import ACCELERATION, ANGLE, FREQUENCY, INERTIA, LENGTH, MASS, STIFFNESS, TORSION
 from femgear.errors import CaseError
+from femgear.trains.rigid import (
+    entries_without_effect,
+    flank_entries,
+    listed,
+    rigid_refusals,
+    unheld_member,
+)
 
 SMOOTHING = 0.3e-6
 """Length over which tooth contact sets in [m], of the examples of NREL/CP-5000-55355."""
@@ -62,11 +67,7 @@ def _some(values: tuple) -> tuple:
     return values
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class PlanarRingSection(_Section):
+class PlanarRingSection(Section):
     """The ring as a rigid body on its support in the housing."""
 
     mass: Quantity(MASS, 1e-6, 1e6)
@@ -74,7 +75,7 @@ class PlanarRingSection(_Section):
     support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
 
 
-class TorsionSection(_Section):
+class TorsionSection(Section):
     """Torsional supports of the members; the fixed member is held where it has none."""
 
     sun: Torsion | None = None
@@ -82,7 +83,7 @@ class TorsionSection(_Section):
     carrier: Torsion | None = None
 
 
-class CarrierBearingSection(_Section):
+class CarrierBearingSection(Section):
     """A bearing of the carrier beside its support."""
 
     stiffness: Quantity(STIFFNESS, 1.0, 1e15)
@@ -90,14 +91,14 @@ class CarrierBearingSection(_Section):
     on: Literal["ring", "housing"] = "housing"
 
 
-class GravitySection(_Section):
+class GravitySection(Section):
     """Weight of all bodies; its direction counts from the x axis when the carrier's phase is zero."""
 
     acceleration: Quantity(ACCELERATION, 1e-3, 1e3) = 9.80665
     direction: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = -0.5 * math.pi
 
 
-class BranchSection(_Section):
+class BranchSection(Section):
     """Periodic responses to the weight, followed over its frequency in the carrier frame."""
 
     start: Frequency = Field(alias="from")
@@ -107,14 +108,14 @@ class BranchSection(_Section):
     points: Count(10, 5000) = 600
 
 
-class ResponseSection(_Section):
+class ResponseSection(Section):
     """Responses to weight and mesh frequency together at the speeds of the operation."""
 
     carrier_harmonics: Count(1, 500) = 3
     side_bands: Count(0, 100) = 3
 
 
-class PlanarPublished(_Section):
+class PlanarPublished(Section):
     """What somebody published: a natural frequency, or a figure and how ours compares with it."""
 
     kind: Literal["rotational", "translational", "planet"] | None = None
@@ -137,7 +138,7 @@ class PlanarPublished(_Section):
         return self
 
 
-class PlanarSection(_Section):
+class PlanarSection(Section):
     """Rigid bodies that move in their plane: sun, ring, carrier and planets.
 
     With this section a run solves the lumped set of Lin and Parker in place of the elastic ring.
@@ -168,17 +169,14 @@ def planar_notices(data: dict) -> Iterator[str]:
         Tables of a case file that was checked, with a section planar.
     """
     planar = data["planar"]
-    unused = [name for name in ("motor", "brake", "housing") if name in data]
     keys = ["tolerance"]
     if "response" not in planar:
         keys += ["mesh_harmonics", "response_harmonics"]
-    unused += [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
-    foundations = ("foundation_radial", "foundation_tangential")
-    unused += [f"ring.{key}" for key in foundations if key in data["ring"]]
-    if unused:
-        yield f"{_listed(unused)} no effect in this planar case"
+    dynamics = [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
+    if unused := entries_without_effect(data, dynamics):
+        yield f"{listed(unused)} no effect in this planar case"
     if "mesh_stiffness" in planar and (unused := _without_static(data)):
-        yield f"{_listed(unused)} no effect while planar.mesh_stiffness is given"
+        yield f"{listed(unused)} no effect while planar.mesh_stiffness is given"
     if "response" in planar and "mesh_stiffness" in planar:
         still = "no weight acts" if "gravity" not in planar else ""
         if data["operation"].get("fixed", "ring") == "carrier":
@@ -192,10 +190,6 @@ def planar_notices(data: dict) -> Iterator[str]:
         yield "planet.bearing_clearance has no effect without planar.branch or planar.response"
 
 
-def _listed(names: list[str]) -> str:
-    return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
-
-
 def _without_static(data: dict) -> list[str]:
     """Entries that act on the static solution alone, which a given mesh stiffness replaces."""
     unused = ["static"] if "static" in data else []
@@ -205,10 +199,7 @@ def _without_static(data: dict) -> list[str]:
         unused += ["planar.response.side_bands"] if "side_bands" in data["planar"]["response"] else []
     if data["planar"].get("line_backlash") is not None and "backlash" in data["set"]:
         unused.append("set.backlash")
-    for name in ("sun", "planet", "ring", "carrier"):
-        keys = ("modifications", "errors", "individual")
-        unused += [f"{name}.{key}" for key in keys if data.get(name, {}).get(key)]
-    return unused
+    return unused + flank_entries(data)
 
 
 class PlanarCase(RigidCase):
@@ -220,22 +211,7 @@ class PlanarCase(RigidCase):
 def check_planar(case: PlanarCase) -> Iterator[CaseError]:
     """Refusals of what a planar section does not go with."""
     planar = case.planar
-    if case.static.members == "elastic":
-        yield CaseError(
-            "the supports belong to the planar model: the static solution is that of the gears alone",
-            code="E-CHOICE",
-            key="static.members",
-            value="elastic",
-            limit='"fixed" in a planar case',
-            remedy="leave static.members out",
-        )
-    if case.operation.torque == 0.0:
-        yield CaseError(
-            "without torque no tooth carries load: the planar set would rattle in its play",
-            code="E-NO-LOAD",
-            key="operation.torque",
-            limit="not zero in a planar case",
-        )
+    yield from rigid_refusals(case, "planar", without_torque=": the planar set would rattle in its play")
     if planar.back_flanks and planar.line_backlash == 0.0:
         yield CaseError(
             "back flanks need play",
@@ -254,13 +230,8 @@ def _check_torsion(case: PlanarCase) -> Iterator[CaseError]:
     planar, operation = case.planar, case.operation
     output = output_member(case)
     if getattr(planar.torsion, operation.fixed) == 0.0:
-        yield CaseError(
-            f"the {operation.fixed} is the fixed member but nothing keeps it from turning",
-            code="E-MECHANISM",
-            key=f"planar.torsion.{operation.fixed}",
-            value="0 N m/rad",
-            limit="above 0 N m/rad",
-            remedy="leave it out: the fixed member is then held",
+        yield unheld_member(
+            case, f"planar.torsion.{operation.fixed}", "leave it out: the fixed member is then held"
         )
     if planar.reaction == "supports" and not getattr(planar.torsion, output):
         yield CaseError(

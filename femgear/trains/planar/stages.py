@@ -13,7 +13,6 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
-from femgear.case.sections import output_member
 from femgear.report.tables import describe_modes
 from femgear.threads import one_blas_thread
 from femgear.trains.planar.checks import (
@@ -38,6 +37,15 @@ from femgear.trains.planar.results import (
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
 from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.rigid import (
+    driving_torque,
+    member_speeds,
+    mesh_stiffnesses,
+    modes_verdict,
+    needed,
+    rotation_sense,
+    torsional_support,
+)
 from femgear.trains.static.description import describe_case, set_warnings
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import STATIC, STRESS
@@ -47,10 +55,8 @@ if TYPE_CHECKING:
     from femgear.report.tables import Block
     from femgear.storage.results import Results
     from femgear.system.elements import GearMeshes
-    from femgear.system.lumped import PlanarSet
+    from femgear.system.rigid_bodies import PlanarSet
     from femgear.trains.planar.model import PlanarModel
-
-BODIES = ("carrier", "ring", "sun")
 
 
 @one_blas_thread()
@@ -70,7 +76,8 @@ def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> 
         What `check_planar_case` refuses, a load that accelerates the set.
     """
     from femgear.solvers.linear.modal import solve_modes
-    from femgear.trains.planar.model import mode_ratios, planar_kinds
+    from femgear.system.mode_kinds import gear_set_kinds
+    from femgear.trains.planar.model import mode_ratios
 
     gears = planetary_set(case)
     check_planar_case(case, gears)
@@ -78,7 +85,7 @@ def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> 
     bare = replace(model.problem.system, C=np.zeros_like(model.problem.system.C))
     modes = solve_modes(bare, model.springs)
     ratios = np.where(modes.frequency > 0.0, mode_ratios(modes.frequency, _ratios(case)), 0.0)
-    kinds = planar_kinds(model.data, modes.shape, frequency=modes.frequency)
+    kinds = gear_set_kinds(model.data, modes.shape, frequency=modes.frequency)
     return PlanarModesResult(gears, model.data, replace(modes, kind=kinds, damping_ratio=ratios))
 
 
@@ -100,7 +107,7 @@ def solve_branch(
     """
     from femgear.trains.planar.model import judged_branch, motion_lines, weight_curve
 
-    gears, wanted = planetary_set(case), case.planar.branch
+    gears, wanted = planetary_set(case), needed(case.planar.branch, "planar.branch")
     check_planar_case(case, gears)
     model = planar_model(case, gears, static)
     check_smoothing(case, gears, model)
@@ -115,12 +122,10 @@ def solve_branch(
     )
     branch, lines = bounded_branch(branch, (motion_lines(model, one) for one in branch.solutions), gears)
     if wanted.stability:
-        steps = (
-            None
-            if progress is None
-            else lambda done, total: progress("branch", 0.3 * total + 0.7 * done, total)
+        tell = progress or (lambda stage, done, total: None)
+        branch = judged_branch(
+            model.problem, branch, lambda done, total: tell("branch", 0.3 * total + 0.7 * done, total)
         )
-        branch = judged_branch(model.problem, branch, progress=steps)
     ending = end_of_branch(branch, wanted)
     return BranchResult(gears, model, branch, lines, carrier_sense(case, gears), ending)
 
@@ -138,16 +143,13 @@ def solve_planar_response(
     ConvergenceError
         Speeds without a solution, or with one that moves too far (E-MOTION).
     """
-    from femgear.gears.kinematics import speeds
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
     from femgear.trains.planar.model import motion_lines
 
     gears = planetary_set(case)
     check_planar_case(case, gears)
     operation, orders = case.operation, _response_lines(case, gears, static)
-    turning = tuple(
-        speeds(gears, input=operation.input, fixed=operation.fixed, speed=speed) for speed in operation.speeds
-    )
+    turning = tuple(member_speeds(case, gears, speed) for speed in operation.speeds)
     solutions, lines, model = [], [], None
     for number, speed in enumerate(turning):
         if model is None or case.planar.gyroscopic:
@@ -180,28 +182,20 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
     static : StaticResult, optional
         Its mean stiffnesses are taken where the case gives none.
     """
-    from femgear.system.lumped import PlanarBody, planar_from_set
+    from femgear.system.rigid_bodies import PlanarBody, planar_from_set
 
-    planar, N = case.planar, gears.n_planets
-    held = {name: getattr(planar.torsion, name) for name in BODIES}
-    # the fixed member is held where it has no torsional support, the others are free
-    torsion = {
-        name: (np.inf if name == case.operation.fixed else 0.0) if value is None else value
-        for name, value in held.items()
-    }
-    sections = {"carrier": case.carrier, "ring": planar.ring, "sun": case.sun}
-    bodies = {
-        name: PlanarBody(one.mass, one.inertia, one.support_stiffness, torsion[name])
-        for name, one in sections.items()
-    }
+    planar, bodies = case.planar, {}
+    for name, one in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
+        torsional = torsional_support(case, name, getattr(planar.torsion, name))
+        support = needed(one.support_stiffness, f"{name}.support_stiffness")
+        bodies[name] = PlanarBody(one.mass, one.inertia, support, torsional)
     given = planar.mesh_stiffness
-    mean = static.cycle.stiffness.mean(axis=1) if given is None else None
+    mean = needed(static, "static").cycle.stiffness.mean(axis=1) if given is None else None
     return planar_from_set(
         gears,
         **bodies,
         planet=PlanarBody(case.planet.mass, case.planet.inertia),
-        stiffness_sun_planet=mean[:N] if given is None else given.sun_planet,
-        stiffness_planet_ring=mean[N:] if given is None else given.planet_ring,
+        **mesh_stiffnesses(given, mean),
         planet_bearing=case.planet.bearing_stiffness,
     )
 
@@ -228,7 +222,6 @@ def planar_model(
     carrier_speed : float
         Of the gyroscopic terms [rad/s].
     """
-    from femgear.system.lumped import PlanarTorque
     from femgear.trains.planar.model import (
         Clearances,
         MemberBearing,
@@ -241,14 +234,13 @@ def planar_model(
 
     if static is not None:
         check_entries(static.entries, static_entries(case), "static solution")
-    planar, operation = case.planar, case.operation
+    planar = case.planar
     data = planar_data(case, gears, static)
-    output = None if planar.reaction == "supports" else output_member(case)
     clearance = case.planet.bearing_clearance or None
     options = {
         "meshes": _meshes(case, gears, data, static, mesh_frequency),
         "back_flanks": planar.back_flanks,
-        "torque": PlanarTorque(operation.torque, operation.input, output),
+        "torque": driving_torque(case, reacts=planar.reaction == "output"),
         "clearances": None if clearance is None else Clearances(planets=clearance),
         "gravity": _gravity(case, gears, mesh_frequency),
         "pin_errors": _pin_errors(case, gears.n_planets) if planar.mesh_stiffness else None,
@@ -268,10 +260,7 @@ def planar_model(
 
 def carrier_sense(case: PlanarCase, gears: PlanetarySet) -> int:
     """1 where the carrier turns counter-clockwise, -1 where clockwise, 0 where it stands."""
-    from femgear.gears.kinematics import speeds
-
-    found = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=1.0)
-    return int(np.sign(found.carrier))
+    return int(np.sign(member_speeds(case, gears).carrier))
 
 
 def _ratios(case: PlanarCase):
@@ -280,10 +269,9 @@ def _ratios(case: PlanarCase):
 
 def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
     """Mesh elements: constant, or along the static record over the mesh phase."""
-    from femgear.gears.kinematics import speeds
-    from femgear.system.assembler import planar_meshes
+    from femgear.system.assembler import mesh_elements
     from femgear.system.elements import GearMeshes
-    from femgear.system.series import constant
+    from femgear.system.fourier import constant
     from femgear.system.system import MeshExcitation
 
     planar, N = case.planar, gears.n_planets
@@ -292,8 +280,8 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
         play = np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], N)
         backlash = np.where(play > 0.0, play, np.inf)
     if planar.mesh_stiffness is not None:
-        return planar_meshes(data, backlash=backlash, smoothing=planar.smoothing)
-    cycle = static.cycle
+        return mesh_elements(data, backlash=backlash, smoothing=planar.smoothing)
+    cycle = needed(static, "static").cycle
     if not varying:
         stiffness, deflection, force = (
             getattr(cycle, name).mean(axis=1) for name in ("stiffness", "deflection", "force")
@@ -302,15 +290,13 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
         return GearMeshes(
             np.arange(2 * N), constant(stiffness), unloaded, backlash=backlash, smoothing=planar.smoothing
         )
-    turning = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=1.0)
-    # positions of the record run with the sun against the carrier
-    sense = 1 if turning.sun > turning.carrier else -1
     record = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, np.zeros(2 * N))
-    return planar_meshes(
+    return mesh_elements(
         data,
         stiffness=record,
         harmonics=case.mesh_harmonics,
-        orders=(0, sense),
+        # positions of the record run with the sun against the carrier
+        orders=(0, rotation_sense(case, gears)),
         backlash=backlash,
         smoothing=planar.smoothing,
     )
@@ -336,9 +322,9 @@ def _pin_errors(case: PlanarCase, n_planets: int) -> np.ndarray:
 def _response_lines(case: PlanarCase, gears: PlanetarySet, static: StaticResult | None) -> np.ndarray:
     """Lines of weight and mesh frequency; none of the weight where it does not turn, none of the mesh
     frequency where the mesh stiffness is constant."""
-    from femgear.system.series import side_bands
+    from femgear.system.fourier import side_bands
 
-    wanted = case.planar.response
+    wanted = needed(case.planar.response, "planar.response")
     turns = case.planar.gravity is not None and carrier_sense(case, gears) != 0
     carrier, bands = (wanted.carrier_harmonics, wanted.side_bands) if turns else (0, 0)
     mesh = case.response_harmonics if case.planar.mesh_stiffness is None else 0
@@ -412,9 +398,7 @@ PLANAR = Train(
             name="modes",
             title="Modes",
             solve=lambda case, results, _: solve_planar_modes(case, results.get("static")),
-            verdict=lambda result: {
-                "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
-            },
+            verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=_needs_static,
             check=lambda case: check_planar_case(case, planetary_set(case)),

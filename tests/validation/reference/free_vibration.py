@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, checked_numbers
 from femgear.solvers.periodic.shooting import (
     _SINGULAR,
     ShootingOptions,
@@ -20,8 +20,7 @@ from femgear.solvers.periodic.shooting import (
     _size,
 )
 from femgear.solvers.time.adaptive import Contacts, Flow, checked_start, flow
-from femgear.system.entries import checked_numbers
-from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.system import NonlinearSystem
 
 
 def solve_free_vibration(

@@ -1,7 +1,8 @@
-"""From a helical case to the helical set, and from spur gears to the stiffness of its teeth.
+"""From a helical case to the helical set, from spur gears to the stiffness of its teeth, and refusals.
 
 Bodies, supports, radii, helix and torque are those of the case. Teeth are solved as spur gears of the
 transverse section; those of the normal section, the virtual gears, tell by how much their stiffness differs.
+Refused before anything is computed are supports that are missing and torques too large.
 """
 
 from __future__ import annotations
@@ -13,19 +14,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.sections import output_member
-from femgear.errors import CaseError, GeometryError
+from femgear.errors import CaseError, ConvergenceError, GeometryError
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
 from femgear.trains.helical.section import HelicalCase
+from femgear.trains.rigid import check_one_period, driving_torque, mesh_stiffnesses, needed, torsional_support
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
-    from femgear.system.lumped import PlanarTorque
     from femgear.trains.helical.model import HelicalSet
 
 # both sections are solved on the same grid, and only the ratio of their stiffnesses counts
 FLANK_ELEMENTS, POSITIONS = 8, 16
+# any stiffness shows whether something takes up the load [N/m, N m/rad]
+_TRIAL = 1e8
+_AXES = {"axial_stiffness": "axial", "tilt_stiffness": "tilt"}
+# c' of steel teeth [N/m^2] and Young's modulus of steel [Pa] (ISO 6336-1, method B); what teeth give way by
+# before nothing is left of their contact [modules]
+_TOOTH, _STEEL, _MOST = 14e9, 206e9, 0.25
 
 
 def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) -> HelicalSet:
@@ -39,28 +45,24 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
     mesh_stiffness : (2N,) array, optional
         Mean stiffnesses along the tooth normals [N/m] where the case gives none.
     """
-    from femgear.system.lumped import HelicalBody, HelicalSupport
+    from femgear.system.rigid_bodies import HelicalBody, HelicalSupport
     from femgear.trains.helical.model import helical_from_set
 
-    helical, N = case.helical, gears.n_planets
-    polar = {"sun": case.sun, "ring": helical.ring, "carrier": case.carrier}
+    helical = case.helical
     bodies = {}
-    for name, one in polar.items():
+    for name, one in (("sun", case.sun), ("ring", helical.ring), ("carrier", case.carrier)):
         space = getattr(helical, name)
-        held = np.inf if name == case.operation.fixed else 0.0
-        torsional = held if space.torsional_stiffness is None else space.torsional_stiffness
-        support = HelicalSupport(
-            one.support_stiffness, space.axial_stiffness, space.tilt_stiffness, torsional
-        )
+        torsional = torsional_support(case, name, space.torsional_stiffness)
+        radial = needed(one.support_stiffness, f"{name}.support_stiffness")
+        support = HelicalSupport(radial, space.axial_stiffness, space.tilt_stiffness, torsional)
         bodies[name] = HelicalBody(one.mass, one.inertia, space.diametral_inertia, support)
-    pin, given = helical.planet, helical.mesh_stiffness
+    pin = helical.planet
     return helical_from_set(
         gears,
         helix_angle=helical.signed_helix_angle,
         **bodies,
         planet=HelicalBody(case.planet.mass, case.planet.inertia, pin.diametral_inertia),
-        stiffness_sun_planet=mesh_stiffness[:N] if given is None else given.sun_planet,
-        stiffness_planet_ring=mesh_stiffness[N:] if given is None else given.planet_ring,
+        **mesh_stiffnesses(helical.mesh_stiffness, mesh_stiffness),
         planet_bearing=HelicalSupport(
             case.planet.bearing_stiffness,
             pin.axial_stiffness,
@@ -84,21 +86,6 @@ def overlap_ratio(case: HelicalCase, gears: PlanetarySet) -> float:
 
     found = contact_ratios(gears, helix_angle=case.helical.helix_angle, face_width=case.set.face_width)
     return float(found[0, 1])
-
-
-def rotation_sense(case: HelicalCase, gears: PlanetarySet) -> int:
-    """1 where the sun turns counter-clockwise against the carrier, else -1."""
-    from femgear.gears.kinematics import speeds
-
-    found = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=1.0)
-    return 1 if found.sun > found.carrier else -1
-
-
-def torque_of(case: HelicalCase) -> PlanarTorque:
-    """The driving torque, which the member that is neither driven nor held takes up."""
-    from femgear.system.lumped import PlanarTorque
-
-    return PlanarTorque(case.operation.torque, case.operation.input, output_member(case))
 
 
 @dataclass(frozen=True)
@@ -157,13 +144,12 @@ def section_stiffness(
         Virtual gears that cannot be made (E-HELICAL-SECTION).
     GridError, ContactError
     """
-    virtual, helix = virtual_gears(case, gears), case.helical.helix_angle
+    virtual = virtual_gears(case, gears)
     single = replace(gears, planet_angles=gears.planet_angles[:1])
-    beta_b = math.atan(math.tan(helix) * math.cos(gears.sun.pressure_angle))
     load = line_load(case, gears)
     transverse, normal = (_pair_stiffness(case, one, load, cache) for one in (single, virtual))
-    teeth = tuple(gear.teeth for gear in (virtual.sun, virtual.planet, virtual.ring))
-    return SectionStiffness(teeth, transverse, normal, beta_b)
+    teeth = (virtual.sun.teeth, virtual.planet.teeth, virtual.ring.teeth)
+    return SectionStiffness(teeth, transverse, normal, base_helix_angle(case, gears))
 
 
 def virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
@@ -277,3 +263,104 @@ def _pair_stiffness(case: HelicalCase, gears: PlanetarySet, load: float, cache: 
     )
     ratios = np.array([gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring])
     return cycle.stiffness.mean(axis=1) / (width * ratios)
+
+
+def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
+    """Refuse what the helical model cannot represent, before anything is computed.
+
+    Raises
+    ------
+    CaseError
+        E-MECHANISM: torque, thrust or tilting moments that nothing takes up. E-RANGE: stiffnesses too far
+        apart, a torque that no teeth carry. E-PERIODS: a static record of several mesh
+        periods. E-HELICAL-SECTION: virtual gears that cannot be made.
+    """
+    _check_supports(case, gears)
+    if case.helical.mesh_stiffness is not None:
+        return
+    _check_torque(case, gears)
+    check_one_period(case, gears, "helical")
+    if case.helical.section == "normal":
+        virtual_gears(case, gears)
+
+
+def _check_torque(case: HelicalCase, gears: PlanetarySet) -> None:
+    """A load under which teeth would give way by a large part of their height has no static solution."""
+    stiffness = _TOOTH * case.material.youngs_modulus / _STEEL
+    share = line_load(case, gears) / (stiffness * gears.sun.module)
+    if share > _MOST:
+        raise CaseError(
+            f"a tooth pair would give way by {share:.3g} modules under this torque",
+            code="E-RANGE",
+            key="operation.torque",
+            value=f"{case.operation.torque:.6g} N m",
+            limit=f"{abs(case.operation.torque) * _MOST / share:.3g} N m, by {_MOST} modules, for this set",
+            remedy="check the unit of the torque, or give the teeth a wider face or a larger module",
+            file=case.location("operation.torque"),
+        )
+
+
+def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
+    """The thrust of helical teeth needs axial supports and its moments tilt supports."""
+    data = helical_data(case, gears, np.full(2 * gears.n_planets, _TRIAL))
+    try:
+        balanced = _balanced(case, data)
+    except ConvergenceError as error:
+        if error.code != "E-RIGID-MODE":
+            raise
+        raise CaseError(
+            "the stiffest supports are too stiff beside the softest: rounding hides the soft ones",
+            code="E-RANGE",
+            key="helical",
+            limit="tilt and torsional stiffnesses over the radius squared within 1e17 N/m",
+            remedy="lower the largest axial_stiffness, tilt_stiffness or torsional_stiffness",
+            file=case.location("helical"),
+        ) from None
+    if not balanced:
+        _refuse_loose(case, data)
+
+
+def _balanced(case: HelicalCase, data: HelicalSet) -> bool:
+    """Whether supports take up what the torque asks of them."""
+    from femgear.solvers.linear.modal import solve_modes
+    from femgear.system.assembler import gear_set_system
+
+    try:
+        solve_modes(gear_set_system(data, torque=driving_torque(case)), data.column_stiffness)
+    except CaseError as error:
+        if error.code != "E-LOAD-BALANCE":
+            raise
+        return False
+    return True
+
+
+def _refuse_loose(case: HelicalCase, data: HelicalSet) -> None:
+    """Name the supports of zero stiffness that would each take up what nothing takes up."""
+    free = [
+        (body, entry)
+        for body in ("sun", "ring", "carrier", "planet")
+        for entry in _AXES
+        if getattr(getattr(case.helical, body), entry) == 0.0
+    ]
+    cures = [one for one in free if _balanced(case, _supported(data, *one))] or free
+    names = [f"helical.{body}.{entry}" for body, entry in cures]
+    what = {"axial_stiffness": "thrust", "tilt_stiffness": "tilting moments"}
+    lost = " or the ".join(dict.fromkeys(what[entry] for _, entry in cures)) or "torque"
+    raise CaseError(
+        f"nothing takes up the {lost} of the helical teeth",
+        code="E-MECHANISM",
+        key=names[0] if names else "helical",
+        value="0" if names else None,
+        limit=f"above 0: {' or '.join(names)}" if names else "supports of sun, ring and carrier above 0",
+        remedy="give axial_stiffness, tilt_stiffness and support_stiffness",
+        file=case.location(names[0] if names else "helical"),
+    )
+
+
+def _supported(data: HelicalSet, body: str, entry: str) -> HelicalSet:
+    """The same set with one support that was missing."""
+    change = {_AXES[entry]: _TRIAL}
+    if body == "planet":
+        return replace(data, planet_bearing=replace(data.planet_bearing, **change))
+    one = getattr(data, body)
+    return replace(data, **{body: replace(one, support=replace(one.support, **change))})

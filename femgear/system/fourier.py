@@ -12,9 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.errors import CaseError
-from femgear.system.entries import checked_numbers
-from femgear.system.system import MeshExcitation
+from femgear.errors import CaseError, checked_numbers
 
 # Fluctuation, relative to the mean, below which there is none.
 _ROUNDING = 1e-12
@@ -115,42 +113,6 @@ def multiply(matrix: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
     return np.matmul(flat, matrix.transpose(0, 2, 1)).view(complex).reshape(amplitudes.shape)
 
 
-def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Stiffness, deflection and force of the meshes, each cut to ``count`` mesh harmonics.
-
-    Parameters
-    ----------
-    excitation : MeshExcitation
-    count : int
-        Mesh harmonics kept; a record of several periods keeps all its lines up to that frequency.
-
-    Returns
-    -------
-    stiffness, deflection, force : (n_meshes, count periods + 1) complex arrays
-        [N/m], [m], [N].
-
-    Raises
-    ------
-    CaseError
-        Numbers that are not finite, arrays that do not fit each other, too few positions.
-    """
-    if count < 1 or int(count) != count:
-        raise CaseError("at least one excitation harmonic is needed", code="E-HARMONICS", value=count)
-    arrays = (excitation.stiffness, excitation.deflection, excitation.force)
-    for name, array in zip(("stiffness", "deflection", "force"), arrays):
-        if array.ndim != 2 or array.shape != excitation.stiffness.shape:
-            raise CaseError(
-                f"mesh {name} has shape {array.shape}, mesh stiffness {excitation.stiffness.shape}",
-                code="E-SHAPE", limit="(n_meshes, n_positions), the same for all",
-            )  # fmt: skip
-        if not np.all(np.isfinite(array)):
-            raise CaseError(f"mesh {name} holds numbers that are not finite", code="E-FINITE")
-    if excitation.periods < 1:
-        raise CaseError("the record spans no period", code="E-HARMONICS", value=excitation.periods)
-    lines = int(count) * excitation.periods
-    return tuple(harmonics_of(array, lines) for array in arrays)
-
-
 @dataclass(frozen=True)
 class FourierSeries:
     """``Re sum_h X_h exp(i h (orders . theta))`` with ``theta`` the phases of the base frequencies.
@@ -182,7 +144,7 @@ class FourierSeries:
     @property
     def mean(self) -> np.ndarray:
         """(n,) array."""
-        return self.amplitudes[:, 0].real
+        return np.real(self.amplitudes[:, 0])
 
     def at(self, theta) -> np.ndarray:
         """Values (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
@@ -300,7 +262,12 @@ class SummedSeries:
 
     def at(self, theta) -> np.ndarray:
         """Values (..., n) at the phases ``theta`` (..., n_bases) [rad]."""
-        return sum(part.at(theta) for part in self.parts)
+        first, *others = (part.at(theta) for part in self.parts)
+        return sum(others, first)
+
+
+Series = FourierSeries | StepSeries | SummedSeries
+"""Coefficients that repeat with the phases of the base frequencies."""
 
 
 def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np.ndarray, np.ndarray]:
@@ -337,7 +304,7 @@ def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np
     rates, lines = rates[order], lines[:, order]
     first = np.flatnonzero(np.diff(rates, prepend=-np.inf) > _COINCIDE * rates.max(initial=0.0))
     total = np.add.reduceat(lines, first, axis=1)
-    total[:, 0] = total[:, 0].real
+    total[:, 0] = np.real(total[:, 0])
     return rates[first], total
 
 
@@ -408,7 +375,7 @@ def distinct_lines(orders) -> np.ndarray:
 
 def mirror_sign(orders: np.ndarray) -> np.ndarray:
     """Sign (L,) of the last order of every line that is not zero; 1 for the mean."""
-    last = np.zeros(len(orders), int)
+    last: np.ndarray = np.zeros(len(orders), int)
     for column in orders.T:
         last = np.where(column != 0, np.sign(column), last)
     return np.where(last == 0, 1, last)

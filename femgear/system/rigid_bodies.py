@@ -1,6 +1,8 @@
 """Data of planetary sets of rigid bodies: bodies, supports, radii, angles, torques, refusals.
 
-The planar set moves in its plane (E-PLANAR), helical bodies in all six directions (E-HELICAL).
+Bodies have up to six motions: along x, y and z, two tilts ``w = r phi`` and the rotation ``u = r theta``.
+Those of the planar set move in their plane (E-PLANAR), those of the helical set in all directions
+(E-HELICAL).
 """
 
 from __future__ import annotations
@@ -8,8 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 import numpy as np
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 CENTRAL = ("carrier", "ring", "sun")
 DIRECTIONS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}
+ROTATIONS = (3, 4, 5)
+"""Places of tilts and rotation among the six motions of a body."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +46,41 @@ class PlanarBody:
     support: float = 0.0
     torsional_support: float = 0.0
 
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Of its supports (3,): twice radial [N/m], torsional [N m/rad]."""
+        return np.array([self.support, self.support, self.torsional_support], float)
+
+    def masses(self, radius: float) -> list[float]:
+        """m, m and I / r^2 [kg] of x, y and ``u`` on a radius [m]."""
+        return [self.mass, self.mass, self.inertia / radius**2]
+
+
+@dataclass(frozen=True)
+class ContactLines:
+    """Where and along which lines the flanks of rigid gears touch.
+
+    Parameters
+    ----------
+    base_helix_angle : float
+        Angle of the tooth normals to the transverse section [rad].
+    heights : tuple of float
+        Of the slices above mid-face [m].
+    on_base_circles : bool
+        Forces act where the line of action touches the base circle of each gear, else at the pitch point.
+    """
+
+    base_helix_angle: float = 0.0
+    heights: tuple[float, ...] = (0.0,)
+    on_base_circles: bool = False
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RigidSet:
     """Rigid bodies, the geometry of their gears and the stiffness of their meshes.
+
+    A kind of set says which of the six motions its bodies have (``axes``), and the names of the springs in
+    them (``directions``); ``meshes_optional`` allows meshes without stiffness.
 
     Parameters
     ----------
@@ -63,7 +97,18 @@ class RigidSet:
         Working pressure angles in the transverse section [rad].
     stiffness_sun_planet, stiffness_planet_ring : float or (N,) array
         Mean stiffnesses of the whole meshes along the tooth normals [N/m].
+
+    Raises
+    ------
+    CaseError
+        Numbers that no set can have, planet angles that are none, unordered or span more than a turn, with
+        the code of the kind of set.
     """
+
+    code: ClassVar[str] = "E-HELICAL"
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
+    directions: ClassVar[dict[str, tuple[int, ...]]] = {}
+    meshes_optional: ClassVar[bool] = True
 
     sun: PlanarBody | HelicalBody
     ring: PlanarBody | HelicalBody
@@ -79,14 +124,54 @@ class RigidSet:
     stiffness_sun_planet: float | np.ndarray
     stiffness_planet_ring: float | np.ndarray
 
+    def __post_init__(self):
+        self._keep("planet_angles", np.atleast_1d(self._numbers("planet_angles")))
+        for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
+            self._keep(name, self._per_planet(name))
+        for name in (*CENTRAL, "planet"):
+            check_body(name, getattr(self, name))
+        check_set(self)
+
     @property
     def n_planets(self) -> int:
         return len(self.planet_angles)
 
     @property
+    def angles(self) -> np.ndarray:
+        """psi_n (N,) [rad]."""
+        return np.asarray(self.planet_angles)
+
+    @property
+    def radii(self) -> np.ndarray:
+        """Radius r (N + 3,) of ``u = r theta`` of carrier, ring, sun and planets [m]."""
+        return np.array(
+            [member_radius(self, name) for name in CENTRAL] + [self.planet_radius] * self.n_planets
+        )
+
+    @property
     def mesh_stiffness(self) -> np.ndarray:
         """Mean stiffness of the 2N meshes [N/m]."""
-        return np.concatenate([self.stiffness_sun_planet, self.stiffness_planet_ring])
+        return np.concatenate([np.asarray(self.stiffness_sun_planet), np.asarray(self.stiffness_planet_ring)])
+
+    @property
+    def column_stiffness(self) -> np.ndarray:
+        """Mean stiffness of the mesh columns of ``W`` [N/m]."""
+        return self.mesh_stiffness
+
+    @property
+    def support_stiffness(self) -> np.ndarray:
+        """Of carrier, ring and sun in all their motions (3, axes) [N/m, N m/rad]."""
+        return np.stack([getattr(self, name).stiffness for name in CENTRAL])
+
+    @property
+    def pin_stiffness(self) -> np.ndarray:
+        """Of the planet bearings (N, d) in the first d motions of a planet [N/m, N m/rad]."""
+        raise NotImplementedError
+
+    @property
+    def contact_lines(self) -> ContactLines:
+        """Where and along which lines the flanks touch."""
+        return ContactLines()
 
     @property
     def closure(self) -> tuple[float, float]:
@@ -99,6 +184,25 @@ class RigidSet:
             (self.sun_radius + self.planet_radius) / (a * math.cos(self.pressure_angle_sun_planet)) - 1.0,
             (self.ring_radius - self.planet_radius) / (a * math.cos(self.pressure_angle_planet_ring)) - 1.0,
         )
+
+    def refuse(self, key: str, value, unit: str, limit: str, *, remedy: str | None = None) -> NoReturn:
+        """Refuse an entry with the code of this kind of set."""
+        refuse(key, value, unit, limit, code=self.code, remedy=remedy)
+
+    def _numbers(self, key: str, dimensions: int | None = None) -> np.ndarray:
+        return numbers(key, getattr(self, key), dimensions, code=self.code)
+
+    def _keep(self, name: str, array: np.ndarray) -> None:
+        array.setflags(write=False)
+        object.__setattr__(self, name, array)
+
+    def _per_planet(self, name: str) -> np.ndarray:
+        """Values (N,) from one number or one a planet."""
+        values = self._numbers(name)
+        values = np.full(self.n_planets, values.item()) if values.size == 1 else values
+        if values.shape != (self.n_planets,):
+            self.refuse(name, f"{values.size} values", "", f"one number, or {self.n_planets}")
+        return values
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,23 +226,24 @@ class PlanarSet(RigidSet):
     taken as they are, and `closure` tells by how much.
     """
 
+    code: ClassVar[str] = "E-PLANAR"
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 5)
+    directions: ClassVar[dict[str, tuple[int, ...]]] = {"{}": (0, 1), "torsional {}": (2,)}
+    meshes_optional: ClassVar[bool] = False
+
     planet_bearing: float | np.ndarray
 
     def __post_init__(self):
-        angles = np.atleast_1d(np.array(self.planet_angles, float))
-        per_planet = ("stiffness_sun_planet", "stiffness_planet_ring", "planet_bearing")
-        arrays = {"planet_angles": angles} | {
-            name: np.array(getattr(self, name), float) * np.ones(1) for name in per_planet
-        }
-        for name in per_planet:
-            if len(arrays[name]) == 1:
-                arrays[name] = np.full(len(angles), arrays[name][0])
-        for name, array in arrays.items():
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-        for name in (*CENTRAL, "planet"):
-            check_body(name, getattr(self, name))
-        check_set(self)
+        super().__post_init__()
+        self._keep("planet_bearing", self._per_planet("planet_bearing"))
+        wrong = ~(self.pin_stiffness > 0.0)
+        if np.any(wrong):
+            self.refuse("planet_bearing", self.pin_stiffness[wrong][0], "N/m", "above 0, or infinite")
+
+    @property
+    def pin_stiffness(self) -> np.ndarray:
+        """Of the planet bearings, (N, 2): radial and tangential [N/m]."""
+        return np.repeat(np.asarray(self.planet_bearing)[:, None], 2, axis=1)
 
 
 @dataclass(frozen=True)
@@ -232,41 +337,32 @@ class HelicalBody:
     support: HelicalSupport = field(default_factory=HelicalSupport)
 
     def __post_init__(self):
-        check_helical_body("body", self)
+        check_body("body", self)
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Of its support (6,): twice radial, axial [N/m], two tilts, torsional [N m/rad]."""
+        return self.support.stiffness
+
+    def masses(self, radius: float) -> list[float]:
+        """m three times, I / r^2 twice and J / r^2 [kg] of the six motions on a radius [m]."""
+        diametral, polar = self.diametral_inertia / radius**2, self.inertia / radius**2
+        return [self.mass, self.mass, self.mass, diametral, diametral, polar]
 
 
-def planar_from_set(
-    planetary_set: PlanetarySet,
-    *,
-    sun: PlanarBody,
-    ring: PlanarBody,
-    carrier: PlanarBody,
-    planet: PlanarBody,
-    stiffness_sun_planet,
-    stiffness_planet_ring,
-    planet_bearing,
-) -> PlanarSet:
-    """Lumped set with the base radii, working pressure angles and planet angles of a geared one.
+def planar_from_set(planetary_set: PlanetarySet, **data: Any) -> PlanarSet:
+    """Make a planar set with the base radii, working pressure angles and planet angles of a geared one.
 
     Parameters
     ----------
     planetary_set : PlanetarySet
-    sun, ring, carrier, planet, stiffness_sun_planet, stiffness_planet_ring, planet_bearing
-        See `PlanarSet`.
+    **data
+        Bodies, mesh stiffnesses and planet bearing of `PlanarSet`.
     """
-    return PlanarSet(
-        sun=sun,
-        ring=ring,
-        carrier=carrier,
-        planet=planet,
-        stiffness_sun_planet=stiffness_sun_planet,
-        stiffness_planet_ring=stiffness_planet_ring,
-        planet_bearing=planet_bearing,
-        **gear_geometry(planetary_set),
-    )
+    return PlanarSet(**data, **gear_geometry(planetary_set))
 
 
-def gear_geometry(s: PlanetarySet) -> dict[str, float | np.ndarray]:
+def gear_geometry(s: PlanetarySet) -> dict[str, Any]:
     """Base radii, centre distance, planet angles and working pressure angles of a `RigidSet`."""
     return {
         "sun_radius": s.sun.base_radius,
@@ -342,11 +438,10 @@ def member_radius(data: RigidSet, member: str) -> float:
     return data.centre_distance if member == "carrier" else getattr(data, f"{member}_radius")
 
 
-def body_masses(data: PlanarSet) -> np.ndarray:
-    """Mass, mass and ``I / r^2`` (N + 3, 3) [kg] of carrier, ring, sun and planets."""
-    bodies = [(getattr(data, name), member_radius(data, name)) for name in CENTRAL]
-    bodies += [(data.planet, data.planet_radius)] * data.n_planets
-    return np.array([(body.mass, body.mass, body.inertia / r**2) for body, r in bodies])
+def body_masses(data: RigidSet) -> np.ndarray:
+    """Masses and reduced inertias (N + 3, axes) [kg] of carrier, ring, sun and planets."""
+    bodies = [getattr(data, name) for name in CENTRAL] + [data.planet] * data.n_planets
+    return np.array([body.masses(radius) for body, radius in zip(bodies, data.radii.tolist())])
 
 
 def inertia_of_reduced(reduced: float, radius: float) -> float:
@@ -359,89 +454,74 @@ def torsional_of_reduced(stiffness: float, radius: float) -> float:
     return stiffness * radius**2
 
 
-def check_set(data: PlanarSet) -> None:
-    """Refuse radii, angles and stiffnesses (E-PLANAR)."""
+def check_set(data: RigidSet) -> None:
+    """Refuse radii, pressure angles, mesh stiffnesses and planet angles."""
     for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
-        value = getattr(data, name)
-        if not (math.isfinite(value) and value > 0.0):
-            _refuse_planar(name, value, "m", "finite and above 0")
+        _check_positive(name, getattr(data, name), "m", code=data.code)
     for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
-        value = getattr(data, name)
+        value = numbers(name, getattr(data, name), 0, code=data.code)
         if not 0.0 < value < 0.5 * math.pi:
-            _refuse_planar(name, value, "rad", "between 0 and pi/2", remedy="give radians")
-    for name in ("stiffness_sun_planet", "stiffness_planet_ring", "planet_bearing"):
-        values, allowed = getattr(data, name), "finite and above 0"
-        wrong = ~np.isfinite(values) | ~(values > 0.0)
-        if name == "planet_bearing":
-            allowed, wrong = "above 0, or infinite", ~(values > 0.0)
-        if len(values) != data.n_planets:
-            _refuse_planar(name, f"{len(values)} values", "", f"one number, or {data.n_planets}")
+            data.refuse(name, value, "rad", "between 0 and pi/2", remedy="give radians")
+    limit = "finite, 0 or more" if data.meshes_optional else "finite and above 0"
+    for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
+        values = getattr(data, name)
+        wrong = ~np.isfinite(values) | ~((values >= 0.0) if data.meshes_optional else (values > 0.0))
         if np.any(wrong):
-            _refuse_planar(name, values[wrong][0], "N/m", allowed)
-    check_angles(data.planet_angles, code="E-PLANAR")
-
-
-def check_body(name: str, body: PlanarBody) -> None:
-    """Refuse a mass, inertia or support (E-PLANAR)."""
-    for entry, unit in (("mass", "kg"), ("inertia", "kg m^2")):
-        value = getattr(body, entry)
-        if not (math.isfinite(value) and value > 0.0):
-            _refuse_planar(f"{name}.{entry}", value, unit, "finite and above 0")
-    for entry, unit in (("support", "N/m"), ("torsional_support", "N m/rad")):
-        value = getattr(body, entry)
-        if not value >= 0.0:
-            _refuse_planar(f"{name}.{entry}", value, unit, "0 or more, or infinite")
-        if name == "planet" and value:
-            _refuse_planar(f"planet.{entry}", value, unit, "0", remedy="give planet_bearing of the set")
-
-
-def check_angles(angles: np.ndarray, *, code: str) -> None:
-    """Refuse planet angles that are none, unordered or span more than a turn."""
-    allowed = "one or more, finite, ascending, within one turn"
-    if not angles.size or angles.ndim != 1 or not np.all(np.isfinite(angles)):
-        refuse("planet_angles", angles.tolist(), "rad", allowed, code=code)
-    if np.any(np.diff(angles) < 1e-9) or np.ptp(angles) > 2.0 * math.pi - 1e-9:
+            data.refuse(name, values[wrong][0], "N/m", limit)
+    psi, allowed = data.angles, "one or more, finite, ascending, within one turn"
+    if not psi.size or psi.ndim != 1 or not np.all(np.isfinite(psi)):
+        data.refuse("planet_angles", psi.tolist(), "rad", allowed)
+    if np.any(np.diff(psi) < 1e-9) or np.ptp(psi) > 2.0 * math.pi - 1e-9:
         remedy = "give radians, in ascending order"
-        refuse("planet_angles", angles.tolist(), "rad", allowed, code=code, remedy=remedy)
+        data.refuse("planet_angles", psi.tolist(), "rad", allowed, remedy=remedy)
 
 
-def check_helical_body(name: str, body: HelicalBody) -> None:
-    """Refuse a mass, inertia or support (E-HELICAL)."""
+def check_body(name: str, body: PlanarBody | HelicalBody) -> None:
+    """Refuse a mass, inertia or support."""
+    code = "E-HELICAL" if isinstance(body, HelicalBody) else "E-PLANAR"
     for entry, unit in (("mass", "kg"), ("inertia", "kg m^2"), ("diametral_inertia", "kg m^2")):
-        value = numbers(f"{name}.{entry}", getattr(body, entry), 0)
-        if not (math.isfinite(value) and value > 0.0):
-            refuse_helical(f"{name}.{entry}", value, unit, "finite and above 0")
-    check_support(f"{name}.support", body.support, count=0)
-    if name == "planet" and np.any(body.support.stiffness):
-        refuse_helical("planet.support", "a planet", "", "none", remedy="give planet_bearing of the set")
+        if hasattr(body, entry):
+            _check_positive(f"{name}.{entry}", getattr(body, entry), unit, code=code)
+    remedy = "give planet_bearing of the set"
+    if isinstance(body, HelicalBody):
+        check_support(f"{name}.support", body.support, count=0)
+        if name == "planet" and np.any(body.support.stiffness):
+            refuse("planet.support", "a planet", "", "none", code=code, remedy=remedy)
+        return
+    for entry, unit in (("support", "N/m"), ("torsional_support", "N m/rad")):
+        value = numbers(f"{name}.{entry}", getattr(body, entry), 0, code=code)
+        if not value >= 0.0:
+            refuse(f"{name}.{entry}", value, unit, "0 or more, or infinite", code=code)
+        if name == "planet" and value:
+            refuse(f"planet.{entry}", value, unit, "0", code=code, remedy=remedy)
 
 
 def check_support(key: str, support: HelicalSupport, *, count: int | None = None) -> None:
     """Refuse stiffnesses of a support (E-HELICAL): of `count` planets, of one body (0), of either (None)."""
-    allowed = f"one number, or {count}" if count else "one number"
+    code, allowed = "E-HELICAL", f"one number, or {count}" if count else "one number"
     # what is no support has none of its stiffnesses
     if not all(hasattr(support, entry) for entry in DIRECTIONS):
-        refuse_helical(key, repr(support), "", "a HelicalSupport")
+        refuse(key, repr(support), "", "a HelicalSupport", code=code)
     for entry, unit in DIRECTIONS.items():
-        values = numbers(f"{key}.{entry}", getattr(support, entry))
+        values = numbers(f"{key}.{entry}", getattr(support, entry), code=code)
         if count is not None and values.ndim and values.shape != (count,):
-            refuse_helical(f"{key}.{entry}", f"{values.size} values", "", allowed)
+            refuse(f"{key}.{entry}", f"{values.size} values", "", allowed, code=code)
         if not np.all(values >= 0.0):
-            refuse_helical(f"{key}.{entry}", values.min(), unit, "0 or more, or infinite")
+            refuse(f"{key}.{entry}", values.min(), unit, "0 or more, or infinite", code=code)
 
 
-def numbers(key: str, values, dimensions: int | None = None) -> np.ndarray:
-    """Values as an array of floats, of so many dimensions where they are given (E-HELICAL)."""
+def numbers(key: str, values, dimensions: int | None = None, *, code: str) -> np.ndarray:
+    """Values as an array of floats, of so many dimensions where they are given."""
     try:
         found = np.array(values, float)
     except (TypeError, ValueError):
-        refuse_helical(key, repr(values), "", "a number" if dimensions == 0 else "numbers")
+        refuse(key, repr(values), "", "a number" if dimensions == 0 else "numbers", code=code)
     if dimensions is not None and found.ndim != dimensions:
-        refuse_helical(key, f"{found.size} values", "", "one number")
+        refuse(key, f"{found.size} values", "", "one number", code=code)
     return found
 
 
-def refuse(key: str, value, unit: str, limit: str, *, code: str, remedy: str | None = None):
+def refuse(key: str, value, unit: str, limit: str, *, code: str, remedy: str | None = None) -> NoReturn:
     """Refuse an entry of a set, such as ``planet.mass``, with its value and what is allowed."""
     raise CaseError(
         f"{key.replace('_', ' ').replace('.', ': ')} of {value} {unit}".rstrip(),
@@ -449,5 +529,7 @@ def refuse(key: str, value, unit: str, limit: str, *, code: str, remedy: str | N
     )  # fmt: skip
 
 
-_refuse_planar = partial(refuse, code="E-PLANAR")
-refuse_helical = partial(refuse, code="E-HELICAL")
+def _check_positive(key: str, value, unit: str, *, code: str) -> None:
+    number = numbers(key, value, 0, code=code)
+    if not (math.isfinite(number) and number > 0.0):
+        refuse(key, value, unit, "finite and above 0", code=code)
