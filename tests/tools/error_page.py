@@ -20,9 +20,9 @@ CODE = re.compile(r"E-[A-Z0-9]+(?:-[A-Z0-9]+)*")
 HEAD = """# Errors
 
 Every refusal names the file and the key where there are any, the value found, what is allowed and what to do.
-Its code is stable: scripts may test `error.code` of a `femgear.errors.FemgearError`. Exit codes of the
-command line are 2 for input that cannot be used, 3 for computations without trustworthy result, 4 for results that cannot
-be written or read.
+Its code is stable: scripts may test `error.code` of a `femgear.errors.FemgearError`. Exit codes of the command
+line are 2 for input that cannot be used, 3 for computations without trustworthy result, 4 for results that
+cannot be written or read.
 
 Below are all codes with the messages that carry them; `…` stands for numbers and names. This page is written
 by `python tests/tools/error_page.py -o docs/errors.md`.
