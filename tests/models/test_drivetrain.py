@@ -9,7 +9,6 @@ from published.wind_turbine_drivetrain import (
     PRINTED,
     RADII_TEETH,
     line_teeth,
-    paper_torques,
     ratio_of_radii,
     wind_turbine_drivetrain,
 )
@@ -37,7 +36,6 @@ from femgear.trains.drivetrain.model import (
     torsional_matrices,
     torsional_model,
 )
-from femgear.trains.drivetrain.multitone import settled_motion
 from femgear.trains.drivetrain.spectra import averaged_spectrum
 from femgear.trains.drivetrain.time import march_drivetrain
 
@@ -281,7 +279,6 @@ NOWHERE = ChainBearing("rotor", 1e8, other="carrier", station=1)
         (lambda: drivetrain_model(gear_set(planet_angles=(0.0, 2.0, 4.0))), "E-TURNING"),
         (lambda: drivetrain_model(gear_set(planet_bearing=1e8)), "E-TURNING"),
         (lambda: drivetrain_model(replace(TRAIN, shafts=(*TRAIN.shafts, SHORT_CUT))), "E-KINEMATICS"),
-        (lambda: settled_motion(drivetrain_model(TRAIN), paper_torques(), speed=0.6), "E-LOAD-BALANCE"),
         (lambda: march_drivetrain(drivetrain_model(TRAIN), (), duration=1.0, step=2.0, speed=0.6), "E-STEP"),
         (lambda: averaged_spectrum(np.zeros(100), 1e-3, resolution=1.0), "E-SPECTRUM"),
     ],

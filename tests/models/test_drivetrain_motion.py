@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 
-from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
+from femgear.system.series import FourierSeries, distinct_lines
 from femgear.trains.drivetrain.data import ChainBearing, Drivetrain, TorqueHistory, constant_torques
 from femgear.trains.drivetrain.model import (
     balanced_torque,
@@ -16,7 +17,6 @@ from femgear.trains.drivetrain.model import (
     drivetrain_problem,
     torsional_model,
 )
-from femgear.trains.drivetrain.multitone import drivetrain_lines, settled_motion
 from femgear.trains.drivetrain.spectra import averaged_spectrum, order_spectrum
 from femgear.trains.drivetrain.time import march_drivetrain
 
@@ -77,64 +77,46 @@ def test_march_against_the_general_integrator():
     assert np.abs(fine.motion - exact.displacement[:, chosen]).max() < 2e-3 * size
 
 
-def small_chain(**wave):
-    """A planetary stage and one parallel stage with much damping."""
-    bodies = tuple(b for b in TRAIN.bodies if b.name in ("carrier", "sun", "gear 1", "gear 2"))
-    mesh = replace(TRAIN.parallel[0].mesh, stiffness=2e8, **wave)
-    return Drivetrain(
-        bodies, tuple(s for s in TRAIN.shafts if s.first == "sun"), (replace(TRAIN.parallel[0], mesh=mesh),),
-        TRAIN.planetary, tuple(b for b in TRAIN.bearings if b.body in {one.name for one in bodies}),
-        damping_ratio=0.08,
-    )  # fmt: skip
+def settled_forces(model, torques, speed, times):
+    """Mesh forces (n_times, n_meshes) of harmonic balance over the turn and the mesh; its start (q, v)."""
+    problem = drivetrain_problem(model, torques=torques, speed=speed)
+    orders = distinct_lines([[turn, mesh] for mesh in range(15) for turn in range(-3, 4)])
+    frequency = model.frequencies(speed)
+    found = solve_harmonic_balance(problem, frequency, orders=orders, samples=(16, 48), stability=False)
+    assert found.converged
+    theta = times[:, None] * frequency
+    approach = np.einsum("tmj,tm->tj", model.geometry.selection(theta[:, :1]), found.at(times))
+    lines = displacements(problem, found)
+    start = lines.sum(axis=1).real, (1j * found.line_frequency * lines).sum(axis=1).real
+    return approach * FourierSeries(model.stiffness).at(theta[:, 1:]), start
 
 
-def test_settled_motion_against_integration():
-    model = drivetrain_model(small_chain(), harmonics=2)
-    torques, speed = balanced_torque(model, "carrier", 15000.0, "gear 2"), 0.9
-    lines = drivetrain_lines(model, harmonics=14, bands=3, mixed=4, mixed_bands=1)
-    found = settled_motion(model, torques, speed=speed, orders=lines)
-    q = found.displacement.sum(axis=1).real
-    v = (1j * found.line_frequency * found.displacement).sum(axis=1).real
-    run = march_drivetrain(
-        model, constant_torques(torques), duration=0.4, step=2e-5, every=5, speed=speed, start=(q, v)
-    )
-    force = found.at(run.time)[1]
-    assert found.residual < 1e-10
-    assert np.abs(run.force - force).max() < 6e-3 * np.ptp(force)
-
-
-def test_settled_motion_against_harmonic_balance():
-    """The general solver samples two bases; its lines are those of the convolution."""
+def test_integration_against_harmonic_balance():
+    """The general solver samples both bases; the run begins on its motion and stays there."""
     model = drivetrain_model(replace(gear_set(), damping_ratio=0.05, gravity=9.81), harmonics=2)
-    torques, speed = balanced_torque(model, "carrier", 15000.0, "sun"), 1.0
-    lines = drivetrain_lines(model, harmonics=4, bands=3)
-    found = settled_motion(model, torques, speed=speed, orders=lines, gyroscopic=False)
-    problem = drivetrain_problem(model, torques=torques)
-    other = solve_harmonic_balance(
-        problem, model.frequencies(speed), orders=lines, samples=(16, 32), radius=False
+    torques, speed, step = balanced_torque(model, "carrier", 15000.0, "sun"), 1.0, 2e-5
+    times = 5 * step * np.arange(4001)
+    force, start = settled_forces(model, torques, speed, times)
+    run = march_drivetrain(
+        model, constant_torques(torques), duration=times[-1], step=step, every=5, speed=speed, start=start
     )
-    assert other.converged
-    size = np.abs(other.deflection[:, 1:]).max()
-    assert np.abs(found.motion - other.deflection).max() < 1e-8 * size
+    assert np.abs(run.force - force).max() < 1e-3 * np.ptp(force)
 
 
 def test_bending_alone_gives_side_bands_of_the_turn():
     """Weight displaces carrier and sun in the fixed frame, where the planets pass: only then f_p +- turn."""
-    speed, seen = PRINTED.speed, {}
+    train = replace(gear_set(), damping_ratio=0.05, gravity=9.81)
+    # the mesh has 184 periods in a turn
+    teeth, seen, times = train.planetary[0].ring_teeth, {}, 2.0 * np.pi * np.arange(32 * 184) / (32 * 184)
     for text, model in (
-        ("bending", drivetrain_model(TRAIN, harmonics=3)),
-        ("torsion", torsional_model(TRAIN, harmonics=3)),
+        ("bending", drivetrain_model(train, harmonics=3)),
+        ("torsion", torsional_model(train, harmonics=3)),
     ):
-        lines = drivetrain_lines(model, harmonics=4, bands=2, mixed=1)
-        found = settled_motion(model, paper_torques(balanced=True), speed=speed, orders=lines)
-        times = np.arange(0.0, 20.0, 4e-3)
-        force, f, window = found.at(times)[1][:, 0], model.frequencies(speed), np.hanning(len(times))
-        seen[text] = [
-            2 * abs((window * force) @ np.exp(-1j * omega * times)) / window.sum()
-            for omega in (f[1], f[1] + f[0], f[1] - f[0])
-        ]
-    assert min(seen["bending"][1:]) > 1e-2 * seen["bending"][0]
-    assert max(seen["torsion"][1:]) < 2e-4 * seen["torsion"][0]
+        force = settled_forces(model, balanced_torque(model, "carrier", 15000.0, "sun"), 1.0, times)[0]
+        lines = 2.0 * np.abs(np.fft.rfft(force[:, 0])) / len(times)
+        seen[text] = lines[[teeth, teeth + 1, teeth - 1]]
+    assert seen["bending"][1:].min() > 1e-3 * seen["bending"][0]
+    assert seen["torsion"][1:].max() < 1e-9 * seen["torsion"][0]
 
 
 def test_backlash_takes_the_pulling_forces_away():
