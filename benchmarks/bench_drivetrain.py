@@ -36,9 +36,12 @@ def run(duration, step, **options):
 
 
 def test_a_minute_at_20_khz(benchmark):
+    from femgear.trains.drivetrain.time import Records
+
     benchmark.group = MINUTE
     model()
-    found = benchmark.pedantic(run, args=(60.0, STEP), kwargs={"every": 20, "lowpass": True}, rounds=1)
+    records = Records(20, lowpass=True)
+    found = benchmark.pedantic(run, args=(60.0, STEP), kwargs={"records": records}, rounds=1)
     assert found.ledger.error < 1e-6 and found.momentum < 1e-6
     note = f"{found.steps} steps, 15 terms of the mesh stiffness, records low-passed to 1 kHz; "
     note += f"energy balance {found.ledger.error:.0e}; time of the process"

@@ -52,9 +52,9 @@ def main(
         Whether to vary the assumed inputs of the published set.
     """
     from femgear.report.draw import write_pictures
+    from femgear.trains.drivetrain.checks import case_model, check_spectrum
     from femgear.trains.drivetrain.results import describe_drivetrain, describe_spectrum, describe_transient
     from femgear.trains.drivetrain.section import need_drivetrain
-    from femgear.trains.drivetrain.setup import case_model, check_spectrum
     from femgear.trains.drivetrain.stages import (
         DRIVETRAIN,
         solve_drivetrain_modes,

@@ -63,8 +63,7 @@ def separating_start(case, model, *, steps: int):
     The second is None where the linear motion outgrows the numbers.
     """
     from femgear.errors import ConvergenceError
-    from femgear.trains.drivetrain.section import settle_time
-    from femgear.trains.drivetrain.setup import torque_histories
+    from femgear.trains.drivetrain.section import settle_time, torque_histories
     from femgear.trains.drivetrain.time import march_drivetrain
 
     s, torques = case.simulation, torque_histories(case, model.ratio)

@@ -206,7 +206,7 @@ def test_modes_have_the_numbers_of_the_table(tmp_path, monkeypatch):
     import xarray as xr
 
     from femgear.trains.drivetrain import scene
-    from femgear.trains.drivetrain.setup import case_model
+    from femgear.trains.drivetrain.checks import case_model
 
     model, drawn = case_model(read_case(CASE)), []
     monkeypatch.setattr(scene, "drivetrain_pictures", lambda views, **_: drawn.extend(views))

@@ -16,15 +16,17 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.run import report_again, run_case
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.storage.results import run_folder
+from femgear.trains.drivetrain.checks import BENDING, TORSIONAL, case_model, check_spectrum
 from femgear.trains.drivetrain.figures import spectrum_figures
 from femgear.trains.drivetrain.model import balanced_torque, drivetrain_problem
-from femgear.trains.drivetrain.results import describe_drivetrain, describe_transient
+from femgear.trains.drivetrain.results import MeshLine, describe_drivetrain, describe_transient
 from femgear.trains.drivetrain.section import DrivetrainCase
-from femgear.trains.drivetrain.setup import BENDING, TORSIONAL, case_model, check_spectrum
-from femgear.trains.drivetrain.spectra import MeshLine, line_amplitudes, mesh_lines, resolved_lines
 from femgear.trains.drivetrain.stages import (
     DRIVETRAIN,
     _check_sense,
+    line_amplitudes,
+    mesh_lines,
+    resolved_lines,
     solve_drivetrain_modes,
     solve_spectrum,
     solve_transient_run,

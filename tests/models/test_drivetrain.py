@@ -36,8 +36,8 @@ from femgear.trains.drivetrain.model import (
     torsional_matrices,
     torsional_model,
 )
-from femgear.trains.drivetrain.spectra import averaged_spectrum
-from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.drivetrain.stages import averaged_spectrum
+from femgear.trains.drivetrain.time import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 SHORT_CUT = ChainShaft("rotor", "generator", 3.0, 1e6, 1e6)
@@ -180,7 +180,7 @@ def test_turning_directions_against_the_carrier_frame():
     start[model.index("sun: x")] = 1e-5
     times = np.linspace(0.0, 0.05, 101)
     run = march_drivetrain(
-        model, (), duration=0.05, step=2.5e-6, every=200, speed=speed,
+        model, (), duration=0.05, step=2.5e-6, records=Records(200), speed=speed,
         start=(start, 0.0 * start), outputs=("sun: x", "sun: y", "carrier: x"),
     )  # fmt: skip
     from scipy.linalg import expm

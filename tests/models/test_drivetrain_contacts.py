@@ -23,7 +23,7 @@ from femgear.trains.drivetrain.model import (
     drivetrain_problem,
     torsional_model,
 )
-from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.drivetrain.time import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 ALPHA, RADIUS = math.radians(20.0), 0.0345
@@ -168,7 +168,7 @@ def test_reversed_torque_against_an_adaptive_integrator():
             constant_torques(back),
             duration=0.02,
             step=1e-4 / n,
-            every=n,
+            records=Records(n),
             speed=20.0,
             start=start,
             outputs=model.system.dofs,
@@ -209,7 +209,8 @@ def test_thinned_records_are_those_of_all_steps():
     model = drivetrain_model(TRAIN)
     options = {"duration": 0.2, "step": 1e-4, "speed": 0.63, "start": "zero", "contact_loss": True}
     every, tenth = (
-        march_drivetrain(model, constant_torques(paper_torques()), every=n, **options) for n in (1, 10)
+        march_drivetrain(model, constant_torques(paper_torques()), records=Records(n), **options)
+        for n in (1, 10)
     )
     assert np.array_equal(every.force[::10], tenth.force)
     assert np.array_equal(every.approach[::10], tenth.approach)

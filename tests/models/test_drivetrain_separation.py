@@ -25,7 +25,13 @@ from femgear.trains.drivetrain.model import (
     mesh_force,
     torsional_model,
 )
-from femgear.trains.drivetrain.time import _across_borders, march_drivetrain, one_sided, solve_contact
+from femgear.trains.drivetrain.time import (
+    Records,
+    _across_borders,
+    march_drivetrain,
+    one_sided,
+    solve_contact,
+)
 
 K, BACKLASH = 2e8, 1e-4
 
@@ -135,7 +141,7 @@ def parting(build):
 
 def marched(model, torques, speed, _, *, step, every=1, duration, start="zero"):
     return march_drivetrain(
-        model, constant_torques(torques), duration=duration, step=step, every=every, speed=speed,
+        model, constant_torques(torques), duration=duration, step=step, records=Records(every), speed=speed,
         start=start, outputs=model.system.dofs, contact_loss=True,
     )  # fmt: skip
 
@@ -268,7 +274,7 @@ def test_books_balance_through_torque_reversals():
     balanced, times = paper_torques(balanced=True), [0.0, 0.3, 0.6, 0.9]
     waves = [TorqueHistory(body, times, np.array([1.0, -1.0, 1.0, -1.0]) * t) for body, t in balanced.items()]
     run = march_drivetrain(
-        model, waves, duration=1.0, step=1e-4, speed=PRINTED.speed, contact_loss=True, every=10
+        model, waves, duration=1.0, step=1e-4, speed=PRINTED.speed, contact_loss=True, records=Records(10)
     )
     assert run.ledger.error < 1e-9 and run.momentum < 1e-9
     assert run.pulling.min() > 0.1 and run.lost.min() > 0.05
@@ -285,7 +291,7 @@ def test_growth_of_separating_meshes_is_that_of_their_tangents():
     for extra in (0.0, 1e-4):
         runs.append(
             march_drivetrain(
-                model, torques, duration=16_000 * step, step=step, speed=2.0 * w / 20, every=20,
+                model, torques, duration=16_000 * step, step=step, speed=2.0 * w / 20, records=Records(20),
                 start=(q, v * (1.0 + extra)), contact_loss=True,
             )
         )  # fmt: skip

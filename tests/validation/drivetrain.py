@@ -34,7 +34,7 @@ from femgear.trains.drivetrain.model import (
     torsional_matrices,
     torsional_model,
 )
-from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.drivetrain.time import Records, march_drivetrain
 from validation.rows import Row, at_most, information, printed, within
 from validation.timoshenko import free_bending
 
@@ -209,7 +209,7 @@ def _balances(duration: float) -> tuple[Row, ...]:
     run = march_drivetrain(
         model, constant_torques(paper_torques()), duration=duration, step=5e-5, speed=PRINTED.speed,
         start="zero",
-        every=200,
+        records=Records(200),
     )  # fmt: skip
     text = f"36 dof, {duration:g} s in steps of 50 µs:"
     return (

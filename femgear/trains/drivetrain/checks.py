@@ -1,19 +1,23 @@
-"""Checks of a drivetrain: loose motions, frequencies that lie too far apart, and which body drives a stage.
+"""Model of a drivetrain case, its loaded flanks, and checks of what a run can represent.
 
-A motion that nothing holds is found whatever the sizes of springs and inertias; natural frequencies may not
-lie further apart than double precision resolves beside the free spin. The driver of every gear stage, and
-with it the loaded flanks, follows from statics under the given torques.
+The driver of every gear stage, and with it the loaded flanks, follows from statics under the mean torques. A
+motion that nothing holds is found whatever the sizes of springs and inertias; natural frequencies may not lie
+further apart than double precision resolves beside the free spin. Runs are refused, by stage, whose steps,
+records or spectra cannot follow the speeds at which the rigid chain turns under its torques.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femgear.case.units import FREQUENCY, SPEED
 from femgear.errors import CaseError
+from femgear.storage.dataset import RPM
+from femgear.system.series import FourierSeries
 from femgear.trains.drivetrain.data import ChainBearing, ChainShaft, Drivetrain, MeshWave, TorqueHistory
 from femgear.trains.drivetrain.model import (
     DrivetrainModel,
@@ -22,8 +26,29 @@ from femgear.trains.drivetrain.model import (
     rigid_rotation,
     torsional_model,
 )
-from femgear.trains.drivetrain.section import DrivetrainCase
-from femgear.trains.drivetrain.time import static_deviations
+from femgear.trains.drivetrain.section import (
+    FASTEST_RATE,
+    DrivetrainCase,
+    drivetrain_of,
+    record_problems,
+    settle_time,
+    spectrum_problems,
+    torque_histories,
+)
+from femgear.trains.drivetrain.time import PASS_BAND, static_deviations
+
+BENDING, TORSIONAL = "with bending", "torsional"
+# Slower instants, over the mean speed, would need records of endless length over a turn.
+SLOWEST = 0.05
+
+# Steps a period that can follow a mesh at all, and well: average acceleration lowers its frequency by
+# (2 pi / steps)^2 / 12, 21 % for four, 0.4 % for thirty.
+# Not enough where modes lie far above the mesh lines: see `mesh_mode`.
+LEAST_STEPS, GOOD_STEPS = 4, 30
+# Records that nobody chose keep this multiple of the highest mesh frequency, and come this often [Hz].
+KEPT_HARMONIC, LEAST_RECORD_RATE = 3, 1000.0
+# Share of its strain energy that a mode has in the meshes where they drive it noticeably.
+MESH_SHARE = 0.1
 
 # Stiffness of a motion over that of its coordinates alone; a chain of 1500 coordinates keeps 1e-10.
 _NOT_RESISTED = 1e-12
@@ -34,6 +59,394 @@ _MOVED, _NAMED = 1e-3, 6
 _NO_FORCE = 1e-6
 # Torsional stiffness that stands for a rigid shaft, over that of the stiffest mesh.
 _RIGID = 1e3
+
+
+def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
+    """Model of a case, its loaded flanks those that the mean torques press together.
+
+    Raises
+    ------
+    CaseError
+        Stages that leave no single spin (E-KINEMATICS), mesh directions that cannot turn (E-TURNING).
+    """
+    build = drivetrain_model if variant == BENDING else torsional_model
+    options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
+    try:
+        train = drivetrain_of(case)
+        torques = torque_histories(case, speed_ratios(train))
+        return build(with_drivers(train, torques, duration=case.simulation.duration), **options)
+    except CaseError as error:
+        raise _located(error, case) from None
+
+
+def _located(error: CaseError, case: DrivetrainCase) -> CaseError:
+    """The error of a model in terms of the case file."""
+    if error.code == "E-TURNING":
+        error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
+    error.file = case.location(error.key or "")
+    return error
+
+
+def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
+    """The drivetrain with the driver of every stage that the torques make drive.
+
+    The torques, as means over the run, and the inertia forces of the acceleration of the free spin that they
+    give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so that
+    the load of parallel paths follows their stiffness. Weight does not count.
+
+    Parameters
+    ----------
+    train : Drivetrain
+        Stages whose driver is given keep it.
+    torques : sequence of TorqueHistory
+    duration : float
+        Of the run [s].
+
+    Returns
+    -------
+    Drivetrain
+        A stage without load on its flanks, and one that its first body (the carrier) drives, stay as they
+        are.
+
+    Raises
+    ------
+    CaseError
+        A duration that is not above zero (E-RANGE), a torque on no body (E-DRIVETRAIN), stages that leave no
+        single spin (E-KINEMATICS).
+    """
+    if not (np.isfinite(duration) and duration > 0.0):
+        raise CaseError(f"a run of {duration} s", code="E-RANGE", key="duration", limit="above 0 s, finite")
+    stages = (*train.planetary, *train.parallel)
+    if not torques or all(one.driver is not None for one in stages):
+        return train
+    force = _stage_forces(train, torques, duration)
+    found = [
+        replace(one, driver=one.ends[1]) if one.driver is None and value < 0.0 else one
+        for one, value in zip(stages, force)
+    ]
+    planets = len(train.planetary)
+    return replace(train, planetary=tuple(found[:planets]), parallel=tuple(found[planets:]))
+
+
+def speed_ratios(train: Drivetrain) -> dict[str, float]:
+    """Speed of every body over that of the first one.
+
+    Raises
+    ------
+    CaseError
+        Stages that leave no single spin (E-KINEMATICS).
+    """
+    place = coordinates_of(train)
+    spin = rigid_rotation(train, place)
+    return {name: float(spin[first + 4]) for name, first in place.body.items()}
+
+
+def mean_torque(history: TorqueHistory, duration: float) -> float:
+    """Mean of a torque from 0 to `duration` [N m], exact."""
+    inside = history.times[(history.times > 0.0) & (history.times < duration)]
+    times = np.concatenate([[0.0], inside, [duration]])
+    return float(np.trapezoid(history.at(times), times) / duration)
+
+
+def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration: float) -> np.ndarray:
+    """Sum of the mean mesh forces of every stage [N]; zero where they are rounding."""
+    model = torsional_model(_elastic(train), harmonics=0, turning=False)
+    W, k, carried = model.system.W, model.mean_stiffness, model.system.M @ model.rigid
+    force = np.zeros((len(k), len(torques)))
+    for column, one in enumerate(torques):
+        load = np.zeros(len(carried))
+        load[model.index(f"{one.body}: rotation")] = mean_torque(one, duration)
+        load -= carried * (model.rigid @ load) / model.inertia
+        force[:, column] = k * (W.T @ static_deviations(model, W, k, load))
+    sums = np.zeros((len(train.planetary) + len(train.parallel), len(torques)))
+    np.add.at(sums, model.geometry.stage, force)
+    total = sums.sum(axis=1)
+    # the model's flanks are those of the drivers that are given
+    default = [one.flank for one in (*train.planetary, *train.parallel)]
+    return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)
+
+
+def _elastic(train: Drivetrain) -> Drivetrain:
+    """The chain without damping, shafts that do not twist made stiff: a torque may act on either end."""
+    meshes = [one.mesh.stiffness * one.first_radius**2 for one in train.parallel]
+    meshes += [one.ring_mesh.stiffness * one.ring_radius**2 for one in train.planetary]
+    torsion = _RIGID * max(meshes, default=1.0)
+    shafts = tuple(
+        replace(one, torsion=torsion) if not one.elements and math.isinf(one.springs.torsion) else one
+        for one in train.shafts
+    )
+    return replace(train, shafts=shafts, damping_ratio=0.0)
+
+
+@dataclass(frozen=True)
+class SpeedRange:
+    """Speeds of the free spin over a run: first, last, lowest, highest and mean over time [rad/s]."""
+
+    first: float
+    last: float
+    lowest: float
+    highest: float
+    mean: float
+
+    @property
+    def fastest(self) -> float:
+        """Largest speed in either sense [rad/s]."""
+        return max(abs(self.lowest), abs(self.highest))
+
+
+def speed_range(
+    model: DrivetrainModel,
+    torques: Sequence[TorqueHistory],
+    *,
+    duration: float,
+    speed: float,
+    start: float = 0.0,
+) -> SpeedRange:
+    """Speeds of the first body as the rigid chain turns under its torques.
+
+    Newton's law of the rigid chain, d omega / dt = sum(ratio_b T_b(t)) / I with its inertia I about the axis
+    of the first body. Torques are linear between their instants, so that the speed there is a sum of
+    trapezoids, and a parabola in between with its vertex where the sum is zero.
+
+    Parameters
+    ----------
+    model : DrivetrainModel
+    torques : sequence of TorqueHistory
+    duration : float
+        [s]
+    speed : float
+        Of the first body at time zero [rad/s].
+    start : float
+        The range is that from here to the end [s].
+
+    Returns
+    -------
+    SpeedRange
+    """
+    instants = np.concatenate([[0.0, start, duration], *(one.times for one in torques)])
+    times = np.unique(np.clip(instants, 0.0, duration))
+    power = sum((model.ratio[one.body] * one.at(times) for one in torques), np.zeros(len(times)))
+    rate, step = power / model.inertia, np.diff(times)
+    speeds = speed + np.append(0.0, np.cumsum(0.5 * step * (rate[1:] + rate[:-1])))
+    begin = int(np.searchsorted(times, start))
+    rate, step, speeds = rate[begin:], step[begin:], speeds[begin:]
+    middle = speeds[:-1] + step * (3.0 * rate[:-1] + rate[1:]) / 8.0
+    # simpson's rule, exact for parabolas
+    mean = step @ (speeds[:-1] + 4.0 * middle + speeds[1:]) / (6.0 * step.sum())
+    turning = np.flatnonzero(rate[1:] * rate[:-1] < 0.0)
+    vertex = rate[turning] ** 2 / (rate[turning] - rate[turning + 1]) * step[turning]
+    every = np.append(speeds, speeds[turning] + 0.5 * vertex)
+    return SpeedRange(*map(float, (speeds[0], speeds[-1], every.min(), every.max(), mean)))
+
+
+def case_speeds(case: DrivetrainCase, model: DrivetrainModel) -> SpeedRange:
+    """Speeds of the first body over the run, without its deviation."""
+    torques = torque_histories(case, model.ratio)
+    return speed_range(model, torques, duration=case.simulation.duration, speed=case.operation.speed)
+
+
+def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:
+    """Steps a record: as given, or what the highest mesh frequency of the run asks for."""
+    s = case.simulation
+    record = s.record
+    if record is None:
+        record = default_record_rate(s.rate, highest_mesh(model, case_speeds(case, model).fastest)[1])
+    return max(1, round(s.rate / record))
+
+
+def record_rate(case: DrivetrainCase, model: DrivetrainModel) -> float:
+    """Records a second [Hz]; see `record_every`."""
+    return case.simulation.rate / record_every(case, model)
+
+
+def highest_mesh(model: DrivetrainModel, speed: float) -> tuple[str, float]:
+    """Name and frequency [Hz] of the fastest mesh at a speed of the first body; none, 0 without gears."""
+    bases = np.unique(model.mesh_base)
+    if not len(bases):
+        return "none", 0.0
+    hertz = model.frequencies(abs(speed))[bases] / (2.0 * math.pi)
+    return model.bases[bases[np.argmax(hertz)]], float(hertz.max())
+
+
+def mesh_mode(model: DrivetrainModel, limit: float) -> float:
+    """Frequency of the highest mode that the meshes drive noticeably [Hz]; 0 where there is none.
+
+    Modes at standstill with mean mesh stiffnesses; the share of the meshes in the strain energy of a mode
+    ``phi`` is ``sum(k (w^T phi)^2) / omega^2`` (R. G. Parker and J. Lin, J. Vib. Acoust. 126, 2004, 68-76).
+
+    Parameters
+    ----------
+    model : DrivetrainModel
+    limit : float
+        The highest line of the mesh stiffness [Hz]; modes above answer it as springs do, without resonance.
+    """
+    from scipy import linalg
+
+    if not len(model.meshes):
+        return 0.0
+    rows, stiffness = model.system.W, model.mean_stiffness
+    total = model.system.K + (rows * stiffness) @ rows.T
+    values, shapes = linalg.eigh(total, model.system.M)
+    # the free spin is the first
+    values, shapes = np.maximum(values[1:], 0.0), shapes[:, 1:]
+    hertz = np.sqrt(values) / (2.0 * math.pi)
+    driven = stiffness @ (rows.T @ shapes) ** 2 > MESH_SHARE * values
+    return float(hertz[driven & (hertz <= limit)].max(initial=0.0))
+
+
+def frequency_shift(hertz: float, rate: float) -> float:
+    """Share by which average acceleration lowers a natural frequency [Hz] at so many steps a second [Hz].
+
+    ``tan(Omega h / 2) = omega h / 2`` for the frequency Omega that the steps have, so that the share is
+    ``(omega h)^2 / 12`` for short steps (T. J. R. Hughes, The Finite Element Method, 1987, section 9.3).
+    """
+    half = math.pi * hertz / rate
+    return 1.0 - math.atan(half) / half if half > 0.0 else 0.0
+
+
+def shift_rate(hertz: float, share: float) -> float:
+    """Steps a second [Hz] that lower a natural frequency [Hz] by this small share or a little less."""
+    return math.pi * hertz / math.sqrt(3.0 * share)
+
+
+def default_record_rate(rate: float, highest: float) -> float:
+    """Records a second where none are given: few, but with the third harmonic of the highest mesh.
+
+    Parameters
+    ----------
+    rate : float
+        Steps a second [Hz].
+    highest : float
+        Highest mesh frequency of the run [Hz].
+
+    Returns
+    -------
+    float
+        The rate over the largest whole number for which the pass band of the records holds that harmonic and
+        there are 1000 a second; at most the rate.
+    """
+    # a hair more, so that rounding of the speed does not push the harmonic out
+    needed = max(LEAST_RECORD_RATE, 2.0 * KEPT_HARMONIC * highest * (1.0 + 1e-6) / PASS_BAND)
+    return rate / max(1, math.floor(rate / needed * (1.0 + 1e-12)))
+
+
+def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
+    """Refuse what the stages cannot represent, before anything is computed.
+
+    Raises
+    ------
+    CaseError
+        As `case_model`; bodies that nothing holds across their axis or against tilting (E-MECHANISM);
+        natural frequencies too far apart for double precision (E-SPREAD); steps that cannot follow the
+        meshes (E-RATE); records that are too many (E-RANGE).
+    """
+    try:
+        count, names = loose_motions(drivetrain_of(case), turning=case.simulation.turning)
+    except CaseError as error:
+        raise _located(error, case) from None
+    if count:
+        raise CaseError(
+            f"nothing holds {count} motion{'s' if count > 1 else ''}, such as {', '.join(names[:3])}",
+            code="E-MECHANISM", key="bearing", file=case.location("bearing"),
+            limit="bearings and shafts that leave the common rotation alone free",
+            remedy="add a [[bearing]] or its stiffness, or tilts = false",
+        )  # fmt: skip
+    check_spread(case, drivetrain_of(case))
+    model = case_model(case)
+    _check_stiffness(case, model)
+    _check_rate(case, model)
+    if case.simulation.record is None:
+        for problem in record_problems(case, record_rate(case, model)):
+            problem.file = case.location(problem.key)
+            raise problem
+    return model
+
+
+def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
+    """Refuse what has no spectra: the stage is not asked for by every run.
+
+    Raises
+    ------
+    CaseError
+        Records that are too few, a resolution that they do not have (E-RANGE); no meshes, or a first body
+        that nearly stops or turns back in the part that the spectra take (E-SPECTRUM).
+    """
+    if not len(model.meshes):
+        raise CaseError(
+            "the chain has no gears, and therefore no mesh forces",
+            code="E-SPECTRUM",
+            limit="one mesh or more",
+        )
+    for problem in spectrum_problems(case, record_rate(case, model)):
+        problem.file = case.location(problem.key)
+        raise problem
+    s = case.simulation
+    late = speed_range(
+        model, torque_histories(case, model.ratio), duration=s.duration, speed=case.operation.speed,
+        start=settle_time(case),
+    )  # fmt: skip
+    try:
+        check_turning(late.lowest, late.mean)
+    except CaseError as error:
+        error.file = case.location(error.key)
+        raise
+
+
+def check_turning(lowest: float, mean: float) -> None:
+    """Refuse speeds of the first body [rad/s] at which a turn takes endless records (E-SPECTRUM)."""
+    if not lowest > SLOWEST * mean or not mean > 0.0:
+        raise CaseError(
+            f"the first body nearly stops or turns back: {lowest / RPM:.6g} rpm at the slowest, "
+            f"{mean / RPM:.6g} rpm in the mean; there are no orders",
+            code="E-SPECTRUM", key="operation.torque",
+            limit=f"never slower than {SLOWEST:.0%} of its mean speed where spectra are taken",
+            remedy="give torques that keep it turning, or write --only transient",
+        )  # fmt: skip
+
+
+def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
+    """Refuse meshes whose cut series turns negative: no real mesh pushes the other way."""
+    if not len(model.meshes):
+        return
+    phase = 2.0 * math.pi * np.arange(4096)[:, None] / 4096
+    least = np.array(FourierSeries(model.stiffness).at(phase)).min(axis=0)
+    wrong = np.flatnonzero(least <= 0.0)
+    if not len(wrong):
+        return
+    keys = []
+    for i, one in enumerate(model.train.planetary):
+        for which in ("sun_mesh", "ring_mesh"):
+            keys += [f"planetary[{i}].{which}.low_share"] * len(one.planet_angles)
+    keys += [f"parallel[{i}].mesh.low_share" for i in range(len(model.train.parallel))]
+    key = keys[wrong[0]]
+    raise CaseError(
+        f"the series of the stiffness of {model.meshes[wrong[0]]} falls to {least[wrong[0]]:.3g} N/m: with "
+        f"{case.simulation.harmonics} terms it overshoots the jump by about 9 %",
+        code="E-STIFFNESS", key=key, file=case.location(key), limit="above 0 N/m at any time",
+        remedy="give a larger low_share",
+    )  # fmt: skip
+
+
+def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
+    speeds, rate = case_speeds(case, model), case.simulation.rate
+    name, hertz = highest_mesh(model, speeds.fastest)
+    if rate >= LEAST_STEPS * hertz:
+        return
+    first = case.body[0].name
+    good = FREQUENCY.show(GOOD_STEPS * hertz)
+    key, value, remedy = "simulation.rate", FREQUENCY.show(rate), f"take {good} or more"
+    if LEAST_STEPS * hertz > FASTEST_RATE:
+        remedy = "take a lower speed, or fewer teeth: no simulation.rate is fast enough"
+    if speeds.fastest > 1.01 * speeds.first:
+        key, value = "operation.torque", None
+        remedy = f"give torques that balance (share = 1.0), a shorter duration, or a rate of {good}"
+    raise CaseError(
+        f"{rate / hertz:.3g} steps a period ({FREQUENCY.show(rate)}) cannot follow the {name}, "
+        f"{FREQUENCY.show(hertz)} at {SPEED.show(speeds.fastest)} of {first}",
+        code="E-RATE", key=key, value=value, file=case.location(key),
+        limit=f"{LEAST_STEPS} steps a period at any time: {FREQUENCY.show(LEAST_STEPS * hertz)} or more",
+        remedy=remedy,
+    )  # fmt: skip
 
 
 def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tuple[str, ...]]:
@@ -208,94 +621,3 @@ def _softest(train: Drivetrain) -> tuple[float, tuple[str, str], str]:
                 speed = math.sqrt(sum(springs) / inertia)
                 found.append((speed, (f"bearing[{first}].{kind}", body.name), f"{max(springs):g} {unit}"))
     return min(found)
-
-
-def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
-    """The drivetrain with the driver of every stage that the torques make drive.
-
-    The torques, as means over the run, and the inertia forces of the acceleration of the free spin that they
-    give (d'Alembert's principle) act on the chain with held axes and mean mesh stiffnesses: statics, so that
-    the load of parallel paths follows their stiffness. Weight does not count.
-
-    Parameters
-    ----------
-    train : Drivetrain
-        Stages whose driver is given keep it.
-    torques : sequence of TorqueHistory
-    duration : float
-        Of the run [s].
-
-    Returns
-    -------
-    Drivetrain
-        A stage without load on its flanks, and one that its first body (the carrier) drives, stay as they
-        are.
-
-    Raises
-    ------
-    CaseError
-        A duration that is not above zero (E-RANGE), a torque on no body (E-DRIVETRAIN), stages that leave no
-        single spin (E-KINEMATICS).
-    """
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise CaseError(f"a run of {duration} s", code="E-RANGE", key="duration", limit="above 0 s, finite")
-    stages = (*train.planetary, *train.parallel)
-    if not torques or all(one.driver is not None for one in stages):
-        return train
-    force = _stage_forces(train, torques, duration)
-    found = [
-        replace(one, driver=one.ends[1]) if one.driver is None and value < 0.0 else one
-        for one, value in zip(stages, force)
-    ]
-    planets = len(train.planetary)
-    return replace(train, planetary=tuple(found[:planets]), parallel=tuple(found[planets:]))
-
-
-def speed_ratios(train: Drivetrain) -> dict[str, float]:
-    """Speed of every body over that of the first one.
-
-    Raises
-    ------
-    CaseError
-        Stages that leave no single spin (E-KINEMATICS).
-    """
-    place = coordinates_of(train)
-    spin = rigid_rotation(train, place)
-    return {name: float(spin[first + 4]) for name, first in place.body.items()}
-
-
-def mean_torque(history: TorqueHistory, duration: float) -> float:
-    """Mean of a torque from 0 to `duration` [N m], exact."""
-    inside = history.times[(history.times > 0.0) & (history.times < duration)]
-    times = np.concatenate([[0.0], inside, [duration]])
-    return float(np.trapezoid(history.at(times), times) / duration)
-
-
-def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration: float) -> np.ndarray:
-    """Sum of the mean mesh forces of every stage [N]; zero where they are rounding."""
-    model = torsional_model(_elastic(train), harmonics=0, turning=False)
-    W, k, carried = model.system.W, model.mean_stiffness, model.system.M @ model.rigid
-    force = np.zeros((len(k), len(torques)))
-    for column, one in enumerate(torques):
-        load = np.zeros(len(carried))
-        load[model.index(f"{one.body}: rotation")] = mean_torque(one, duration)
-        load -= carried * (model.rigid @ load) / model.inertia
-        force[:, column] = k * (W.T @ static_deviations(model, W, k, load))
-    sums = np.zeros((len(train.planetary) + len(train.parallel), len(torques)))
-    np.add.at(sums, model.geometry.stage, force)
-    total = sums.sum(axis=1)
-    # the model's flanks are those of the drivers that are given
-    default = [one.flank for one in (*train.planetary, *train.parallel)]
-    return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)
-
-
-def _elastic(train: Drivetrain) -> Drivetrain:
-    """The chain without damping, shafts that do not twist made stiff: a torque may act on either end."""
-    meshes = [one.mesh.stiffness * one.first_radius**2 for one in train.parallel]
-    meshes += [one.ring_mesh.stiffness * one.ring_radius**2 for one in train.planetary]
-    torsion = _RIGID * max(meshes, default=1.0)
-    shafts = tuple(
-        replace(one, torsion=torsion) if not one.elements and math.isinf(one.springs.torsion) else one
-        for one in train.shafts
-    )
-    return replace(train, shafts=shafts, damping_ratio=0.0)

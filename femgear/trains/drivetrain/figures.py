@@ -21,9 +21,10 @@ from matplotlib.figure import Figure
 from femgear.report.frequency import campbell
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
 from femgear.storage.dataset import RPM
+from femgear.trains.drivetrain.checks import case_model
 from femgear.trains.drivetrain.data import Drivetrain, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel, coordinates_of, free_coordinates
-from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, symbols
+from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, pass_band, separating, symbols
 from femgear.trains.drivetrain.time import PASS_BAND
 from femgear.trains.protocol import Drawn, Figures
 
@@ -450,7 +451,7 @@ def transient_figures(data: xr.Dataset) -> dict:
     }
     if meshes:
         contact = "linear meshes keep contact"
-        if separates(data):
+        if separating(data):
             contact = f"meshes part, for up to {float(data['lost'].max()):.2%} of the time"
         notes = (contact, passed, passed and "least and largest force of all steps in the table")
         figures["transient_forces"] = _signals(
@@ -472,15 +473,7 @@ def _signals(data: xr.Dataset, name: str, columns, titles, **options):
 
 def _pass_band(data: xr.Dataset) -> str:
     """What the low pass of the records of transient.nc leaves."""
-    attrs = data.attrs
-    if attrs["filter"] == "none":
-        return ""
-    return f"low-passed to {0.5 * PASS_BAND / (attrs['step'] * attrs['every']):.4g} Hz"
-
-
-def separates(data: xr.Dataset) -> bool:
-    """Whether the meshes of transient.nc part and meet their back flanks."""
-    return data.attrs.get("contact") == "separating"
+    return "" if data.attrs["filter"] == "none" else f"low-passed to {pass_band(data):.4g} Hz"
 
 
 def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> dict:
@@ -799,16 +792,12 @@ def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count
 
 
 def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
-    from femgear.trains.drivetrain.setup import case_model
-
     model = case_model(drawn.case)
     figures = {"stiffness_series": stiffness_figure(model)} if len(model.meshes) else {}
     return figures | {"campbell": campbell_figure(drawn.data["modes"])}
 
 
 def _write_modes(drawn: Drawn, folder: Path) -> list[str]:
-    from femgear.trains.drivetrain.setup import case_model
-
     count = drawn.case.simulation.modes
     return mode_pictures(folder, case_model(drawn.case), drawn.data["modes"], count)
 
