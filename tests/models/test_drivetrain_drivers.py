@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drivetrain_references import torsional_matrices
 from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivetrain
 
 from femgear.errors import CaseError
@@ -31,7 +32,6 @@ from femgear.trains.drivetrain.data import (
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
-    torsional_matrices,
     torsional_model,
 )
 from femgear.trains.drivetrain.section import drivetrain_of

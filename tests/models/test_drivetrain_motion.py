@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drivetrain_references import mesh_force
 from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
@@ -131,8 +132,6 @@ def test_backlash_takes_the_pulling_forces_away():
         problem = drivetrain_problem(model, torques=paper_torques(), separates=separates)
         run = solve_transient(problem, model.frequencies(0.6), times, start=(zero, zero), step=2e-4)
         assert run.converged
-        from femgear.trains.drivetrain.model import mesh_force
-
         stage = problem.elements[1]
         x = (run.deflection[:, stage.columns] * stage.fixed).sum(axis=-1)
         k = stage.stiffness.at(times[:, None] * model.frequencies(0.6))

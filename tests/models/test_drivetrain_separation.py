@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drivetrain_references import mesh_force
 from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 
 from femgear.errors import CaseError
@@ -22,7 +23,6 @@ from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
     drivetrain_problem,
-    mesh_force,
     torsional_model,
 )
 from femgear.trains.drivetrain.time import (

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from drivetrain_references import torsional_matrices
 from published.wind_turbine_drivetrain import (
     PRINTED,
     RADII_TEETH,
@@ -31,7 +32,6 @@ from femgear.trains.drivetrain.model import (
     drivetrain_model,
     planar_of,
     rectangular_series,
-    torsional_matrices,
     torsional_model,
 )
 from femgear.trains.drivetrain.time import Records, march_drivetrain
