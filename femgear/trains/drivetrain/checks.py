@@ -357,8 +357,7 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
     _check_rate(case, model)
     if case.simulation.record is None:
         for problem in record_problems(case, record_rate(case, model)):
-            problem.file = case.location(problem.key)
-            raise problem
+            raise _located(problem, case)
     return model
 
 
@@ -378,8 +377,7 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
             limit="one mesh or more",
         )
     for problem in spectrum_problems(case, record_rate(case, model)):
-        problem.file = case.location(problem.key)
-        raise problem
+        raise _located(problem, case)
     s = case.simulation
     late = speed_range(
         model, torque_histories(case, model.ratio), duration=s.duration, speed=case.operation.speed,
@@ -388,8 +386,7 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
     try:
         check_turning(late.lowest, late.mean)
     except CaseError as error:
-        error.file = case.location(error.key)
-        raise
+        raise _located(error, case) from None
 
 
 def check_turning(lowest: float, mean: float) -> None:
@@ -549,6 +546,7 @@ def _shaft(one: ChainShaft, arm: float) -> ChainShaft:
     # a slender shaft of 12 E I / l^3 = 1 N/m
     diameter = 0.1 * one.length
     modulus = one.length**3 / (12.0 * math.pi * diameter**4 / 64.0)
+    assert one.section is not None  # elements need one
     section = replace(one.section, outer_diameter=diameter, inner_diameter=0.0, young=modulus)
     return replace(one, section=section)
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.shaft import JointSprings, ShaftSection, joint_springs
+from femgear.system.shaft import JointSprings, ShaftSection, beam_element, joint_springs
 
 # Stiffness against the spin, over that of the rotations, that is rounding.
 _FREE = 1e-9
@@ -107,14 +107,22 @@ class ChainShaft:
     @property
     def springs(self) -> JointSprings:
         """Of the joint."""
-        own = None if self.section is None else joint_springs(self.section, self.length)
-        bending = own.bending if self.bending is None else self.bending
-        torsion = own.torsion if self.torsion is None else self.torsion
-        shear = self.shear
+        bending, torsion, shear = self.bending, self.torsion, self.shear
+        if self.section is not None:
+            own = joint_springs(self.section, self.length)
+            shear = own.shear if bending is None and shear is None else shear
+            bending = own.bending if bending is None else bending
+            torsion = own.torsion if torsion is None else torsion
+        assert bending is not None and torsion is not None  # or there is a section
         if shear is None:
-            exact = own is not None and self.bending is None
-            shear = own.shear if exact else 12.0 * bending / ((1.0 + self.shear_ratio) * self.length**2)
+            shear = 12.0 * bending / ((1.0 + self.shear_ratio) * self.length**2)
         return JointSprings(bending, torsion, shear)
+
+    @property
+    def element_matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Mass, stiffness, and gyroscopic matrix per unit speed, of one element (10, 10)."""
+        assert self.section is not None  # elements need one
+        return beam_element(self.section, self.length / self.elements)
 
 
 @dataclass(frozen=True)
@@ -409,7 +417,7 @@ class TorqueHistory:
 
 def constant_torques(torques: dict[str, float]) -> tuple[TorqueHistory, ...]:
     """Histories of constant torques on bodies [N m]."""
-    return tuple(TorqueHistory(body, [0.0], [value]) for body, value in torques.items())
+    return tuple(TorqueHistory(body, np.zeros(1), np.array([value])) for body, value in torques.items())
 
 
 def numbered(names: Sequence[str]) -> list[str]:

@@ -121,7 +121,7 @@ def panels(
     rows, gap = -(-len(titles) // columns), _SHARED if columns == 1 else _GAP
     top, step = _TOP + bool(title) * _TITLE + named * _NAMES, _LEFT + width + _RIGHT
     size = (columns * step, top + rows * height + (rows - 1) * gap + _BOTTOM)
-    figure, axes = Figure(figsize=size, layout="none"), []
+    figure, axes = Figure(figsize=size), []
     for number in range(len(titles)):
         row, column = divmod(number, columns)
         left, bottom = column * step + _LEFT, size[1] - top - row * (height + gap) - height
@@ -790,10 +790,10 @@ def drivetrain_pictures(views: Iterable[ModeView], layout: Layout, *, size: int 
     pv = load_pyvista()
     discs = [_disc(pv, wheel) for wheel in layout.wheels]
     # one window for all: opening it takes as long as drawing
-    plotter = pv.Plotter(off_screen=True, window_size=(size, round(_HEIGHT * size)))
+    plotter = pv.Plotter(off_screen=True, window_size=[size, round(_HEIGHT * size)])
     plotter.enable_anti_aliasing("ssaa")
-    plotter.set_background("white")
-    plotter.enable_parallel_projection()
+    plotter.set_background("white")  # type: ignore[call-arg]
+    plotter.enable_parallel_projection()  # type: ignore[call-arg]
     found = []
     try:
         for view in views:

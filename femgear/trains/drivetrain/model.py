@@ -31,7 +31,7 @@ from femgear.system.elements import positive_part
 from femgear.system.lumped import PlanarBody, PlanarSet
 from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.series import FourierSeries, phase_of
-from femgear.system.shaft import AXES, beam_element, disc_matrices, joint_deflections
+from femgear.system.shaft import AXES, disc_matrices, joint_deflections
 from femgear.system.system import MechanicalSystem
 from femgear.trains.drivetrain.data import (
     ChainBearing,
@@ -104,7 +104,7 @@ class DrivetrainModel:
     @property
     def mean_stiffness(self) -> np.ndarray:
         """(n_meshes,) [N/m]"""
-        return self.stiffness[:, 0].real
+        return np.real(self.stiffness[:, 0])
 
     @property
     def still(self) -> MechanicalSystem:
@@ -151,8 +151,7 @@ def drivetrain_model(
     spin = rigid_rotation(train, place)
     if turning:
         _check_turning(train)
-    M, G = _inertia(train, place, spin)
-    K = _stiffness(train, place)
+    M, K, G = _matrices(train, place, spin)
     T, names = free_coordinates(train, place)
     geometry = mesh_geometry(train, place, spin)
     weight = np.zeros(place.count)
@@ -167,7 +166,7 @@ def drivetrain_model(
     C = np.zeros_like(reduced.C)
     if train.damping_ratio:
         still = replace(reduced, gyroscopic=None)
-        C = modal_damping(still, stiffness[:, 0].real, train.damping_ratio)
+        C = modal_damping(still, np.real(stiffness[:, 0]), train.damping_ratio)
     rigid = np.linalg.lstsq(T, spin, rcond=None)[0]
     load, carried = T.T @ M @ weight, reduced.M @ rigid
     # over a turn the weight of planets that do not balance one another has no moment about the carrier
@@ -231,10 +230,9 @@ def _flanks(
     used = [contacts.columns[j] for j in own]
     order = tuple(int(b == model.mesh_base[meshes[0]]) for b in range(n_bases))
     turn = tuple(int(planetary and b == 2 * stage) for b in range(n_bases))
-    return TurningMeshes(
-        np.array(used), *(np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd)),
-        FourierSeries(model.stiffness[meshes], order), turn, contacts.gap[own], separates,
-    )  # fmt: skip
+    fixed, even, odd = (np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd))
+    stiffness = FourierSeries(model.stiffness[meshes], order)
+    return TurningMeshes(np.array(used), fixed, even, odd, stiffness, turn, contacts.gap[own], separates)
 
 
 def torque_vector(model: DrivetrainModel, torques: dict[str, float]) -> np.ndarray:
@@ -263,21 +261,32 @@ def _check_turning(train: Drivetrain) -> None:
             )  # fmt: skip
 
 
-def _inertia(train: Drivetrain, place: Coordinates, spin: np.ndarray):
-    """Mass (n, n), and gyroscopic matrix per unit speed of the first body."""
-    M, G = np.zeros((2, place.count, place.count))
+def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
+    """Mass and stiffness (n, n) without meshes, and gyroscopic matrix per unit speed of the first body."""
+    M, K, G = np.zeros((3, place.count, place.count))
     for body in train.bodies:
         first = place.body[body.name]
         own, _ = disc_matrices(body.mass, body.inertia, body.transverse_inertia)
         M[first : first + 5, first : first + 5] += own
         _add_gyroscopic(G, first, body.inertia * spin[first + 4])
     for shaft, inner in zip(train.shafts, place.inner):
+        if not shaft.elements:
+            s = shaft.springs
+            K += _springs(joint_rows(place, shaft), [s.shear, s.shear, s.bending, s.bending, s.torsion])
+            continue
         ends = (place.body[shaft.first], *inner, place.body[shaft.second])
-        for one, two in itertools.pairwise(ends) if shaft.elements else ():
+        mass, stiffness, gyroscopic = shaft.element_matrices
+        for one, two in itertools.pairwise(ends):
             at = np.r_[one : one + 5, two : two + 5]
-            mass, _, gyroscopic = beam_element(shaft.section, shaft.length / shaft.elements)
             M[np.ix_(at, at)] += mass
+            K[np.ix_(at, at)] += stiffness
             G[np.ix_(at, at)] += gyroscopic * spin[ends[0] + 4]
+    for bearing in train.bearings:
+        rows = np.zeros((5, place.count))
+        first = bearing_place(train, place, bearing)
+        rows[np.arange(5), first + np.arange(5)] = 1.0
+        rows[0, first + 3], rows[1, first + 2] = bearing.offset, -bearing.offset
+        K += _springs(rows, [bearing.radial] * 2 + [bearing.tilt] * 2 + [bearing.torsion])
     for number, stage in enumerate(train.planetary):
         carrier = place.body[stage.carrier]
         B = lumped_map(stage, place, number)
@@ -289,37 +298,15 @@ def _inertia(train: Drivetrain, place: Coordinates, spin: np.ndarray):
         M[carrier + 3, carrier + 3] += tilt
         polar = n * stage.planet_mass * a**2 * spin[carrier + 4]
         _add_gyroscopic(G, carrier, polar + n * stage.planet_inertia * spin[place.planets[number][0, 2]])
-    return M, G
+        if math.isfinite(stage.planet_bearing):
+            rows = planet_bearing_rows(train, stage, place, number)
+            K += _springs(rows, [stage.planet_bearing] * len(rows))
+    return M, K, G
 
 
 def _add_gyroscopic(G, first: int, momentum: float) -> None:
     G[first + 2, first + 3] += momentum
     G[first + 3, first + 2] -= momentum
-
-
-def _stiffness(train: Drivetrain, place: Coordinates) -> np.ndarray:
-    """Shafts, bearings and planet bearings of finite stiffness."""
-    K = np.zeros((place.count, place.count))
-    for shaft, inner in zip(train.shafts, place.inner):
-        ends = (place.body[shaft.first], *inner, place.body[shaft.second])
-        if shaft.elements:
-            for one, two in itertools.pairwise(ends):
-                at = np.r_[one : one + 5, two : two + 5]
-                K[np.ix_(at, at)] += beam_element(shaft.section, shaft.length / shaft.elements)[1]
-            continue
-        s = shaft.springs
-        K += _springs(joint_rows(place, shaft), [s.shear, s.shear, s.bending, s.bending, s.torsion])
-    for bearing in train.bearings:
-        rows = np.zeros((5, place.count))
-        first = bearing_place(train, place, bearing)
-        rows[np.arange(5), first + np.arange(5)] = 1.0
-        rows[0, first + 3], rows[1, first + 2] = bearing.offset, -bearing.offset
-        K += _springs(rows, [bearing.radial] * 2 + [bearing.tilt] * 2 + [bearing.torsion])
-    for number, stage in enumerate(train.planetary):
-        if math.isfinite(stage.planet_bearing):
-            rows = planet_bearing_rows(train, stage, place, number)
-            K += _springs(rows, [stage.planet_bearing] * len(rows))
-    return K
 
 
 def _springs(rows, stiffness) -> np.ndarray:
@@ -454,7 +441,7 @@ def _eliminated(rows, free, place):
     table = table[np.abs(table).max(axis=1, initial=0.0) > _RANK * size]
     if not len(table):
         return np.eye(place.count)[:, free], tuple(place.names[i] for i in free)
-    _, triangle, order = linalg.qr(table, mode="economic", pivoting=True)
+    _, triangle, order = linalg.qr(table, mode="economic", pivoting=True)  # type: ignore[misc]
     diagonal = np.abs(np.diag(triangle))
     rank = int(np.count_nonzero(diagonal > _RANK * diagonal[0]))
     bound, rest = backwards[order[:rank]], np.sort(backwards[order[rank:]])
@@ -835,7 +822,7 @@ def flank_contacts(
     for whole, part in ((fixed, geometry.fixed), (even, geometry.even), (odd, geometry.odd)):
         whole[..., : len(geometry.fixed), :count] = part
     columns = [np.append(j, _shared(geometry, j)) for j in range(count)]
-    for column, j in enumerate(behind, start=count):
+    for column, j in enumerate(behind.tolist(), start=count):
         stage, own, radial = geometry.stage[j], _shared(geometry, j), [extra[j]] if j in extra else []
         fixed[j, column], fixed[radial, column] = -1.0, 1.0
         if stage < len(planar):

@@ -427,7 +427,7 @@ def _wave(one: MeshSection) -> MeshWave:
 
 
 def _bearing(one: BearingSection) -> ChainBearing:
-    body, other = one.shaft or (one.body, None)
+    body, other = one.shaft or (one.body or "", None)
     return ChainBearing(body, one.radial, one.tilt, one.offset, other=other, station=one.station or 0)
 
 
@@ -461,6 +461,7 @@ def _planetary(one: PlanetarySection) -> PlanetaryStage:
         cosine = math.cos(one.pressure_angle)
         sun, planet = one.sun_base_radius / cosine, one.planet_base_radius / cosine
     else:
+        assert one.sun_radius is not None and one.planet_radius is not None  # one of three ways
         sun, planet = one.sun_radius, one.planet_radius
     same = ("carrier", "sun", "ring_teeth", "sun_teeth", "pressure_angle", "planet_bearing", "driver")
     same += ("planet_mass", "planet_inertia", "planet_transverse_inertia")
@@ -489,7 +490,7 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
     """
     entries = case.operation.torque
     found = [
-        TorqueHistory(one.body, one.times or [0.0], one.torques or [one.torque])
+        TorqueHistory(one.body, np.array(one.times or [0.0]), np.array(one.torques or [one.torque]))
         for one in entries
         if one.share is None
     ]
@@ -669,7 +670,7 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
                 key=f"{key}.{given[0] if given else 'torque'}",
                 limit="torque, file, times with torques, or share",
             )
-        elif series:
+        elif one.times is not None and one.torques is not None:
             if len(one.times) != len(one.torques) or any(b <= a for a, b in pairwise(one.times)):
                 yield CaseError(
                     "the series needs ascending times, and as many torques",
@@ -911,7 +912,7 @@ def notices(case: DrivetrainCase) -> tuple[str, ...]:
             (stage.sun_radius, stage.planet_radius),
             (stage.sun_base_radius, stage.planet_base_radius),
         ):
-            if sun is not None:
+            if sun is not None and planet is not None:
                 found.append(
                     (f"planetary[{i}]", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)
                 )

@@ -334,6 +334,10 @@ def _transient_verdict(result: TransientResult) -> dict:
     }
 
 
+def _check(case: DrivetrainCase) -> None:
+    check_drivetrain(case)
+
+
 def _figures() -> Mapping[str, Figures]:
     from femgear.trains.drivetrain.figures import FIGURES
 
@@ -363,7 +367,7 @@ DRIVETRAIN = Train(
                 "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
             },
             describe=lambda results: describe_drivetrain_modes(results.modes),
-            check=check_drivetrain,
+            check=_check,
         ),
         Stage(
             name="transient",
@@ -371,7 +375,7 @@ DRIVETRAIN = Train(
             solve=lambda case, _, context: solve_transient_run(case, progress=context.progress),
             verdict=_transient_verdict,
             describe=lambda results: describe_transient(results.transient),
-            check=check_drivetrain,
+            check=_check,
         ),
         Stage(
             name="spectrum",

@@ -34,6 +34,7 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.time.newmark import AVERAGE_ACCELERATION
+from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.series import FourierSeries
 from femgear.trains.drivetrain.data import TorqueHistory, check_free_spin
 from femgear.trains.drivetrain.model import DrivetrainModel, FlankContacts, contact_model
@@ -421,7 +422,7 @@ class Scheme:
 
         rule, system, U = AVERAGE_ACCELERATION, model.system, model.geometry.basic
         M, K, n = system.M, system.K, len(system.M)
-        D = system.C + speed * system.gyroscopic
+        D = NonlinearSystem(system, (), speed=speed).damping
         # columns: q, v, g, loads before, loads after, mesh forces after
         ends = np.cumsum([n, n, U.shape[1], directions.shape[1], directions.shape[1], U.shape[1]])
         blank = np.zeros((n, ends[-1]))
@@ -621,7 +622,8 @@ class Separating:
     def __init__(self, gap, meshes: int):
         from scipy.linalg import get_lapack_funcs
 
-        self.gap, self.dgesv = gap, get_lapack_funcs("gesv", dtype=float)
+        self.gap = gap
+        (self.dgesv,) = get_lapack_funcs(("gesv",), dtype=float)
         self.drive = np.arange(len(gap)) < meshes
         # what leaves the drive flanks, and no others, in touch is not below zero
         self.sense = np.where(self.drive, 1.0, -1.0)
@@ -919,7 +921,8 @@ class Decimator:
         half = min(length // 2, count) if every > 1 else 0
         self.half = half
         middle = 0.5 * (1.0 + PASS_BAND) / every
-        self.weights = firwin(2 * half + 1, middle, window=("kaiser", beta)) if half else np.ones(1)
+        window = ("kaiser", beta)
+        self.weights = firwin(2 * half + 1, middle, window=window) if half else np.ones(1)  # type: ignore
         self.slope = _end_slope(min(half, 2 * every)) if half else np.zeros(1)
         self.buffer, self.first, self.done = np.zeros((0, 0)), 0, 0
 
