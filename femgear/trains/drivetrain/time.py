@@ -13,9 +13,8 @@ Meshes that separate add the search for the flanks that touch. Drive and back fl
 (`femgear.trains.drivetrain.model`) with the force ``k max(u, 0)`` of their overlap u, the approach less the
 gap. With the contacts known that touch, the overlaps at the end of a step obey a small linear system. The
 forces do not fall with the overlap and the flexibility takes no energy back, so that there is one solution.
-Changing the wrong contacts and solving again mostly ends after one round; where it does not, the way from a
-known point is followed across the borders of the contacts, which always ends (J. Katzenelson, Bell Syst.
-Tech. J. 44, 1965, 1605-1620; T. Fujisawa and E. S. Kuh, SIAM J. Appl. Math. 22, 1972, 307-328).
+Changing the wrong contacts and solving again mostly ends after one round; where it does not, only the first
+wrong one changes, which always ends (K. G. Murty, Opsearch 11, 1974, 123-130).
 
 Beside the motion goes the free one without loads, whose growth tells a parametric resonance. It takes the
 same steps, with the tangents of the meshes, and is brought back to size one every few steps; the slope of the
@@ -61,8 +60,8 @@ _TABLE = 8192
 
 # Rounding of an overlap relative to the largest one without mesh forces.
 _OVERLAP_ROUNDING = 1e-12
-# Rounds of changing all wrong contacts; borders crossed a contact; starts for the way across them.
-_ROUNDS, _CROSSINGS, _STARTS = 12, 40, 5
+# Rounds of changing all wrong contacts, and of changing one.
+_ROUNDS, _SINGLE = 12, 10_000
 # Steps that are tried at once with all drive flanks and no others in touch, first and last.
 _FEW, _MANY = 8, 64
 
@@ -309,9 +308,9 @@ def static_deviations(model: DrivetrainModel, W, k, load, *, contacts: FlankCont
     free, first = W.T @ q - contacts.gap, np.arange(len(k)) < meshes
     if np.array_equal(free >= 0.0, first):
         return q
-    law = ContactLaw(np.where(first, 0.0, k), np.where(first, -(1.0 - _SLIGHT) * k, 0.0))
+    touching, parted = np.where(first, 0.0, k), np.where(first, -(1.0 - _SLIGHT) * k, 0.0)
     drawn = flexible @ W
-    u, closed = solve_contact(W.T @ drawn, free, law, first)
+    u, closed = solve_overlaps(W.T @ drawn, free, first, touching, parted)
     loose = _SLIGHT * stiffness * np.abs(u[:meshes])
     loose[closed[:meshes] | np.isfinite(model.backlash)] = 0.0
     scale = (k * (np.abs(W).T @ (np.abs(flexible) @ np.abs(load)))).max()
@@ -322,7 +321,7 @@ def static_deviations(model: DrivetrainModel, W, k, load, *, contacts: FlankCont
             remedy="name the driver of the stage that these loads press, give the mesh a backlash, or"
             " start = \"zero\"",
         )  # fmt: skip
-    return q - drawn @ (law.slopes(closed) * u)
+    return q - drawn @ (np.where(closed, touching, parted) * u)
 
 
 @dataclass(frozen=True)
@@ -504,30 +503,7 @@ def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -
         drawn[:] = dot(drawn, closed[i])
 
 
-@dataclass(frozen=True)
-class ContactLaw:
-    """Forces ``touching u`` (n,) of the overlaps u of contacts that touch, ``parted u`` of the others.
-
-    Parameters
-    ----------
-    touching, parted : (n,) arrays
-        [N/m]
-    """
-
-    touching: np.ndarray
-    parted: np.ndarray
-
-    def slopes(self, closed):
-        """(n,) [N/m]"""
-        return np.where(closed, self.touching, self.parted)
-
-
-def one_sided(stiffness) -> ContactLaw:
-    """Contacts that push only."""
-    return ContactLaw(stiffness, np.zeros_like(stiffness))
-
-
-def solve_contact(flexibility, free, law: ContactLaw, closed) -> tuple[np.ndarray, np.ndarray]:
+def solve_overlaps(flexibility, free, closed, touching, parted=0.0) -> tuple[np.ndarray, np.ndarray]:
     """Overlaps and the contacts that touch (n,), with ``u + flexibility force(u) = free``.
 
     Parameters
@@ -536,64 +512,37 @@ def solve_contact(flexibility, free, law: ContactLaw, closed) -> tuple[np.ndarra
         With a symmetric part that is not negative [m/N].
     free : (n,) array
         Overlaps without the forces [m].
-    law : ContactLaw
     closed : (n,) bool array
         First guess.
+    touching, parted : (n,) arrays
+        Forces over overlaps of contacts that touch, and of the others [N/m].
 
     Raises
     ------
     ConvergenceError
         No contacts fit (E-CONTACT-STATE).
     """
-    for _ in range(_ROUNDS):
-        u, found = _solved(flexibility, free, law, closed)
-        if np.array_equal(found, closed):
+    rounding = _OVERLAP_ROUNDING * np.abs(free).max(initial=0.0)
+    for number in range(_ROUNDS + _SINGLE):
+        slopes = np.where(closed, touching, parted)
+        u = np.linalg.solve(np.eye(len(free)) + flexibility * slopes, free)
+        found = changed(u, closed, rounding)
+        wrong = np.flatnonzero(found != closed)
+        if not len(wrong):
             return u, closed
-        closed = found
-    return _across_borders(flexibility, free, law)
-
-
-def _solved(flexibility, free, law, closed):
-    """Overlaps with these contacts, and the contacts that touch with them."""
-    u = np.linalg.solve(np.eye(len(free)) + flexibility * law.slopes(closed), free)
-    return u, changed(u, closed, _OVERLAP_ROUNDING * np.abs(free).max(initial=0.0))
-
-
-def changed(u, closed, rounding):
-    """The contacts that touch with overlaps u; within rounding as before."""
-    return np.where(closed, u >= -rounding, u > rounding)
-
-
-def _across_borders(flexibility, free, law):
-    """Katzenelson's way from `free`; at a corner of several borders it begins again beside it."""
-    random, size = np.random.default_rng(0), np.abs(free).max()
-    for attempt in range(_STARTS):
-        closed = _one_way(flexibility, free, law, free + attempt * size * random.standard_normal(len(free)))
-        if closed is not None:
-            u, found = _solved(flexibility, free, law, closed)
-            if np.array_equal(found, closed):
-                return u, closed
+        # all that are wrong, or the first one alone
+        wrong = wrong if number < _ROUNDS else wrong[:1]
+        closed = closed.copy()
+        closed[wrong] = found[wrong]
     raise ConvergenceError(
         "no contacts of the meshes fit the end of a step", code="E-CONTACT-STATE",
         remedy="take shorter steps, or the start \"zero\"",
     )  # fmt: skip
 
 
-def _one_way(flexibility, free, law, u):
-    """Contacts at the end of the straight way of ``u + flexibility force(u)`` to `free`; None in a circle."""
-    closed = u >= 0.0
-    left = free - u - flexibility @ (law.slopes(closed) * u)
-    for _ in range(_CROSSINGS * len(u)):
-        way = np.linalg.solve(np.eye(len(u)) + flexibility * law.slopes(closed), left)
-        leaves = np.where(closed, way < 0.0, way > 0.0)
-        share = np.full(len(u), np.inf)
-        share[leaves] = np.maximum(-u[leaves] / way[leaves], 0.0)
-        first = int(np.argmin(share))
-        if share[first] >= 1.0:
-            return closed
-        u, left = u + share[first] * way, (1.0 - share[first]) * left
-        u[first], closed[first] = 0.0, not closed[first]
-    return None
+def changed(u, closed, rounding: float) -> np.ndarray:
+    """The contacts that touch with overlaps u; within rounding as before."""
+    return np.where(closed, u >= -rounding, u > rounding)
 
 
 def check_pushing(model, table) -> None:
@@ -683,7 +632,7 @@ class Separating:
         if np.array_equal(found, self.closed):
             return forces
         flexibility = np.dot(S.T, np.dot(scheme.flexibility, S))
-        self._take(solve_contact(flexibility, free, one_sided(meshes.stiffness[i]), found)[1])
+        self._take(solve_overlaps(flexibility, free, found, meshes.stiffness[i])[1])
         return self._solved(scheme, meshes, i, x)[0]
 
     def _solved(self, scheme, meshes, i, x):
