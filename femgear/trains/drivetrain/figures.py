@@ -227,13 +227,13 @@ def name_lines(ax, lines: Sequence[tuple], width: float) -> None:
         )  # fmt: skip
 
 
-def finished(figure):
+def finished(figure: Figure) -> Figure:
     """The figure with its legend."""
     legend_below(figure)
     return figure
 
 
-def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, title: str = ""):
+def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, title: str = "") -> Figure:
     """Mesh stiffness over the mesh period: the series and the rectangular wave that it stands for.
 
     Parameters
@@ -242,10 +242,6 @@ def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, 
         Fractions of the period.
     curves, steps : sequences of (text, stiffness (n,) [N/m])
         Series, and rectangular waves in the same order.
-
-    Returns
-    -------
-    Figure
     """
     figure, axes = panels(
         [text for text, _ in curves], columns=len(curves), width=3.1, height=2.4, x="mesh period [1]",
@@ -272,7 +268,7 @@ def over_time(
     columns: int = 1,
     title: str = "",
     zero: bool = True,
-):
+) -> Figure:
     """Signals of several runs over time, one panel each; the first run stands in front.
 
     Where there are many more instants than pixels, the band between the least and the largest value of every
@@ -291,10 +287,6 @@ def over_time(
         Above all panels.
     zero : bool
         Draw zero; False shows changes of what is far from it.
-
-    Returns
-    -------
-    Figure
     """
     figure, axes = panels(
         [text for text, _ in signals], columns=columns, width=7.0 if columns == 1 else 5.2, x="time [s]",
@@ -321,7 +313,7 @@ def spectra(
     factor: float = 1.0,
     x: str = "",
     title: str = "",
-):
+) -> Figure:
     """Amplitude spectra of several runs, one panel each, with named lines; the first run stands in front.
 
     Parameters
@@ -338,10 +330,6 @@ def spectra(
         Label of the abscissa, the frequency when not given.
     title : str
         Above all panels.
-
-    Returns
-    -------
-    Figure
     """
     frequency = np.asarray(frequency)
     lines = [(text, at) for text, at in lines if frequency[0] <= at <= frequency[-1]]
@@ -358,13 +346,8 @@ def spectra(
     return finished(figure)
 
 
-def stiffness_figure(model: DrivetrainModel):
-    """Series of the mesh stiffness of every stage, and the rectangular wave.
-
-    Returns
-    -------
-    Figure
-    """
+def stiffness_figure(model: DrivetrainModel) -> Figure:
+    """Series of the mesh stiffness of every stage, and the rectangular wave."""
     train, phase = model.train, np.linspace(0.0, 2.0, 1601)
     names, row, waves = numbered(model.meshes), 0, []
     # by position: the planetary stages come first, with all suns' meshes before the rings'
@@ -383,13 +366,8 @@ def stiffness_figure(model: DrivetrainModel):
     return stiffness_series(phase, curves, steps, title=f"series of {model.stiffness.shape[1] - 1} terms")
 
 
-def campbell_figure(modes: xr.Dataset):
-    """Campbell diagram with the mesh lines of modes.nc.
-
-    Returns
-    -------
-    Figure
-    """
+def campbell_figure(modes: xr.Dataset) -> Figure:
+    """Campbell diagram with the mesh lines of modes.nc."""
     frequency = modes["campbell_frequency"].values
     top = frequency.max()
     critical = zip(modes["critical_speed"].values, modes["critical_frequency"].values)

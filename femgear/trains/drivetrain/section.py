@@ -19,10 +19,9 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, ValidationError, ValidationInfo, field_validator
 
-from femgear.case import text
 from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
 from femgear.case.problems import combine, translate
-from femgear.case.tables import Columns, embedded, read_columns
+from femgear.case.tables import Columns, embed_points, read_columns
 from femgear.case.text import ReadCase, text_with_points
 from femgear.case.units import (
     ACCELERATION,
@@ -972,16 +971,12 @@ def embed_torques(data: dict, name: str) -> dict[str, str]:
         if table.keys() & {"torque", "times", "torques", "share"}:
             continue
         key = f"operation.torque[{i}]"
-        file = table.pop("file")
-        times, torques = embedded(file, name, f"{key}.file", read_torques)
-        table["times"] = [f"{value:{_DIGITS}} s" for value in times]
-        table["torques"] = [f"{value:{_DIGITS}} N m" for value in torques]
-        found[key] = text.printable(file)
+        found[key] = embed_points(table, name, key, read_torques, {"times": "s", "torques": "N m"})
     return found
 
 
-def read_torques(path: str | os.PathLike) -> tuple[list[float], list[float]]:
-    """Instants [s] and torques [N m] of a CSV file.
+def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
+    """``"times"`` [s] and ``"torques"`` [N m] of a CSV file.
 
     Parameters
     ----------
@@ -993,9 +988,9 @@ def read_torques(path: str | os.PathLike) -> tuple[list[float], list[float]]:
     Raises
     ------
     CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-CSV`` with the number of the line: unknown
-        columns or units, numbers that are none, not finite or beyond the limits of a case file, decimal
-        commas beside decimal points, times that do not ascend.
+        ``E-FILE``, ``E-FILE-ENC`` (see `femgear.case.text.read_text`); ``E-CSV`` with the number of the line:
+        unknown columns or units, numbers that are none, not finite or beyond the limits of a case file,
+        decimal commas beside decimal points, times that do not ascend.
     """
     found = read_columns(path, _DIMENSIONS, least=1, most=MOST_POINTS, remedy=_COLUMNS)
     times, torques = (_column(found, key) for key in ("time", "torque"))
@@ -1005,7 +1000,7 @@ def read_torques(path: str | os.PathLike) -> tuple[list[float], list[float]]:
                 "the times do not ascend", line, value=f"{after:g} s", limit=f"above {before:g} s",
                 remedy="sort the lines by time, and keep one line of every instant",
             )  # fmt: skip
-    return times, torques
+    return {"times": times, "torques": torques}
 
 
 def _column(found: Columns, key: str) -> list[float]:
