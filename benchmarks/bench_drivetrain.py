@@ -42,9 +42,9 @@ def test_a_minute_at_20_khz(benchmark):
     model()
     records = Records(20, lowpass=True)
     found = benchmark.pedantic(run, args=(60.0, STEP), kwargs={"records": records}, rounds=1)
-    assert found.ledger.error < 1e-6 and found.momentum < 1e-6
+    assert found.energy_balance.error < 1e-6 and found.momentum < 1e-6
     note = f"{found.steps} steps, 15 terms of the mesh stiffness, records low-passed to 1 kHz; "
-    note += f"energy balance {found.ledger.error:.0e}; time of the process"
+    note += f"energy balance {found.energy_balance.error:.0e}; time of the process"
     benchmark.extra_info.update(title="average acceleration, 60 s at 20 kHz", note=note, limit=LIMIT)
     if benchmark.stats is not None:
         assert benchmark.stats.stats.median < LIMIT

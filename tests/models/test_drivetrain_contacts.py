@@ -184,7 +184,7 @@ def test_reversed_torque_against_an_adaptive_integrator():
     size = np.abs(exact.displacement).max(axis=0)
     coarse, fine = (np.abs(r.motion - exact.displacement).max(axis=0) / size for r in runs)
     assert np.all(fine < 2e-6) and np.all(fine < coarse / 8.0)
-    assert runs[1].ledger.error < 1e-9 and runs[1].momentum < 1e-9
+    assert runs[1].energy_balance.error < 1e-9 and runs[1].momentum < 1e-9
 
 
 def test_books_balance_with_wedged_teeth():
@@ -202,7 +202,7 @@ def test_books_balance_with_wedged_teeth():
     assert 0.05 < wedged.mean() < 0.95
     force = K * (np.maximum(both[:, 0], 0.0) - np.maximum(both[:, 1], 0.0))
     assert run.force[:, 0] == pytest.approx(force, rel=1e-9, abs=1e-9 * np.abs(force).max())
-    assert run.ledger.error < 1e-9 and run.momentum < 1e-9
+    assert run.energy_balance.error < 1e-9 and run.momentum < 1e-9
 
 
 def test_thinned_records_are_those_of_all_steps():

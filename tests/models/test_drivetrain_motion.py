@@ -40,8 +40,8 @@ def test_momentum_energy_and_drift():
         *constant_torques({"generator": -100.0}),
     )
     run = march_drivetrain(model, torques, duration=1.0, step=1e-4, speed=0.6, start="zero")
-    assert run.momentum < 1e-9 and run.ledger.error < 1e-6
-    assert run.ledger.damping > 0.0
+    assert run.momentum < 1e-9 and run.energy_balance.error < 1e-6
+    assert run.energy_balance.damping > 0.0
     assert run.drift < 1e-12
     # the spin by hand: J w' = T_r + i T_g
     impulse = 0.25 * 2e4 + 0.5 * 1.5e4 - 100.0 * model.ratio["generator"]

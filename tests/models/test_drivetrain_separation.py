@@ -84,7 +84,7 @@ def test_flight_and_impact_in_closed_form():
         )  # fmt: skip
         wanted = bounce(run.time, speed, load, K, mass)[0]
         errors.append(np.abs(run.approach[:, 0] - wanted).max() / np.ptp(wanted))
-        assert run.ledger.error < 1e-10 and run.momentum < 1e-10
+        assert run.energy_balance.error < 1e-10 and run.momentum < 1e-10
         assert run.lost[0] == pytest.approx(np.mean(wanted < 0.0), abs=2.0 / steps)
         assert run.force.min() == 0.0 and run.pulling[0] == 0.0
     assert errors[2] < 5e-5 and errors[2] < errors[0] / 10.0
@@ -110,12 +110,12 @@ def test_back_flanks_in_closed_form():
         errors.append(np.abs(run.force[:, 0] - force).max() / force.max())
         assert run.lost[0] == pytest.approx(2.0 * cross / period, abs=2.0 / steps)
         assert run.pulling[0] == pytest.approx(half / period, abs=2.0 / steps)
-        assert run.ledger.error < 1e-10
+        assert run.energy_balance.error < 1e-10
     assert errors[1] < 1e-3 and errors[1] < errors[0] / 10.0
 
 
 def test_free_motion_keeps_its_energy_to_the_square_of_the_step():
-    """The books balance exactly; energy is lost or won only where a step crosses a border of the contact."""
+    """The balance is exact; energy is lost or won only where a step crosses a border of the contact."""
     model, speed, found = pair(backlash=BACKLASH), 0.05, []
     w, mass = approach_of(model)
     for steps in (50, 200, 800):
@@ -127,7 +127,7 @@ def test_free_motion_keeps_its_energy_to_the_square_of_the_step():
         overlap = np.maximum(run.approach, 0.0) + np.maximum(-run.approach - BACKLASH, 0.0)
         energy = 0.5 * mass * (run.velocity @ w) ** 2 + 0.5 * K * overlap[:, 0] ** 2
         found.append(np.abs(energy / energy[0] - 1.0).max())
-        assert run.ledger.error < 1e-9
+        assert run.energy_balance.error < 1e-9
     assert found[2] < 1e-3 and found[2] < found[1] / 8.0 and found[1] < found[0] / 8.0
 
 
@@ -267,7 +267,7 @@ def test_static_start_on_back_flanks():
         assert run.pulling[0] == 1.0 and run.lost[0] == 0.0
 
 
-def test_books_balance_through_torque_reversals():
+def test_energy_balances_through_torque_reversals():
     """Flanks change sides under torques that alternate; a chain of two stages with a shaft."""
     model = drivetrain_model(wind_turbine_drivetrain())
     balanced, times = paper_torques(balanced=True), [0.0, 0.3, 0.6, 0.9]
@@ -275,7 +275,7 @@ def test_books_balance_through_torque_reversals():
     run = march_drivetrain(
         model, waves, duration=1.0, step=1e-4, speed=PRINTED.speed, contact_loss=True, records=Records(10)
     )
-    assert run.ledger.error < 1e-9 and run.momentum < 1e-9
+    assert run.energy_balance.error < 1e-9 and run.momentum < 1e-9
     assert run.pulling.min() > 0.1 and run.lost.min() > 0.05
 
 

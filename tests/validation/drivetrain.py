@@ -213,7 +213,7 @@ def _balances(duration: float) -> tuple[Row, ...]:
     )  # fmt: skip
     text = f"36 dof, {duration:g} s in steps of 50 µs:"
     return (
-        at_most("balances", "theory", f"{text} energy", 1e-6, run.ledger.error),
+        at_most("balances", "theory", f"{text} energy", 1e-6, run.energy_balance.error),
         at_most("balances", "theory", f"{text} angular momentum", 1e-6, run.momentum),
         at_most("balances", "theory", f"{text} spin in the deviations [rad]", 1e-9, run.drift),
     )
@@ -283,5 +283,5 @@ def contact_loss() -> tuple[Row, ...]:
     text = "flight and impact, 800 steps a period, three periods:"
     return (
         at_most("contact loss", "closed form", f"{text} approach over its range", 1e-4, error),
-        at_most("contact loss", "theory", f"{text} energy balance", 1e-9, run.ledger.error),
+        at_most("contact loss", "theory", f"{text} energy balance", 1e-9, run.energy_balance.error),
     )

@@ -167,7 +167,7 @@ class TransientResult:
             name: (("variant", *dims), [value(run) for run in runs], unit, text)
             for name, dims, value, unit, text in of_runs
         }
-        energy, momentum = [run.ledger.error for run in runs], [run.momentum for run in runs]
+        energy, momentum = [run.energy_balance.error for run in runs], [run.momentum for run in runs]
         variables |= {
             "torque": (moving, torque, "N m", "external torque"),
             "ratio": (("body",), ratio, "1", "speed over that of the first body"),

@@ -132,7 +132,7 @@ def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
 
 
 def _check_sense(run: DrivetrainRun, variant: str, ratio) -> None:
-    """Refuse motions that have grown beyond sense, however exact their books are."""
+    """Refuse motions that have grown beyond sense, however exact their balances are."""
     if not run.gain > GROWN:
         return
     fastest = np.abs(run.spin_speed).max() * np.abs(ratio)
@@ -328,7 +328,7 @@ def _transient_verdict(result: TransientResult) -> dict:
     runs = result.runs.values()
     return {
         "steps": next(iter(runs)).steps,
-        "energy": max(run.ledger.error for run in runs),
+        "energy": max(run.energy_balance.error for run in runs),
         "momentum": max(run.momentum for run in runs),
         "pulling": {variant: float(np.max(run.pulling, initial=0.0)) for variant, run in result.runs.items()},
     }

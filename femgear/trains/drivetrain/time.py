@@ -33,7 +33,6 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.time.newmark import AVERAGE_ACCELERATION
-from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.series import FourierSeries
 from femgear.trains.drivetrain.data import TorqueHistory, check_free_spin
 from femgear.trains.drivetrain.model import DrivetrainModel, FlankContacts, contact_model
@@ -106,8 +105,8 @@ class DrivetrainRun:
         Of the drive flanks [m]; of the meshes, drive less back flank [N].
     spin, spin_speed : (n,) arrays
         Angle and speed of the first body without its deviation [rad], [rad/s].
-    meshes, ledger
-        Names, energies.
+    meshes : tuple of str
+    energy_balance : EnergyBalance
     drift : float
         Largest spin found in the deviations after a block, before it was taken out [rad].
     momentum : float
@@ -139,7 +138,7 @@ class DrivetrainRun:
     spin: np.ndarray
     spin_speed: np.ndarray
     meshes: tuple[str, ...]
-    ledger: Ledger
+    energy_balance: EnergyBalance
     drift: float
     momentum: float
     steps: int
@@ -213,7 +212,7 @@ def march_drivetrain(
             record.take(first, len(states) - 1, states, block)
             motion.state = balances.without_drift(states[-1])
     return DrivetrainRun(
-        outputs=tuple(outputs), **record.columns(step), meshes=model.meshes, ledger=balances.ledger(),
+        outputs=tuple(outputs), **record.columns(step), meshes=model.meshes, energy_balance=balances.works(),
         drift=balances.drift, momentum=balances.momentum_error(), steps=count, step=step,
         contact_loss=contact_loss, growth=motion.free.growth(), gain=motion.free.gain(),
     )  # fmt: skip
@@ -421,7 +420,7 @@ class Scheme:
 
         rule, system, U = AVERAGE_ACCELERATION, model.system, model.geometry.basic
         M, K, n = system.M, system.K, len(system.M)
-        D = NonlinearSystem(system, (), speed=speed).damping
+        D = system.C if system.gyroscopic is None else system.C + speed * system.gyroscopic
         # columns: q, v, g, loads before, loads after, mesh forces after
         ends = np.cumsum([n, n, U.shape[1], directions.shape[1], directions.shape[1], U.shape[1]])
         blank = np.zeros((n, ends[-1]))
@@ -712,7 +711,7 @@ class FreeMotion:
 
 
 @dataclass(frozen=True)
-class Ledger:
+class EnergyBalance:
     """Energies [J] of a run: what was there at the ends, and the work in between."""
 
     before: float
@@ -789,9 +788,9 @@ class Balances:
         state[n : 2 * n] -= rate * rigid
         return state
 
-    def ledger(self) -> Ledger:
+    def works(self) -> EnergyBalance:
         """Energies up to here."""
-        return Ledger(self.before, self.after, self.loads, self.damping, self.meshes)
+        return EnergyBalance(self.before, self.after, self.loads, self.damping, self.meshes)
 
     def momentum_error(self) -> float:
         """Largest error after any block, over the largest momentum or impulse of the torques."""
@@ -807,7 +806,7 @@ class Balances:
             Momentum or energy are lost, or the motion is beyond all numbers (E-DIVERGED).
         """
         finite = np.isfinite(states).all(axis=1)
-        energy, momentum = self.ledger().error, self.momentum_error()
+        energy, momentum = self.works().error, self.momentum_error()
         if finite.all() and energy <= BALANCE and momentum <= BALANCE:
             return
         last = len(states) - 1 if finite.all() else max(int(np.argmin(finite)) - 1, 0)
