@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from femgear.case.case import planetary_set
     from femgear.case.sections import Case
     from femgear.errors import FemgearError
+    from femgear.run import solve
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
     from femgear.trains.reading import open_results, read_case, with_value, with_values
     from femgear.trains.static.stages import solve_static, solve_stress
@@ -21,6 +22,7 @@ __all__ = [
     "open_results",
     "planetary_set",
     "read_case",
+    "solve",
     "solve_dynamics",
     "solve_housing",
     "solve_modes",
@@ -36,6 +38,7 @@ _HOME = {
     "open_results": "trains.reading",
     "planetary_set": "case.case",
     "read_case": "trains.reading",
+    "solve": "run",
     "solve_dynamics": "trains.elastic.stages",
     "solve_housing": "trains.elastic.stages",
     "solve_modes": "trains.elastic.stages",

@@ -1,4 +1,4 @@
-"""The command line: ``femgear check``, ``run``, ``report``, ``sweep`` and ``schema``."""
+"""The command line: ``femgear check``, ``run``, ``report``, ``export``, ``sweep`` and ``schema``."""
 
 from __future__ import annotations
 
@@ -205,6 +205,42 @@ def report(folder: Path, /) -> int:
 
     report_again(folder)
     print(f"report:  {folder / 'report.html'}")
+    return 0
+
+
+@app.command
+def export(
+    folder: Path,
+    /,
+    *,
+    csv: Annotated[bool, Parameter(negative="")] = False,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+) -> int:
+    """Write the numbers of a run as files that other programs read.
+
+    Parameters
+    ----------
+    folder
+        Folder that femgear run wrote.
+    csv
+        Tables with units in their headers: one file for each stage and each set of dimensions.
+    output
+        Folder of the files. Default: exported, inside the other.
+    """
+    from femgear.storage.dataset import write_csv_tables
+    from femgear.storage.files import storage_errors
+    from femgear.trains.reading import open_results
+
+    if not csv:
+        raise CaseError(
+            "no format is named", code="E-ARGUMENTS", limit="--csv", remedy="femgear export --help"
+        )
+    results = open_results(folder)
+    target = folder / "exported" if output is None else output
+    with storage_errors(target):
+        target.mkdir(parents=True, exist_ok=True)
+    names = [name for stage in results.stages for name in write_csv_tables(results[stage], target, stage)]
+    print(f"files in {target}: {', '.join(names)}")
     return 0
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, record
-from femgear.trains.protocol import Context, Drawn, Progress
+from femgear.trains.protocol import Context, Drawn, Progress, Stage
 from femgear.trains.reading import open_results
 from femgear.trains.registry import check_case, stages_of, train_of
 
@@ -25,6 +26,49 @@ def grid_cache() -> Path:
     if beside.is_dir() and (beside.parent / "pyproject.toml").is_file():
         return beside
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "femgear" / "meshes"
+
+
+def solve(case: Any, only: str | None = None, *, progress: Progress | None = None) -> dict[str, Any]:
+    """Compute the stages of a case in memory: transmission error, modes, vibration, whatever its train has.
+
+    Parameters
+    ----------
+    case : case of any train
+        From `femgear.read_case`.
+    only : str, optional
+        Last stage to compute; it is computed with what it needs.
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Returns
+    -------
+    dict of str to result
+        By the name of the stage, in order; ``dataset()`` of each has its numbers with units.
+
+    Raises
+    ------
+    CaseError, GeometryError
+        Before anything is computed: what the stages cannot represent; E-STAGE: no such stage.
+    """
+    check_case(case, only)
+    context = Context(grid_cache(), progress)
+    return {stage.name: result for stage, result, _ in _solved(case, only, context)}
+
+
+def _solved(case: Any, only: str | None, context: Context) -> Iterator[tuple[Stage, Any, float]]:
+    """Stages of a case with their results and seconds, one after the other."""
+    from femgear.threads import one_blas_thread
+
+    if only == "stress":
+        case = case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})})
+    results, say = {}, context.progress or (lambda name, done, total: None)
+    with one_blas_thread():
+        for stage in stages_of(case, only):
+            say(stage.name, 0, 1)
+            start = time.perf_counter()
+            results[stage.name] = stage.solve(case, results, context)
+            yield stage, results[stage.name], time.perf_counter() - start
+            say(stage.name, 1, 1)
 
 
 def run_case(
@@ -50,32 +94,20 @@ def run_case(
     progress : callable, optional
         Called with (stage, done, total).
     """
-    from femgear.threads import one_blas_thread
-
     cache = grid_cache()
     check_case(case, only)
-    if only == "stress":
-        case = case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})})
     write_text(case.source, folder / "case.toml")
     names, timings, convergence = ["case.toml"], {}, {}
     record(folder, names, timings=timings, convergence=convergence)
     results, data = {}, {}
-    context = Context(cache, progress)
-    with one_blas_thread():
-        for stage in stages_of(case, only):
-            name = stage.name
-            if progress is not None:
-                progress(name, 0, 1)
-            start = time.perf_counter()
-            results[name] = stage.solve(case, results, context)
-            timings[name] = time.perf_counter() - start
-            data[name] = results[name].dataset()
-            write_dataset(data[name], folder / f"{name}.nc")
-            names.append(f"{name}.nc")
-            convergence[name] = stage.verdict(results[name])
-            record(folder, names, timings=timings, convergence=convergence)
-            if progress is not None:
-                progress(name, 1, 1)
+    for stage, result, seconds in _solved(case, only, Context(cache, progress)):
+        name = stage.name
+        results[name], timings[name] = result, seconds
+        data[name] = result.dataset()
+        write_dataset(data[name], folder / f"{name}.nc")
+        names.append(f"{name}.nc")
+        convergence[name] = stage.verdict(result)
+        record(folder, names, timings=timings, convergence=convergence)
     if pictures:
         from femgear.report.draw import write_pictures
 

@@ -424,3 +424,28 @@ def test_exit_codes(tmp_path, capsys, pipeline, function, code, words):
 def test_report_of_no_results(tmp_path, capsys):
     assert cli.main(["report", str(tmp_path / "absent")]) == 4
     assert "E-RESULTS-MISSING" in capsys.readouterr().err
+
+
+def test_export_writes_every_number_with_its_unit(tmp_path, capsys, pipeline):
+    import pandas as pd
+
+    out = tmp_path / "out"
+    assert cli.main(["run", str(CASE), "-o", str(out), "--no-pictures"]) == 0
+    assert cli.main(["export", str(out)]) == 2
+    assert "--csv" in capsys.readouterr().err
+    assert cli.main(["export", str(out), "--csv"]) == 0
+    printed, results = capsys.readouterr().out, open_results(out)
+    assert "modes_dof_mode.csv" in printed
+    for stage in STAGES:
+        for name, one in results[stage].data_vars.items():
+            path = out / "exported" / ("_".join((stage, *one.dims)) + ".csv")
+            table = pd.read_csv(path, keep_default_na=False, na_values=[""])
+            column = name if one.dtype.kind in "OUSb" else f"{name} [{one.attrs['units']}]"
+            if one.dims:
+                assert list(table[column]) == pytest.approx(list(one.values.ravel()), rel=1e-14, nan_ok=True)
+                place = [table.columns.get_loc(c) for c in table.columns if c.split(" [")[0] in one.dims]
+                assert place == list(range(len(one.dims)))
+            else:
+                assert table.set_index("name").value[name] == str(one.item())
+    assert cli.main(["run", str(CASE), "-o", str(out), "--no-pictures", "--force"]) == 0
+    assert (out / "exported" / "modes.csv").exists() or (out / "exported" / "modes_mode.csv").exists()

@@ -181,5 +181,5 @@ def test_public_names():
     for name in femgear.__all__:
         assert getattr(femgear, name) is not None
     assert set(femgear.__all__) <= set(dir(femgear))
-    with pytest.raises(AttributeError, match="no attribute 'solve'"):
-        femgear.solve  # noqa: B018
+    with pytest.raises(AttributeError, match="no attribute 'compute'"):
+        femgear.compute  # noqa: B018

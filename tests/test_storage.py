@@ -454,3 +454,16 @@ def test_a_manifest_cannot_be_changed_in_memory(tmp_path):
         manifest.files["b"] = "1"
     write_manifest(tmp_path, manifest)
     assert read_manifest(tmp_path) == manifest
+
+
+def test_results_and_cases_show_themselves_in_a_line(tmp_path):
+    folder = prepare_output(tmp_path / "out")
+    write_text(CASE.read_text(encoding="utf-8"), folder / "case.toml")
+    write_dataset(dataset(), folder / "static.nc")
+    finish(folder, ["case.toml", "static.nc"], timings={"static": 0.5}, convergence={})
+    results = open_results(folder)
+    assert repr(results) == f"<Results in {folder}: static; complete>"
+    assert "<td>static</td>" in results._repr_html_() and "0.50 s" in results._repr_html_()
+    case = results.case
+    assert repr(case) == f"<Case {case.title!r} of {folder / 'case.toml'}>"
+    assert case.title in case._repr_html_() and "centre_distance" in case._repr_html_()

@@ -5,7 +5,8 @@ import json
 import pytest
 from oscillator.stages import OSCILLATOR
 
-from femgear import cli, open_results, read_case, with_value
+from femgear import cli, open_results, read_case, solve, with_value
+from femgear.errors import CaseError
 from femgear.trains import registry
 
 TEXT = """model = "oscillator"
@@ -60,3 +61,13 @@ def test_run_writes_stages_figure_and_page(path, tmp_path, capsys):
     assert cli.main(["run", str(path), "-o", str(tmp_path / "one"), "--only", "receptance"]) == 0
     assert cli.main(["run", str(path), "-o", str(tmp_path / "no"), "--only", "housing"]) == 2
     assert "no stage of an oscillator" in capsys.readouterr().err
+
+
+def test_stages_are_solved_in_memory(path):
+    said = []
+    results = solve(read_case(path), progress=lambda *one: said.append(one))
+    assert list(results) == ["modes", "receptance"] and said[-1] == ("receptance", 1, 1)
+    assert results["receptance"].dataset()["receptance"].max() == pytest.approx(1 / (0.04 * 8e5), rel=1e-3)
+    assert list(solve(read_case(path), "modes")) == ["modes"]
+    with pytest.raises(CaseError, match="no stage of an oscillator"):
+        solve(read_case(path), "housing")

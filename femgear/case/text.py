@@ -322,6 +322,17 @@ class ReadCase(BaseModel):
         """Whether the values agree, from whatever text they came."""
         return isinstance(other, type(self)) and self.model_dump() == other.model_dump()
 
+    def __repr__(self) -> str:
+        """Kind, title and file: the entries are in `source`."""
+        where = f" of {self._name}" if self._name else ""
+        return f"<{type(self).__name__} {getattr(self, 'title', '')!r}{where}>"
+
+    def _repr_html_(self) -> str:
+        """The text of the case, for notebooks."""
+        from html import escape
+
+        return f"<details><summary>{escape(repr(self))}</summary><pre>{escape(self._source)}</pre></details>"
+
     @property
     def source(self) -> str:
         """TOML text that gives this case."""

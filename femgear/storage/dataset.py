@@ -1,4 +1,4 @@
-"""Results as xarray datasets: what goes to disk, every variable with its units."""
+"""Results as xarray datasets: what goes to disk, every variable with its units; the same as CSV files."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
     import xarray as xr
 
     from femgear.system.lumped import RigidSet
@@ -27,6 +30,54 @@ def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
         }
 
     return xr.Dataset(made(variables), coords=made(coords), attrs=attrs)
+
+
+def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
+    """Write the variables of a stage as CSV files, one for each set of dimensions; returns the file names.
+
+    ``modes_dof_mode.csv`` holds the variables over degrees of freedom and modes, a line for each pair;
+    ``modes.csv`` holds single numbers and the attributes of the file.
+    """
+    from femgear.storage.files import write_text
+
+    names = []
+    for dims, frame in csv_tables(data).items():
+        names.append("_".join((stage, *dims)) + ".csv")
+        write_text(frame.to_csv(index=False, lineterminator="\n"), folder / names[-1])
+    return names
+
+
+def csv_tables(data: xr.Dataset) -> dict[tuple[str, ...], pd.DataFrame]:
+    """Tables of the variables of a stage by their dimensions; headers carry the units.
+
+    Returns
+    -------
+    dict of tuple of str to DataFrame
+        Under ``()`` single numbers and attributes, in rows of name, value and unit.
+    """
+    import pandas as pd
+
+    flat = data.reset_coords()
+    single = [
+        *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
+        *((str(name), str(value), "") for name, value in data.attrs.items()),
+    ]
+    tables = {(): pd.DataFrame(single, columns=["name", "value", "unit"])} if single else {}
+    for dims in dict.fromkeys(one.dims for one in flat.values() if one.dims):
+        chosen = [name for name, one in flat.items() if one.dims == dims]
+        frame = flat[chosen].to_dataframe(dim_order=list(dims)).reset_index()
+        tables[dims] = frame.rename(columns={str(name): _header(flat, str(name)) for name in frame})
+    return tables
+
+
+def _unit(one: xr.DataArray) -> str:
+    """Unit of a number, nothing for text."""
+    return "" if one.dtype.kind in "OUSb" else str(one.attrs.get("units", "1"))
+
+
+def _header(data: xr.Dataset, name: str) -> str:
+    unit = _unit(data[name]) if name in data.variables else "1"
+    return f"{name} [{unit}]" if unit else name
 
 
 def complex_entries(entries) -> dict[str, tuple]:

@@ -105,6 +105,21 @@ class Results:
         """Contents of the file of one stage."""
         return read_dataset(self._checked(f"{name}.nc"))
 
+    def __repr__(self) -> str:
+        state = "complete" if self.manifest.complete else "not complete"
+        return f"<Results in {self.folder}: {', '.join(self.stages) or 'no stage'}; {state}>"
+
+    def _repr_html_(self) -> str:
+        """Stages with their variables, for notebooks."""
+        from html import escape
+
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{escape(', '.join(map(str, self[name].data_vars)))}</td>"
+            f"<td>{self.manifest.timings.get(name, 0.0):.2f} s</td></tr>"
+            for name in self.stages
+        )
+        return f"<p>{escape(repr(self))}</p><table><tr><th>stage<th>variables<th>time</tr>{rows}</table>"
+
     @property
     def stages(self) -> tuple[str, ...]:
         """Stages that the folder holds, in the order of the run."""
