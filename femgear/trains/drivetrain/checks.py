@@ -18,7 +18,7 @@ from femgear.case.units import FREQUENCY, SPEED
 from femgear.errors import CaseError
 from femgear.storage.dataset import RPM
 from femgear.system.series import FourierSeries
-from femgear.trains.drivetrain.data import ChainBearing, ChainShaft, Drivetrain, MeshWave, TorqueHistory
+from femgear.trains.drivetrain.data import ChainBearing, ChainShaft, Drivetrain, TorqueHistory
 from femgear.trains.drivetrain.model import (
     DrivetrainModel,
     coordinates_of,
@@ -505,12 +505,12 @@ def _like_springs(train: Drivetrain) -> Drivetrain:
     return replace(
         train,
         shafts=tuple(_shaft(one, arm) for one in train.shafts),
-        parallel=tuple(replace(one, mesh=_mesh(one.mesh)) for one in train.parallel),
+        parallel=tuple(replace(one, mesh=replace(one.mesh, stiffness=1.0)) for one in train.parallel),
         planetary=tuple(
             replace(
                 one,
-                sun_mesh=_mesh(one.sun_mesh),
-                ring_mesh=_mesh(one.ring_mesh),
+                sun_mesh=replace(one.sun_mesh, stiffness=1.0),
+                ring_mesh=replace(one.ring_mesh, stiffness=1.0),
                 planet_bearing=_unit(one.planet_bearing),
             )
             for one in train.planetary
@@ -524,10 +524,6 @@ def _like_springs(train: Drivetrain) -> Drivetrain:
 def _unit(stiffness: float, unit: float = 1.0) -> float:
     """The unit in place of a spring that is there and not rigid."""
     return stiffness if stiffness == 0.0 or math.isinf(stiffness) else unit
-
-
-def _mesh(wave: MeshWave) -> MeshWave:
-    return replace(wave, stiffness=1.0)
 
 
 def _bearing(one: ChainBearing, arm: float) -> ChainBearing:

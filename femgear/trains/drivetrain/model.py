@@ -212,7 +212,9 @@ def drivetrain_problem(
             own = np.flatnonzero((geometry.stage == stage) & ((number >= count) == back))
             if len(own):
                 elements.append(_flanks(model, geometry, own, int(stage), separates))
-    load = model.system.load + torque_vector(model, torques or {})
+    load = model.system.load.copy()
+    for name, torque in (torques or {}).items():
+        load[model.index(f"{name}: rotation")] += torque
     system = replace(model.system, W=geometry.basic, load=load)
     return NonlinearSystem(system, tuple(elements), speed=speed)
 
@@ -233,14 +235,6 @@ def _flanks(
     fixed, even, odd = (np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd))
     stiffness = FourierSeries(model.stiffness[meshes], order)
     return TurningMeshes(np.array(used), fixed, even, odd, stiffness, turn, contacts.gap[own], separates)
-
-
-def torque_vector(model: DrivetrainModel, torques: dict[str, float]) -> np.ndarray:
-    """Load (n,) of torques on bodies [N m]."""
-    load = np.zeros(len(model.rigid))
-    for name, torque in torques.items():
-        load[model.index(f"{name}: rotation")] += torque
-    return load
 
 
 def balanced_torque(model: DrivetrainModel, driver: str, torque: float, output: str) -> dict[str, float]:

@@ -14,7 +14,7 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, ValidationError, ValidationInfo, field_validator
@@ -298,10 +298,6 @@ class DrivetrainCase(Section, ReadCase):
     The fields carry the names of the case file; ``source`` is the text that gives this case, ``notices`` what
     deserves to be said.
     """
-
-    # sections of planetary sets, which code for all kinds of cases asks for
-    planar: ClassVar[None] = None
-    helical: ClassVar[None] = None
 
     format: Count(1, 2**31) = FORMAT
     model: Literal[MODEL]
