@@ -3,18 +3,19 @@
 The driver of every gear stage, and with it the loaded flanks, follows from statics under the mean torques. A
 motion that nothing holds is found whatever the sizes of springs and inertias; natural frequencies may not lie
 further apart than double precision resolves beside the free spin. Runs are refused, by stage, whose steps,
-records or spectra cannot follow the speeds at which the rigid chain turns under its torques.
+records or spectra cannot follow the speeds at which the rigid chain turns under its torques; what is allowed
+but deserves a look is a warning.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.case.units import FREQUENCY, SPEED
+from femgear.case.units import FREQUENCY, SPEED, TIME
 from femgear.errors import CaseError
 from femgear.storage.dataset import RPM
 from femgear.system.series import FourierSeries
@@ -32,7 +33,6 @@ from femgear.trains.drivetrain.section import (
     drivetrain_of,
     record_problems,
     settle_time,
-    spectrum_problems,
     torque_histories,
 )
 from femgear.trains.drivetrain.time import PASS_BAND, static_deviations
@@ -50,10 +50,18 @@ KEPT_HARMONIC, LEAST_RECORD_RATE = 3, 1000.0
 # Share of its strain energy that a mode has in the meshes where they drive it noticeably.
 MESH_SHARE = 0.1
 
+# A speed that changes by more is worth a remark.
+_CHANGE = 2.0
+# Share by which steps may lower the frequency of a mode that the meshes drive, and a small one.
+_SHIFT, _SMALL_SHIFT = 1e-2, 1e-3
+
 # Stiffness of a motion over that of its coordinates alone; a chain of 1500 coordinates keeps 1e-10.
 _NOT_RESISTED = 1e-12
 # Share of the largest motion that counts as moved, and coordinates that are named.
 _MOVED, _NAMED = 1e-3, 6
+
+# Records that spectra take at least.
+LEAST_RECORDS = 64
 
 # Force of a mesh, over the sum of what the single torques would give, that is rounding.
 _NO_FORCE = 1e-6
@@ -376,7 +384,7 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
             code="E-SPECTRUM",
             limit="one mesh or more",
         )
-    for problem in spectrum_problems(case, record_rate(case, model)):
+    for problem in _spectrum_problems(case, record_rate(case, model)):
         raise _located(problem, case)
     s = case.simulation
     late = speed_range(
@@ -387,6 +395,25 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
         check_turning(late.lowest, late.mean)
     except CaseError as error:
         raise _located(error, case) from None
+
+
+def _spectrum_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
+    """Why the records of a run have no spectra; `record` a second [Hz]."""
+    s = case.simulation
+    late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
+    if late * record < LEAST_RECORDS:
+        yield CaseError(
+            f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
+            key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
+            limit=f"{LEAST_RECORDS} records or more after simulation.settle",
+            remedy="take a longer duration, a shorter settle or more records, or write --only transient",
+        )  # fmt: skip
+    elif s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
+        yield CaseError(
+            "the record has no such resolution", code="E-RANGE", key="simulation.resolution",
+            value=FREQUENCY.show(s.resolution),
+            limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(record / 16.0)}",
+        )  # fmt: skip
 
 
 def check_turning(lowest: float, mean: float) -> None:
@@ -444,6 +471,94 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
         limit=f"{LEAST_STEPS} steps a period at any time: {FREQUENCY.show(LEAST_STEPS * hertz)} or more",
         remedy=remedy,
     )  # fmt: skip
+
+
+def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = None) -> tuple[str, ...]:
+    """What is allowed but deserves a look, in sentences; the model is made where it is not given.
+
+    Raises
+    ------
+    CaseError
+        As `check_drivetrain`, without a model.
+    """
+    model = model or check_drivetrain(case)
+    speeds = case_speeds(case, model)
+    warned = (
+        _runaway(case, speeds),
+        _rates(case, model, speeds),
+        _spectra(case, model),
+        _undamped(case),
+    )
+    return (*case.notices, *(text for some in warned for text in some))
+
+
+def _undamped(case: DrivetrainCase) -> Iterator[str]:
+    """Runs in which nothing takes energy out of vibration."""
+    if case.simulation.damping_ratio == 0.0:
+        yield (
+            "[W-DAMPING] simulation.damping_ratio: 0, no damping at all: vibration of the start never dies "
+            "away, resonances grow until something else stops them, and teeth seem to part that would not; "
+            "gear trains are commonly computed with 0.02 to 0.05"
+        )
+
+
+def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
+    """Torques that change the speed more than a run is meant for."""
+    first = speeds.first
+    if speeds.highest <= _CHANGE * first and speeds.lowest >= first / _CHANGE:
+        return
+    rpm = [f"{value / RPM:.6g}" for value in (first, speeds.last, speeds.lowest, speeds.highest)]
+    between = (
+        "" if speeds.last in (speeds.lowest, speeds.highest) else f" ({rpm[2]} to {rpm[3]} rpm on the way)"
+    )
+    turns = " and turn it back" if speeds.lowest < 0.0 else ""
+    yield (
+        f"[W-SPEED] operation.torque: the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
+        f"{case.simulation.duration:g} s{between}{turns}; share = 1.0 on another body balances them"
+    )
+
+
+def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[str]:
+    """Steps and records that are too slow for the highest mesh frequency, at the fastest speed."""
+    name, top = highest_mesh(model, speeds.fastest)
+    rate, record = case.simulation.rate, record_rate(case, model)
+    where = f"{top:.4g} Hz"
+    if speeds.fastest > 1.01 * speeds.first:
+        where += f" at {speeds.fastest / RPM:.6g} rpm, the fastest"
+    if rate < GOOD_STEPS * top:
+        yield (
+            f"[W-RATE] simulation.rate: {rate / top:.3g} steps a period of the {name} ({where}) shift and "
+            f"damp it; take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz"
+        )
+    # modes above the last line of the mesh stiffness answer as springs
+    mode = mesh_mode(model, top * case.simulation.harmonics)
+    if (shift := frequency_shift(mode, rate)) > _SHIFT:
+        yield (
+            f"[W-RATE] simulation.rate: steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the "
+            f"meshes drive, by {shift:.2%}; {_up(shift_rate(mode, _SHIFT))} Hz lowers it by {_SHIFT:.0%}, "
+            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {_SMALL_SHIFT:.1%}"
+        )
+    if 0.5 * PASS_BAND * record < top:
+        yield (
+            f"[W-RECORD] simulation.record: records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, "
+            f"below the {name} ({where})"
+        )
+
+
+def _up(value: float) -> str:
+    """Three digits, rounded up."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return f"{math.ceil(value / unit) * unit:.12g}"
+
+
+def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
+    """Runs that stop before the spectra, which would be refused."""
+    if not len(model.meshes):
+        return
+    try:
+        check_spectrum(case, model)
+    except CaseError as error:
+        yield f"[W-SPECTRUM] {error.key}: {error.message}: the stage spectrum refuses this ({error.code})"
 
 
 def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tuple[str, ...]]:

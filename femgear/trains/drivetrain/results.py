@@ -1,8 +1,7 @@
 """Results of a drivetrain case: modes.nc, transient.nc, spectrum.nc, their tables and warnings.
 
 Every variable of a file carries its units. `transient_warnings` tells what the motion says against itself;
-`describe_drivetrain` and `drivetrain_warnings` are about the chain of the case, the other tables about the
-numbers of a run.
+`describe_drivetrain` is about the chain of the case, the other tables about the numbers of a run.
 """
 
 from __future__ import annotations
@@ -15,21 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.errors import CaseError
 from femgear.report.tables import Block
 from femgear.storage.dataset import RPM, dataset
-from femgear.trains.drivetrain.checks import (
-    GOOD_STEPS,
-    SpeedRange,
-    case_speeds,
-    check_drivetrain,
-    check_spectrum,
-    frequency_shift,
-    highest_mesh,
-    mesh_mode,
-    record_rate,
-    shift_rate,
-)
+from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
 from femgear.trains.drivetrain.data import TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
@@ -60,10 +47,6 @@ _NOTHING = 1e-6
 
 # Modes of the table.
 _SHOWN = 16
-# A speed that changes by more is worth a remark.
-_CHANGE = 2.0
-# Share by which steps may lower the frequency of a mode that the meshes drive, and a small one.
-_SHIFT, _SMALL_SHIFT = 1e-2, 1e-3
 
 
 @dataclass(frozen=True)
@@ -433,94 +416,6 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
         _operation(case, model),
         Block("Warnings", notes=drivetrain_warnings(case, model) or ("none",)),
     )
-
-
-def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = None) -> tuple[str, ...]:
-    """What is allowed but deserves a look, in sentences; the model is made where it is not given.
-
-    Raises
-    ------
-    CaseError
-        As `femgear.trains.drivetrain.checks.check_drivetrain`, without a model.
-    """
-    model = model or check_drivetrain(case)
-    speeds = case_speeds(case, model)
-    warned = (
-        _runaway(case, speeds),
-        _rates(case, model, speeds),
-        _spectra(case, model),
-        _undamped(case),
-    )
-    return (*case.notices, *(text for some in warned for text in some))
-
-
-def _undamped(case: DrivetrainCase) -> Iterator[str]:
-    """Runs in which nothing takes energy out of vibration."""
-    if case.simulation.damping_ratio == 0.0:
-        yield (
-            "[W-DAMPING] simulation.damping_ratio: 0, no damping at all: vibration of the start never dies "
-            "away, resonances grow until something else stops them, and teeth seem to part that would not; "
-            "gear trains are commonly computed with 0.02 to 0.05"
-        )
-
-
-def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
-    """Torques that change the speed more than a run is meant for."""
-    first = speeds.first
-    if speeds.highest <= _CHANGE * first and speeds.lowest >= first / _CHANGE:
-        return
-    rpm = [f"{value / RPM:.6g}" for value in (first, speeds.last, speeds.lowest, speeds.highest)]
-    between = (
-        "" if speeds.last in (speeds.lowest, speeds.highest) else f" ({rpm[2]} to {rpm[3]} rpm on the way)"
-    )
-    turns = " and turn it back" if speeds.lowest < 0.0 else ""
-    yield (
-        f"[W-SPEED] operation.torque: the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
-        f"{case.simulation.duration:g} s{between}{turns}; share = 1.0 on another body balances them"
-    )
-
-
-def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[str]:
-    """Steps and records that are too slow for the highest mesh frequency, at the fastest speed."""
-    name, top = highest_mesh(model, speeds.fastest)
-    rate, record = case.simulation.rate, record_rate(case, model)
-    where = f"{top:.4g} Hz"
-    if speeds.fastest > 1.01 * speeds.first:
-        where += f" at {speeds.fastest / RPM:.6g} rpm, the fastest"
-    if rate < GOOD_STEPS * top:
-        yield (
-            f"[W-RATE] simulation.rate: {rate / top:.3g} steps a period of the {name} ({where}) shift and "
-            f"damp it; take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz"
-        )
-    # modes above the last line of the mesh stiffness answer as springs
-    mode = mesh_mode(model, top * case.simulation.harmonics)
-    if (shift := frequency_shift(mode, rate)) > _SHIFT:
-        yield (
-            f"[W-RATE] simulation.rate: steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the "
-            f"meshes drive, by {shift:.2%}; {_up(shift_rate(mode, _SHIFT))} Hz lowers it by {_SHIFT:.0%}, "
-            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {_SMALL_SHIFT:.1%}"
-        )
-    if 0.5 * PASS_BAND * record < top:
-        yield (
-            f"[W-RECORD] simulation.record: records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, "
-            f"below the {name} ({where})"
-        )
-
-
-def _up(value: float) -> str:
-    """Three digits, rounded up."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return f"{math.ceil(value / unit) * unit:.12g}"
-
-
-def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
-    """Runs that stop before the spectra, which would be refused."""
-    if not len(model.meshes):
-        return
-    try:
-        check_spectrum(case, model)
-    except CaseError as error:
-        yield f"[W-SPECTRUM] {error.key}: {error.message}: the stage spectrum refuses this ({error.code})"
 
 
 def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:

@@ -70,7 +70,6 @@ _REMARK = 1e-4
 
 MOST_STEPS = 1e8
 MOST_VALUES = 2.5e8
-LEAST_RECORDS = 64
 MOST_COORDINATES = 1500
 
 _DIMENSIONS = {"time": TIME, "torque": TORQUE}
@@ -729,25 +728,6 @@ def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
             f"{size:.3g} kept numbers are too many", code="E-RANGE", key="simulation.record",
             value=FREQUENCY.show(record), limit=f"{MOST_VALUES:g} numbers",
             remedy=f"take {FREQUENCY.show(record * MOST_VALUES / size)} or less, or a shorter duration",
-        )  # fmt: skip
-
-
-def spectrum_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
-    """Why the records of a run have no spectra; parameters as of `record_problems`."""
-    s = case.simulation
-    late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
-    if late * record < LEAST_RECORDS:
-        yield CaseError(
-            f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
-            key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
-            limit=f"{LEAST_RECORDS} records or more after simulation.settle",
-            remedy="take a longer duration, a shorter settle or more records, or write --only transient",
-        )  # fmt: skip
-    elif s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
-        yield CaseError(
-            "the record has no such resolution", code="E-RANGE", key="simulation.resolution",
-            value=FREQUENCY.show(s.resolution),
-            limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(record / 16.0)}",
         )  # fmt: skip
 
 

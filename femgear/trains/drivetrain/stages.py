@@ -26,6 +26,7 @@ from femgear.trains.drivetrain.checks import (
     check_drivetrain,
     check_spectrum,
     check_turning,
+    drivetrain_warnings,
     record_every,
     record_rate,
 )
@@ -40,7 +41,6 @@ from femgear.trains.drivetrain.results import (
     describe_drivetrain_modes,
     describe_spectrum,
     describe_transient,
-    drivetrain_warnings,
     transient_warnings,
 )
 from femgear.trains.drivetrain.section import (
