@@ -51,17 +51,9 @@ def main(
     sensitivity
         Whether to vary the assumed inputs of the published set.
     """
-    from femgear.report.draw import write_pictures
+    from femgear.trains.drivetrain.checks import case_model, check_spectrum
     from femgear.trains.drivetrain.results import describe_drivetrain, describe_spectrum, describe_transient
     from femgear.trains.drivetrain.section import need_drivetrain
-    from femgear.trains.drivetrain.setup import case_model, check_spectrum
-    from femgear.trains.drivetrain.stages import (
-        DRIVETRAIN,
-        solve_drivetrain_modes,
-        solve_spectrum,
-        solve_transient_run,
-    )
-    from femgear.trains.protocol import Drawn
     from femgear.trains.reading import read_case, with_value
 
     data, paper = need_drivetrain(read_case(case)), read_case(PAPER)
@@ -71,19 +63,13 @@ def main(
         data = with_value(data, "simulation.rate", rate)
     if modes is not None:
         data = with_value(data, "simulation.modes", modes)
-    data = with_value(data, "simulation.torsional", torsional)
+    data = need_drivetrain(with_value(data, "simulation.torsional", torsional))
     data = with_balance(data) if balanced else data
     blocks = describe_drivetrain(data)  # refuse before the folder is touched
     if gears := bool(data.parallel or data.planetary):
         check_spectrum(data, case_model(data))
     folder = ready_folder(output)
-    with Progress() as progress:
-        found = {"modes": solve_drivetrain_modes(data)}
-        found["transient"] = solve_transient_run(data, progress=progress)
-        if gears:
-            found["spectrum"] = solve_spectrum(data, found["transient"])
-        sets = {name: stage.dataset() for name, stage in found.items()}
-        names = write_pictures(folder, DRIVETRAIN, Drawn(data, sets), progress=progress)
+    sets, names = _computed(data, folder, gears=gears)
     _write_forces(folder, sets["transient"])
     names.append("forces.csv")
     blocks = [*(block for block in blocks if block.rows), describe_transient(sets["transient"])]
@@ -93,11 +79,30 @@ def main(
             print(f"  {note}")
     if _is_paper(data, paper):
         _kinematics()
-    extras = {"contact loss": lambda: backlash_figure(data, found["modes"].model)} if gears else {}
+    extras = {"contact loss": lambda: backlash_figure(data, case_model(data))} if gears else {}
     if sensitivity and _is_paper(data, paper):
         extras["sensitivity"] = _sensitivity
     names += _draw_extras(folder, extras)
     say_files(folder, names)
+
+
+def _computed(data, folder: Path, *, gears: bool):
+    """Datasets of all stages, and the names of the pictures of a run."""
+    from femgear.report.draw import write_pictures
+    from femgear.trains.drivetrain.stages import (
+        DRIVETRAIN,
+        solve_drivetrain_modes,
+        solve_spectrum,
+        solve_transient_run,
+    )
+    from femgear.trains.protocol import Drawn
+
+    with Progress() as progress:
+        transient = solve_transient_run(data, progress=progress)
+        sets = {"modes": solve_drivetrain_modes(data).dataset(), "transient": transient.dataset()}
+        if gears:
+            sets["spectrum"] = solve_spectrum(data, transient).dataset()
+        return sets, write_pictures(folder, DRIVETRAIN, Drawn(data, sets), progress=progress)
 
 
 def _draw_extras(folder: Path, extras) -> list[str]:

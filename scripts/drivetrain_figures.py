@@ -38,7 +38,7 @@ def backlash_figure(case, model, *, steps: int = 100_000):
     str
         What was found.
     """
-    from femgear.trains.drivetrain.figures import backlash_forces
+    from femgear.trains.drivetrain.figures import over_time
 
     parted, linear = separating_start(case, model, steps=steps)
     if not parted.lost.any():
@@ -54,7 +54,7 @@ def backlash_figure(case, model, *, steps: int = 100_000):
         f"{model.meshes[mesh]} parts first at {parted.time[first]:.4g} s; apart for "
         f"{parted.lost[mesh]:.2%} of the first {parted.time[-1]:.4g} s"
     )
-    return backlash_forces(time, curves, title=found), found
+    return over_time(time, [(found, curves)], unit="mesh force [kN]", factor=1e-3), found
 
 
 def separating_start(case, model, *, steps: int):
@@ -63,8 +63,7 @@ def separating_start(case, model, *, steps: int):
     The second is None where the linear motion outgrows the numbers.
     """
     from femgear.errors import ConvergenceError
-    from femgear.trains.drivetrain.section import settle_time
-    from femgear.trains.drivetrain.setup import torque_histories
+    from femgear.trains.drivetrain.section import settle_time, torque_histories
     from femgear.trains.drivetrain.time import march_drivetrain
 
     s, torques = case.simulation, torque_histories(case, model.ratio)
@@ -101,8 +100,6 @@ def sensitivity_figure(progress):
     """Lines of the mesh forces with every assumed number lower and higher."""
     from published.wind_turbine_drivetrain import ASSUMED, assumption_names, varied
 
-    from femgear.trains.drivetrain.figures import sensitivity
-
     names = [
         n for n in assumption_names() if "teeth" not in n and np.all(np.asarray(getattr(ASSUMED, n)) != 0.0)
     ]
@@ -116,7 +113,41 @@ def sensitivity_figure(progress):
     table = np.array(ratios).transpose(2, 0, 1)
     texts = ("f_p in sun-planet 1", "f_p − turn, sun-planet 1", "f_12 in gear 1-2", "f_23 in gear 2-3")
     title = "mesh force lines at half and twice each assumed input (contact ratios: 0.85 and 1.1 times)"
-    return sensitivity([n.replace("_", " ") for n in names], list(zip(texts, table)), title=title)
+    return input_ratios([n.replace("_", " ") for n in names], list(zip(texts, table)), title=title)
+
+
+def input_ratios(names, quantities, *, title: str = ""):
+    """What assumed inputs do: quantity at half and at twice the input over that at the input itself.
+
+    Parameters
+    ----------
+    names : (k,) sequence
+    quantities : sequence of (text, ratio (k, 2))
+
+    Returns
+    -------
+    Figure
+    """
+    from femgear.report.style import BLACK, COLOURS, SIZE, label, legend_below, new_figure
+
+    count = len(names)
+    figure, axes = new_figure(
+        columns=len(quantities), width=3.6 * len(quantities) + 2.4, height=0.3 * count + 1.8, sharey=True
+    )
+    at = np.arange(count)[::-1]
+    for ax, (text, ratio) in zip(axes, quantities):
+        ratio = np.asarray(ratio, float)
+        for side, (colour, note) in enumerate(((COLOURS[0], "lower input"), (COLOURS[1], "higher input"))):
+            ax.barh(
+                at + 0.18 - 0.36 * side, ratio[:, side] - 1.0, height=0.34, left=1.0, color=colour, label=note
+            )
+        ax.axvline(1.0, color=BLACK, linewidth=0.8)
+        ax.set_yticks(at, names)
+        label(ax, "ratio [1]", title=text)
+    if title:
+        figure.suptitle(title, fontsize=SIZE)
+    legend_below(figure)
+    return figure
 
 
 def line_amplitudes(assumed) -> np.ndarray:

@@ -10,9 +10,9 @@ from published.wind_turbine_drivetrain import paper_torques, ratio_of_radii, win
 from femgear.case import text as case_text
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError
+from femgear.trains.drivetrain.checks import case_model, check_drivetrain
 from femgear.trains.drivetrain.results import describe_drivetrain
-from femgear.trains.drivetrain.section import DrivetrainCase
-from femgear.trains.drivetrain.setup import case_model, check_drivetrain, drivetrain_of, torque_histories
+from femgear.trains.drivetrain.section import DrivetrainCase, drivetrain_of, torque_histories
 from femgear.trains.reading import case_schema, parse_case, read_case, to_toml, with_value
 
 CASES = Path(__file__).parents[1] / "cases"

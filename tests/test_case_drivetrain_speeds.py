@@ -8,8 +8,8 @@ import pytest
 
 from femgear.case import text as case_text
 from femgear.errors import CaseError
+from femgear.trains.drivetrain.checks import case_model, check_drivetrain, check_spectrum, record_rate
 from femgear.trains.drivetrain.results import describe_drivetrain
-from femgear.trains.drivetrain.setup import case_model, check_drivetrain, check_spectrum, record_rate
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 
 CASES = Path(__file__).parents[1] / "cases"

@@ -10,11 +10,13 @@ import pytest
 
 from femgear.report.style import png_bytes
 from femgear.trains.drivetrain.figures import (
-    backlash_forces,
+    Layout,
+    ModeView,
+    Wheel,
     band,
+    drivetrain_pictures,
     mode_pictures,
     over_time,
-    sensitivity,
     spectra,
     spectrum_figures,
     stiffness_series,
@@ -41,8 +43,6 @@ def test_curves_and_units():
     panels = [("one", [("a", TIME), ("b", 2.0 * TIME)]), ("two", [("a", TIME**2)])]
     motion = drawn(over_time(TIME, panels, unit="mrad", factor=1e3))
     assert len(motion) == 2 and np.allclose(motion[0][1][:, 1], 2e3 * TIME)
-    forces = drawn(backlash_forces(TIME, [("linear", -TIME)]))
-    assert np.allclose(forces[0][0][:, 1], -1e-3 * TIME)
 
 
 def test_spectra_mark_their_lines():
@@ -52,8 +52,11 @@ def test_spectra_mark_their_lines():
     assert any(np.allclose(line[:, 0], 0.5) for line in drawn(figure)[0])
 
 
-def test_bars_start_at_one():
-    figure = sensitivity(["mass", "length"], [("line", [[0.5, 2.0], [1.0, 1.5]])])
+def test_bars_start_at_one(monkeypatch):
+    monkeypatch.syspath_prepend(str(CASE.parents[1] / "scripts"))
+    from drivetrain_figures import input_ratios
+
+    figure = input_ratios(["mass", "length"], [("line", [[0.5, 2.0], [1.0, 1.5]])])
     bars = figure.axes[0].patches
     assert {bar.get_x() for bar in bars} <= {1.0, 0.5} or all(bar.get_x() == 1.0 for bar in bars)
     assert sorted(round(bar.get_width(), 9) for bar in bars) == [-0.5, 0.0, 0.5, 1.0]
@@ -179,10 +182,12 @@ def test_captions_follow_the_contact():
 def test_picture_of_a_mode(tmp_path):
     import imageio.v3 as iio
 
-    from femgear.trains.drivetrain.scene import ModeView, drivetrain_pictures
-
-    wheels = [((0.0, 0.0, 0.0), 0.3, 0.1, 0), ((0.0, 0.0, 1.0), 0.2, 0.1, 1)]
-    centres = np.array([w[0] for w in wheels])
+    wheels = (
+        Wheel("one", np.zeros(3), 0.3, 0.1, 0),
+        Wheel("two", np.array([0.0, 0.0, 1.0]), 0.2, 0.1, 1),
+    )
+    centres = np.array([wheel.centre for wheel in wheels])
+    layout = Layout(("one", "two"), centres, wheels, ((0, 1),))
     line = np.linspace(0.0, 1.0, 9)[:, None] * [0.0, 0.0, 1.0]
     still, up = np.zeros((2, 3)), np.array([[0.0, 1.0, 0.0], [0.0] * 3])
     bulge = np.sin(np.pi * line[:, 2:]) * [0.0, 4.0, 0.0]
@@ -194,7 +199,7 @@ def test_picture_of_a_mode(tmp_path):
             ("rest", still, 0.0 * line),
         )
     ]
-    scales = drivetrain_pictures(views, wheels=wheels, centres=centres, names=("one", "two"), size=300)
+    scales = drivetrain_pictures(views, layout, size=300)
     images = [iio.imread(view.path) for view in views]
     # a disc moves by the share of the length, 1.1 m from face to face; or the shaft, which moves most
     assert scales == pytest.approx([0.12 * 1.1, 0.12 * 1.1 / 4.0, 0.0], rel=1e-6)
@@ -205,11 +210,11 @@ def test_picture_of_a_mode(tmp_path):
 def test_modes_have_the_numbers_of_the_table(tmp_path, monkeypatch):
     import xarray as xr
 
-    from femgear.trains.drivetrain import scene
-    from femgear.trains.drivetrain.setup import case_model
+    from femgear.trains.drivetrain import figures
+    from femgear.trains.drivetrain.checks import case_model
 
     model, drawn = case_model(read_case(CASE)), []
-    monkeypatch.setattr(scene, "drivetrain_pictures", lambda views, **_: drawn.extend(views))
+    monkeypatch.setattr(figures, "drivetrain_pictures", lambda views, _: drawn.extend(views))
     kinds, hertz = ["rigid", "bending", "torsional"], [0.0, 5.0, 7.0]
     shapes = np.eye(len(model.rigid))[:, :3]
     data = {"kind": ("mode", kinds), "frequency": ("mode", hertz), "shape": (("dof", "mode"), shapes)}

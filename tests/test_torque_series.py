@@ -87,13 +87,13 @@ def test_columns_in_any_order_with_decimal_commas_and_quotation_marks(tmp_path):
         '"time (ms)", "torque (N m)"\n0, 10.25\n500, -350\n',
     ):
         path.write_text(text, encoding="utf-8")
-        assert read_torques(path) == ([0.0, 0.5], pytest.approx([10.25, -350.0]))
+        assert read_torques(path) == {"times": [0.0, 0.5], "torques": pytest.approx([10.25, -350.0])}
 
 
 def test_torque_files_carry_their_units(tmp_path):
     path = tmp_path / "torque.csv"
     path.write_text("# gusts\ntorque [kN m];time [min]\n15;0\n16,5;1\n", encoding="utf-8")
-    assert read_torques(path) == ([0.0, 60.0], [15e3, pytest.approx(16.5e3)])
+    assert read_torques(path) == {"times": [0.0, 60.0], "torques": [15e3, pytest.approx(16.5e3)]}
     text = OWN.read_text(encoding="utf-8").replace("own_chain_motor.csv", "../torque.csv")
     with pytest.raises(CaseError, match="in the folder of the case"):
         parse_case(text, name=str(tmp_path / "case.toml"))

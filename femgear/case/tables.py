@@ -218,6 +218,19 @@ def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
         raise
 
 
+def embed_points(
+    table: dict, name: str, key: str, read: Callable[[str], Any], units: Mapping[str, str]
+) -> str:
+    """Put the points of the ``file`` of a table, read as SI values by entry, in its place; the file's name.
+
+    `name` and `key` are those of the case file and of the table in it; refusals as of `embedded`.
+    """
+    file = table.pop("file")
+    for entry, values in embedded(file, name, f"{key}.file", read).items():
+        table[entry] = [f"{value:.13g} {units[entry]}" for value in values]
+    return text.printable(file)
+
+
 def embed_profiles(data: dict, name: str) -> dict[str, str]:
     """Put the points of every ``file`` of a measured profile in its place.
 
@@ -248,11 +261,7 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
             if table.get("kind") != "measured profile" or "deviations" in table:
                 continue
             key = f"{gear}.modifications[{i}]"
-            file = table.pop("file")
-            columns = embedded(file, name, f"{key}.file", read_profile)
-            for column, values in columns.items():
-                table[column] = [f"{value:.13g} {_PROFILE_UNITS[column]}" for value in values]
-            found[key] = text.printable(file)
+            found[key] = embed_points(table, name, key, read_profile, _PROFILE_UNITS)
     return found
 
 

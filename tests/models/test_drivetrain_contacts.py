@@ -23,7 +23,7 @@ from femgear.trains.drivetrain.model import (
     drivetrain_problem,
     torsional_model,
 )
-from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.drivetrain.time import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
 ALPHA, RADIUS = math.radians(20.0), 0.0345
@@ -168,7 +168,7 @@ def test_reversed_torque_against_an_adaptive_integrator():
             constant_torques(back),
             duration=0.02,
             step=1e-4 / n,
-            every=n,
+            records=Records(n),
             speed=20.0,
             start=start,
             outputs=model.system.dofs,
@@ -184,7 +184,7 @@ def test_reversed_torque_against_an_adaptive_integrator():
     size = np.abs(exact.displacement).max(axis=0)
     coarse, fine = (np.abs(r.motion - exact.displacement).max(axis=0) / size for r in runs)
     assert np.all(fine < 2e-6) and np.all(fine < coarse / 8.0)
-    assert runs[1].ledger.error < 1e-9 and runs[1].momentum < 1e-9
+    assert runs[1].energy_balance.error < 1e-9 and runs[1].momentum < 1e-9
 
 
 def test_books_balance_with_wedged_teeth():
@@ -202,14 +202,15 @@ def test_books_balance_with_wedged_teeth():
     assert 0.05 < wedged.mean() < 0.95
     force = K * (np.maximum(both[:, 0], 0.0) - np.maximum(both[:, 1], 0.0))
     assert run.force[:, 0] == pytest.approx(force, rel=1e-9, abs=1e-9 * np.abs(force).max())
-    assert run.ledger.error < 1e-9 and run.momentum < 1e-9
+    assert run.energy_balance.error < 1e-9 and run.momentum < 1e-9
 
 
 def test_thinned_records_are_those_of_all_steps():
     model = drivetrain_model(TRAIN)
     options = {"duration": 0.2, "step": 1e-4, "speed": 0.63, "start": "zero", "contact_loss": True}
     every, tenth = (
-        march_drivetrain(model, constant_torques(paper_torques()), every=n, **options) for n in (1, 10)
+        march_drivetrain(model, constant_torques(paper_torques()), records=Records(n), **options)
+        for n in (1, 10)
     )
     assert np.array_equal(every.force[::10], tenth.force)
     assert np.array_equal(every.approach[::10], tenth.approach)

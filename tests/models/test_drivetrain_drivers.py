@@ -6,11 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drivetrain_references import torsional_matrices
 from published.wind_turbine_drivetrain import paper_torques, wind_turbine_drivetrain
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.trains.drivetrain.checks import mean_torque, speed_ratios, with_drivers
+from femgear.trains.drivetrain.checks import (
+    BENDING,
+    TORSIONAL,
+    case_model,
+    mean_torque,
+    speed_ratios,
+    with_drivers,
+)
 from femgear.trains.drivetrain.data import (
     ChainBearing,
     ChainBody,
@@ -24,10 +32,9 @@ from femgear.trains.drivetrain.data import (
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
-    torsional_matrices,
     torsional_model,
 )
-from femgear.trains.drivetrain.setup import BENDING, TORSIONAL, case_model, drivetrain_of
+from femgear.trains.drivetrain.section import drivetrain_of
 from femgear.trains.drivetrain.time import march_drivetrain
 from femgear.trains.reading import read_case, with_value
 

@@ -130,7 +130,7 @@ def test_a_motion_that_outgrows_the_numbers_is_refused_at_once():
     assert 15.0 / growth < time < 60.0 / growth
     # real meshes part and the motion stays bounded
     run = run_at(model, 2.0, periods=1000, torques=torques, contact_loss=True)
-    assert run.contact_loss and run.lost[0] > 0.02 and run.ledger.error < 1e-9 and run.momentum < 1e-9
+    assert run.contact_loss and run.lost[0] > 0.02 and run.energy_balance.error < 1e-9 and run.momentum < 1e-9
     assert run.extremes[1, 0] < 10.0 * 500.0 / (0.05 * math.cos(math.radians(20.0)))
 
 
@@ -138,7 +138,7 @@ def test_a_growing_motion_that_is_still_accurate_passes():
     model = pair()
     torques = constant_torques(balanced_torque(model, "a", 500.0, "b"))
     run = run_at(model, 2.0, periods=100, torques=torques)
-    assert run.growth > 50.0 and run.ledger.error < 1e-9
+    assert run.growth > 50.0 and run.energy_balance.error < 1e-9
     assert run.extremes[1, 0] > 1e5
 
 

@@ -9,7 +9,7 @@ import pytest
 from femgear.system.shaft import ShaftSection
 from femgear.trains.drivetrain.checks import loose_motions
 from femgear.trains.drivetrain.data import ChainBearing, ChainBody, ChainShaft, Drivetrain
-from femgear.trains.drivetrain.setup import drivetrain_of
+from femgear.trains.drivetrain.section import drivetrain_of
 from femgear.trains.reading import read_case
 
 CASES = Path(__file__).parents[2] / "cases"

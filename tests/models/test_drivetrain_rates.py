@@ -6,6 +6,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from femgear.trains.drivetrain.checks import (
+    case_model,
+    default_record_rate,
+    frequency_shift,
+    highest_mesh,
+    mesh_mode,
+    shift_rate,
+    speed_range,
+)
 from femgear.trains.drivetrain.data import (
     ChainBearing,
     ChainBody,
@@ -16,16 +25,7 @@ from femgear.trains.drivetrain.data import (
     constant_torques,
 )
 from femgear.trains.drivetrain.model import drivetrain_model
-from femgear.trains.drivetrain.setup import case_model
-from femgear.trains.drivetrain.time import (
-    default_record_rate,
-    frequency_shift,
-    highest_mesh,
-    march_drivetrain,
-    mesh_mode,
-    shift_rate,
-    speed_range,
-)
+from femgear.trains.drivetrain.time import march_drivetrain
 from femgear.trains.reading import read_case
 
 CASES = Path(__file__).parents[2] / "cases"

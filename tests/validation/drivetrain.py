@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from drivetrain_references import torsional_matrices
 from published.wind_turbine_drivetrain import (
     PRINTED,
     RADII_TEETH,
@@ -31,10 +32,9 @@ from femgear.trains.drivetrain.model import (
     drivetrain_model,
     planar_of,
     rectangular_series,
-    torsional_matrices,
     torsional_model,
 )
-from femgear.trains.drivetrain.time import march_drivetrain
+from femgear.trains.drivetrain.time import Records, march_drivetrain
 from validation.rows import Row, at_most, information, printed, within
 from validation.timoshenko import Disc, Support, free_bending, shaft_system
 
@@ -209,11 +209,11 @@ def _balances(duration: float) -> tuple[Row, ...]:
     run = march_drivetrain(
         model, constant_torques(paper_torques()), duration=duration, step=5e-5, speed=PRINTED.speed,
         start="zero",
-        every=200,
+        records=Records(200),
     )  # fmt: skip
     text = f"36 dof, {duration:g} s in steps of 50 µs:"
     return (
-        at_most("balances", "theory", f"{text} energy", 1e-6, run.ledger.error),
+        at_most("balances", "theory", f"{text} energy", 1e-6, run.energy_balance.error),
         at_most("balances", "theory", f"{text} angular momentum", 1e-6, run.momentum),
         at_most("balances", "theory", f"{text} spin in the deviations [rad]", 1e-9, run.drift),
     )
@@ -283,5 +283,5 @@ def contact_loss() -> tuple[Row, ...]:
     text = "flight and impact, 800 steps a period, three periods:"
     return (
         at_most("contact loss", "closed form", f"{text} approach over its range", 1e-4, error),
-        at_most("contact loss", "theory", f"{text} energy balance", 1e-9, run.ledger.error),
+        at_most("contact loss", "theory", f"{text} energy balance", 1e-9, run.energy_balance.error),
     )

@@ -1,20 +1,25 @@
-"""Checks of a drivetrain: loose motions, frequencies that lie too far apart, and which body drives a stage.
+"""Model of a drivetrain case, its loaded flanks, and checks of what a run can represent.
 
-A motion that nothing holds is found whatever the sizes of springs and inertias; natural frequencies may not
-lie further apart than double precision resolves beside the free spin. The driver of every gear stage, and
-with it the loaded flanks, follows from statics under the given torques.
+The driver of every gear stage, and with it the loaded flanks, follows from statics under the mean torques. A
+motion that nothing holds is found whatever the sizes of springs and inertias; natural frequencies may not lie
+further apart than double precision resolves beside the free spin. Runs are refused, by stage, whose steps,
+records or spectra cannot follow the speeds at which the rigid chain turns under its torques; what is allowed
+but deserves a look is a warning.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femgear.case.units import FREQUENCY, SPEED, TIME
 from femgear.errors import CaseError
-from femgear.trains.drivetrain.data import ChainBearing, ChainShaft, Drivetrain, MeshWave, TorqueHistory
+from femgear.storage.dataset import RPM
+from femgear.system.fourier import FourierSeries
+from femgear.trains.drivetrain.data import ChainBearing, ChainShaft, Drivetrain, TorqueHistory
 from femgear.trains.drivetrain.model import (
     DrivetrainModel,
     coordinates_of,
@@ -22,13 +27,41 @@ from femgear.trains.drivetrain.model import (
     rigid_rotation,
     torsional_model,
 )
-from femgear.trains.drivetrain.section import DrivetrainCase
-from femgear.trains.drivetrain.time import static_deviations
+from femgear.trains.drivetrain.section import (
+    FASTEST_RATE,
+    DrivetrainCase,
+    drivetrain_of,
+    record_problems,
+    settle_time,
+    torque_histories,
+)
+from femgear.trains.drivetrain.time import PASS_BAND, static_deviations
+
+BENDING, TORSIONAL = "with bending", "torsional"
+# Slower instants, over the mean speed, would need records of endless length over a turn.
+SLOWEST = 0.05
+
+# Steps a period that can follow a mesh at all, and well: average acceleration lowers its frequency by
+# (2 pi / steps)^2 / 12, 21 % for four, 0.4 % for thirty.
+# Not enough where modes lie far above the mesh lines: see `mesh_mode`.
+LEAST_STEPS, GOOD_STEPS = 4, 30
+# Records that nobody chose keep this multiple of the highest mesh frequency, and come this often [Hz].
+KEPT_HARMONIC, LEAST_RECORD_RATE = 3, 1000.0
+# Share of its strain energy that a mode has in the meshes where they drive it noticeably.
+MESH_SHARE = 0.1
+
+# A speed that changes by more is worth a remark.
+_CHANGE = 2.0
+# Share by which steps may lower the frequency of a mode that the meshes drive, and a small one.
+_SHIFT, _SMALL_SHIFT = 1e-2, 1e-3
 
 # Stiffness of a motion over that of its coordinates alone; a chain of 1500 coordinates keeps 1e-10.
 _NOT_RESISTED = 1e-12
 # Share of the largest motion that counts as moved, and coordinates that are named.
 _MOVED, _NAMED = 1e-3, 6
+
+# Records that spectra take at least.
+LEAST_RECORDS = 64
 
 # Force of a mesh, over the sum of what the single torques would give, that is rounding.
 _NO_FORCE = 1e-6
@@ -36,178 +69,30 @@ _NO_FORCE = 1e-6
 _RIGID = 1e3
 
 
-def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tuple[str, ...]]:
-    """Number of motions besides the free spin that no spring resists, and what moves most in them.
-
-    Whether a motion is resisted does not depend on how stiff the springs are. Therefore all of them get like
-    stiffnesses, 1 N/m across and 1 N/m times a length squared against rotation; the coordinates are scaled by
-    their own stiffness, ``D K D`` with ones on the diagonal, and what is left is a matter of rank (null space
-    of the stiffness: M. Geradin and D. J. Rixen, Mechanical Vibrations, 3rd ed., section 2.9).
-
-    Parameters
-    ----------
-    train : Drivetrain
-    turning : bool
-        As of `drivetrain_model`.
-
-    Returns
-    -------
-    count : int
-    names : tuple of str
-        Coordinates of those motions, the largest first, rotations last.
+def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
+    """Model of a case, its loaded flanks those that the mean torques press together.
 
     Raises
     ------
     CaseError
-        As `drivetrain_model`.
+        Stages that leave no single spin (E-KINEMATICS), mesh directions that cannot turn (E-TURNING).
     """
-    from scipy import linalg
-
-    model = drivetrain_model(_like_springs(train), harmonics=1, turning=turning)
-    system = model.system
-    stiffness = system.K + (system.W * model.mean_stiffness) @ system.W.T
-    own = np.diag(stiffness)
-    size = np.sqrt(np.where(own > 0.0, own, 1.0))
-    # the spin is known, and held
-    spin = model.rigid * size
-    scaled = stiffness / np.outer(size, size) + np.outer(spin, spin) / (spin @ spin)
-    count = int(np.count_nonzero(linalg.eigvalsh(scaled) < _NOT_RESISTED))
-    if not count:
-        return 0, ()
-    return count, _names(train, model, linalg.eigh(scaled, subset_by_index=(0, count - 1))[1])
+    build = drivetrain_model if variant == BENDING else torsional_model
+    options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
+    try:
+        train = drivetrain_of(case)
+        torques = torque_histories(case, speed_ratios(train))
+        return build(with_drivers(train, torques, duration=case.simulation.duration), **options)
+    except CaseError as error:
+        raise _located(error, case) from None
 
 
-def _names(train: Drivetrain, model: DrivetrainModel, motions) -> tuple[str, ...]:
-    """Coordinates of bodies before those of planets and shaft stations, rotations last."""
-    size, bodies = np.abs(motions).max(axis=1), {body.name for body in train.bodies}
-    order = [i for i in np.argsort(-size, kind="stable") if size[i] > _MOVED * size.max()]
-    names = [model.system.dofs[i] for i in order]
-    return tuple(
-        sorted(names, key=lambda n: (n.endswith("rotation"), n.split(":")[0] not in bodies))[:_NAMED]
-    )
-
-
-def _like_springs(train: Drivetrain) -> Drivetrain:
-    """The chain with springs that are all alike, without weight and damping."""
-    lengths = [one.length for one in train.shafts]
-    lengths += [one.first_radius for one in train.parallel] + [one.sun_radius for one in train.planetary]
-    arm = math.exp(np.mean(np.log(lengths))) if lengths else 1.0
-    return replace(
-        train,
-        shafts=tuple(_shaft(one, arm) for one in train.shafts),
-        parallel=tuple(replace(one, mesh=_mesh(one.mesh)) for one in train.parallel),
-        planetary=tuple(
-            replace(
-                one,
-                sun_mesh=_mesh(one.sun_mesh),
-                ring_mesh=_mesh(one.ring_mesh),
-                planet_bearing=_unit(one.planet_bearing),
-            )
-            for one in train.planetary
-        ),
-        bearings=tuple(_bearing(one, arm) for one in train.bearings),
-        gravity=0.0,
-        damping_ratio=0.0,
-    )
-
-
-def _unit(stiffness: float, unit: float = 1.0) -> float:
-    """The unit in place of a spring that is there and not rigid."""
-    return stiffness if stiffness == 0.0 or math.isinf(stiffness) else unit
-
-
-def _mesh(wave: MeshWave) -> MeshWave:
-    return replace(wave, stiffness=1.0)
-
-
-def _bearing(one: ChainBearing, arm: float) -> ChainBearing:
-    return replace(
-        one, radial=_unit(one.radial), tilt=_unit(one.tilt, arm**2), torsion=_unit(one.torsion, arm**2)
-    )
-
-
-def _shaft(one: ChainShaft, arm: float) -> ChainShaft:
-    if not one.elements:
-        springs = one.springs
-        return replace(
-            one, section=None, bending=_unit(springs.bending, arm**2), torsion=_unit(springs.torsion, arm**2),
-            shear=_unit(springs.shear),
-        )  # fmt: skip
-    # a slender shaft of 12 E I / l^3 = 1 N/m
-    diameter = 0.1 * one.length
-    modulus = one.length**3 / (12.0 * math.pi * diameter**4 / 64.0)
-    section = replace(one.section, outer_diameter=diameter, inner_diameter=0.0, young=modulus)
-    return replace(one, section=section)
-
-
-def check_spread(case: DrivetrainCase, train: Drivetrain) -> None:
-    """Refuse slow motions that rounding hides beside the free spin.
-
-    Raises
-    ------
-    CaseError
-        E-SPREAD, with the softest support where that is the cause, else with the fastest and the slowest
-        coordinate.
-    """
-    from scipy import linalg
-
-    model = drivetrain_model(replace(train, damping_ratio=0.0), turning=case.simulation.turning)
-    n, mass = len(model.rigid), model.system.M
-    stiffness = model.system.K + (model.system.W * model.mean_stiffness) @ model.system.W.T
-    values = linalg.eigvalsh(stiffness, mass)
-    # what the modes take for rigid: a share of a norm, which is up to sqrt(n) above the largest
-    share = math.sqrt(n) * max(1e-12, 10.0 * n * np.finfo(float).eps)
-    if n == 1 or values[1] > share * values[-1]:
-        return
-    own = np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2.0 * math.pi)
-    fast = int(np.argmax(own))
-    factor = f"a factor of {1.0 / math.sqrt(share):.1g}"
-    shown = {"code": "E-SPREAD", "limit": f"frequencies within {factor}"}
-    words = "natural frequencies are too far apart for double precision: "
-    words += f"{model.system.dofs[fast]} by itself has {own[fast]:.3g} Hz, and "
-    soft, (place, name), value = _softest(train)
-    # a support is the cause where it lies further from the middle than the fastest coordinate does
-    if soft * 2.0 * math.pi * own[fast] < (2.0 * math.pi * np.median(own)) ** 2:
-        raise CaseError(
-            f"{words}{name} on its bearings alone has {soft / (2.0 * math.pi):.3g} Hz, slower by more than "
-            f"{factor}",
-            key=place, value=value, file=case.location(place), **shown,
-            remedy=f"stiffen the bearings of {name}: theirs are the softest",
-        )  # fmt: skip
-    second = _slowest(model, stiffness)
-    names = [body.name for body in case.body]
-    members = [name.split(":")[0] for name in (model.system.dofs[fast], second)]
-    key = f"body[{names.index(members[0])}]" if members[0] in names else "shaft"
-    raise CaseError(
-        f"{words}{second} moves slower by more than {factor}", key=key, file=case.location(key), **shown,
-        remedy=f"give {members[0]} more mass or inertia or rigid springs, or stiffen what holds {members[1]}",
-    )  # fmt: skip
-
-
-def _slowest(model: DrivetrainModel, stiffness) -> str:
-    """Coordinate with most of the kinetic energy of the slowest motion besides the free spin."""
-    from scipy import linalg
-
-    mass = model.system.M
-    slow = linalg.eigh(stiffness, mass, subset_by_index=(0, 1))[1]
-    slow = slow - np.outer(model.rigid, model.rigid @ mass @ slow) / model.inertia
-    energy = np.abs(slow * (mass @ slow)).max(axis=1)
-    return model.system.dofs[int(np.argmax(energy))]
-
-
-def _softest(train: Drivetrain) -> tuple[float, tuple[str, str], str]:
-    """Slowest body on its own bearings: frequency [rad/s], key and body, stiffness; infinite without any."""
-    found = [(math.inf, ("", ""), "")]
-    for body in train.bodies:
-        places = [i for i, one in enumerate(train.bearings) if one.body == body.name and not one.station]
-        inertias = ("radial", body.mass, "N/m"), ("tilt", body.transverse_inertia, "N m/rad")
-        for kind, inertia, unit in inertias if body.tilts else inertias[:1]:
-            springs = [getattr(train.bearings[i], kind) for i in places]
-            if sum(springs) > 0.0:
-                first = places[int(np.argmax(springs))]
-                speed = math.sqrt(sum(springs) / inertia)
-                found.append((speed, (f"bearing[{first}].{kind}", body.name), f"{max(springs):g} {unit}"))
-    return min(found)
+def _located(error: CaseError, case: DrivetrainCase) -> CaseError:
+    """The error of a model in terms of the case file."""
+    if error.code == "E-TURNING":
+        error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
+    error.file = case.location(error.key or "")
+    return error
 
 
 def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
@@ -299,3 +184,549 @@ def _elastic(train: Drivetrain) -> Drivetrain:
         for one in train.shafts
     )
     return replace(train, shafts=shafts, damping_ratio=0.0)
+
+
+@dataclass(frozen=True)
+class SpeedRange:
+    """Speeds of the free spin over a run: first, last, lowest, highest and mean over time [rad/s]."""
+
+    first: float
+    last: float
+    lowest: float
+    highest: float
+    mean: float
+
+    @property
+    def fastest(self) -> float:
+        """Largest speed in either sense [rad/s]."""
+        return max(abs(self.lowest), abs(self.highest))
+
+
+def speed_range(
+    model: DrivetrainModel,
+    torques: Sequence[TorqueHistory],
+    *,
+    duration: float,
+    speed: float,
+    start: float = 0.0,
+) -> SpeedRange:
+    """Speeds of the first body as the rigid chain turns under its torques.
+
+    Newton's law of the rigid chain, d omega / dt = sum(ratio_b T_b(t)) / I with its inertia I about the axis
+    of the first body. Torques are linear between their instants, so that the speed there is a sum of
+    trapezoids, and a parabola in between with its vertex where the sum is zero.
+
+    Parameters
+    ----------
+    model : DrivetrainModel
+    torques : sequence of TorqueHistory
+    duration : float
+        [s]
+    speed : float
+        Of the first body at time zero [rad/s].
+    start : float
+        The range is that from here to the end [s].
+
+    Returns
+    -------
+    SpeedRange
+    """
+    instants = np.concatenate([[0.0, start, duration], *(one.times for one in torques)])
+    times = np.unique(np.clip(instants, 0.0, duration))
+    power = sum((model.ratio[one.body] * one.at(times) for one in torques), np.zeros(len(times)))
+    rate, step = power / model.inertia, np.diff(times)
+    speeds = speed + np.append(0.0, np.cumsum(0.5 * step * (rate[1:] + rate[:-1])))
+    begin = int(np.searchsorted(times, start))
+    rate, step, speeds = rate[begin:], step[begin:], speeds[begin:]
+    middle = speeds[:-1] + step * (3.0 * rate[:-1] + rate[1:]) / 8.0
+    # simpson's rule, exact for parabolas
+    mean = step @ (speeds[:-1] + 4.0 * middle + speeds[1:]) / (6.0 * step.sum())
+    turning = np.flatnonzero(rate[1:] * rate[:-1] < 0.0)
+    vertex = rate[turning] ** 2 / (rate[turning] - rate[turning + 1]) * step[turning]
+    every = np.append(speeds, speeds[turning] + 0.5 * vertex)
+    return SpeedRange(*map(float, (speeds[0], speeds[-1], every.min(), every.max(), mean)))
+
+
+def case_speeds(case: DrivetrainCase, model: DrivetrainModel) -> SpeedRange:
+    """Speeds of the first body over the run, without its deviation."""
+    torques = torque_histories(case, model.ratio)
+    return speed_range(model, torques, duration=case.simulation.duration, speed=case.operation.speed)
+
+
+def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:
+    """Steps a record: as given, or what the highest mesh frequency of the run asks for."""
+    s = case.simulation
+    record = s.record
+    if record is None:
+        record = default_record_rate(s.rate, highest_mesh(model, case_speeds(case, model).fastest)[1])
+    return max(1, round(s.rate / record))
+
+
+def record_rate(case: DrivetrainCase, model: DrivetrainModel) -> float:
+    """Records a second [Hz]; see `record_every`."""
+    return case.simulation.rate / record_every(case, model)
+
+
+def highest_mesh(model: DrivetrainModel, speed: float) -> tuple[str, float]:
+    """Name and frequency [Hz] of the fastest mesh at a speed of the first body; none, 0 without gears."""
+    bases = np.unique(model.mesh_base)
+    if not len(bases):
+        return "none", 0.0
+    hertz = model.frequencies(abs(speed))[bases] / (2.0 * math.pi)
+    return model.bases[bases[np.argmax(hertz)]], float(hertz.max())
+
+
+def mesh_mode(model: DrivetrainModel, limit: float) -> float:
+    """Frequency of the highest mode that the meshes drive noticeably [Hz]; 0 where there is none.
+
+    Modes at standstill with mean mesh stiffnesses; the share of the meshes in the strain energy of a mode
+    ``phi`` is ``sum(k (w^T phi)^2) / omega^2`` (R. G. Parker and J. Lin, J. Vib. Acoust. 126, 2004, 68-76).
+
+    Parameters
+    ----------
+    model : DrivetrainModel
+    limit : float
+        The highest line of the mesh stiffness [Hz]; modes above answer it as springs do, without resonance.
+    """
+    from scipy import linalg
+
+    if not len(model.meshes):
+        return 0.0
+    rows, stiffness = model.system.W, model.mean_stiffness
+    total = model.system.K + (rows * stiffness) @ rows.T
+    values, shapes = linalg.eigh(total, model.system.M)
+    # the free spin is the first
+    values, shapes = np.maximum(values[1:], 0.0), shapes[:, 1:]
+    hertz = np.sqrt(values) / (2.0 * math.pi)
+    driven = stiffness @ (rows.T @ shapes) ** 2 > MESH_SHARE * values
+    return float(hertz[driven & (hertz <= limit)].max(initial=0.0))
+
+
+def frequency_shift(hertz: float, rate: float) -> float:
+    """Share by which average acceleration lowers a natural frequency [Hz] at so many steps a second [Hz].
+
+    ``tan(Omega h / 2) = omega h / 2`` for the frequency Omega that the steps have, so that the share is
+    ``(omega h)^2 / 12`` for short steps (T. J. R. Hughes, The Finite Element Method, 1987, section 9.3).
+    """
+    half = math.pi * hertz / rate
+    return 1.0 - math.atan(half) / half if half > 0.0 else 0.0
+
+
+def shift_rate(hertz: float, share: float) -> float:
+    """Steps a second [Hz] that lower a natural frequency [Hz] by this small share or a little less."""
+    return math.pi * hertz / math.sqrt(3.0 * share)
+
+
+def default_record_rate(rate: float, highest: float) -> float:
+    """Records a second where none are given: few, but with the third harmonic of the highest mesh.
+
+    Parameters
+    ----------
+    rate : float
+        Steps a second [Hz].
+    highest : float
+        Highest mesh frequency of the run [Hz].
+
+    Returns
+    -------
+    float
+        The rate over the largest whole number for which the pass band of the records holds that harmonic and
+        there are 1000 a second; at most the rate.
+    """
+    # a hair more, so that rounding of the speed does not push the harmonic out
+    needed = max(LEAST_RECORD_RATE, 2.0 * KEPT_HARMONIC * highest * (1.0 + 1e-6) / PASS_BAND)
+    return rate / max(1, math.floor(rate / needed * (1.0 + 1e-12)))
+
+
+def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
+    """Refuse what the stages cannot represent, before anything is computed.
+
+    Raises
+    ------
+    CaseError
+        As `case_model`; bodies that nothing holds across their axis or against tilting (E-MECHANISM);
+        natural frequencies too far apart for double precision (E-SPREAD); steps that cannot follow the
+        meshes (E-RATE); records that are too many (E-RANGE).
+    """
+    try:
+        count, names = loose_motions(drivetrain_of(case), turning=case.simulation.turning)
+    except CaseError as error:
+        raise _located(error, case) from None
+    if count:
+        raise CaseError(
+            f"nothing holds {count} motion{'s' if count > 1 else ''}, such as {', '.join(names[:3])}",
+            code="E-MECHANISM", key="bearing", file=case.location("bearing"),
+            limit="bearings and shafts that leave the common rotation alone free",
+            remedy="add a [[bearing]] or its stiffness, or tilts = false",
+        )  # fmt: skip
+    check_spread(case, drivetrain_of(case))
+    model = case_model(case)
+    _check_stiffness(case, model)
+    _check_rate(case, model)
+    if case.simulation.record is None:
+        for problem in record_problems(case, record_rate(case, model)):
+            raise _located(problem, case)
+    return model
+
+
+def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
+    """Refuse what has no spectra: the stage is not asked for by every run.
+
+    Raises
+    ------
+    CaseError
+        Records that are too few, a resolution that they do not have (E-RANGE); no meshes, or a first body
+        that nearly stops or turns back in the part that the spectra take (E-SPECTRUM).
+    """
+    if not len(model.meshes):
+        raise CaseError(
+            "the chain has no gears, and therefore no mesh forces",
+            code="E-SPECTRUM",
+            limit="one mesh or more",
+        )
+    for problem in _spectrum_problems(case, record_rate(case, model)):
+        raise _located(problem, case)
+    s = case.simulation
+    late = speed_range(
+        model, torque_histories(case, model.ratio), duration=s.duration, speed=case.operation.speed,
+        start=settle_time(case),
+    )  # fmt: skip
+    try:
+        check_turning(late.lowest, late.mean)
+    except CaseError as error:
+        raise _located(error, case) from None
+
+
+def _spectrum_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
+    """Why the records of a run have no spectra; `record` a second [Hz]."""
+    s = case.simulation
+    late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
+    if late * record < LEAST_RECORDS:
+        yield CaseError(
+            f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
+            key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
+            limit=f"{LEAST_RECORDS} records or more after simulation.settle",
+            remedy="take a longer duration, a shorter settle or more records, or write --only transient",
+        )  # fmt: skip
+    elif s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
+        yield CaseError(
+            "the record has no such resolution", code="E-RANGE", key="simulation.resolution",
+            value=FREQUENCY.show(s.resolution),
+            limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(record / 16.0)}",
+        )  # fmt: skip
+
+
+def check_turning(lowest: float, mean: float) -> None:
+    """Refuse speeds of the first body [rad/s] at which a turn takes endless records (E-SPECTRUM)."""
+    if not lowest > SLOWEST * mean or not mean > 0.0:
+        raise CaseError(
+            f"the first body nearly stops or turns back: {lowest / RPM:.6g} rpm at the slowest, "
+            f"{mean / RPM:.6g} rpm in the mean; there are no orders",
+            code="E-SPECTRUM", key="operation.torque",
+            limit=f"never slower than {SLOWEST:.0%} of its mean speed where spectra are taken",
+            remedy="give torques that keep it turning, or write --only transient",
+        )  # fmt: skip
+
+
+def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
+    """Refuse meshes whose cut series turns negative: no real mesh pushes the other way."""
+    if not len(model.meshes):
+        return
+    phase = 2.0 * math.pi * np.arange(4096)[:, None] / 4096
+    least = np.array(FourierSeries(model.stiffness).at(phase)).min(axis=0)
+    wrong = np.flatnonzero(least <= 0.0)
+    if not len(wrong):
+        return
+    keys = []
+    for i, one in enumerate(model.train.planetary):
+        for which in ("sun_mesh", "ring_mesh"):
+            keys += [f"planetary[{i}].{which}.low_share"] * len(one.planet_angles)
+    keys += [f"parallel[{i}].mesh.low_share" for i in range(len(model.train.parallel))]
+    key = keys[wrong[0]]
+    raise CaseError(
+        f"the series of the stiffness of {model.meshes[wrong[0]]} falls to {least[wrong[0]]:.3g} N/m: with "
+        f"{case.simulation.harmonics} terms it overshoots the jump by about 9 %",
+        code="E-STIFFNESS", key=key, file=case.location(key), limit="above 0 N/m at any time",
+        remedy="give a larger low_share",
+    )  # fmt: skip
+
+
+def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
+    speeds, rate = case_speeds(case, model), case.simulation.rate
+    name, hertz = highest_mesh(model, speeds.fastest)
+    if rate >= LEAST_STEPS * hertz:
+        return
+    first = case.body[0].name
+    good = FREQUENCY.show(GOOD_STEPS * hertz)
+    key, value, remedy = "simulation.rate", FREQUENCY.show(rate), f"take {good} or more"
+    if LEAST_STEPS * hertz > FASTEST_RATE:
+        remedy = "take a lower speed, or fewer teeth: no simulation.rate is fast enough"
+    if speeds.fastest > 1.01 * speeds.first:
+        key, value = "operation.torque", None
+        remedy = f"give torques that balance (share = 1.0), a shorter duration, or a rate of {good}"
+    raise CaseError(
+        f"{rate / hertz:.3g} steps a period ({FREQUENCY.show(rate)}) cannot follow the {name}, "
+        f"{FREQUENCY.show(hertz)} at {SPEED.show(speeds.fastest)} of {first}",
+        code="E-RATE", key=key, value=value, file=case.location(key),
+        limit=f"{LEAST_STEPS} steps a period at any time: {FREQUENCY.show(LEAST_STEPS * hertz)} or more",
+        remedy=remedy,
+    )  # fmt: skip
+
+
+def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = None) -> tuple[str, ...]:
+    """What is allowed but deserves a look, in sentences; the model is made where it is not given.
+
+    Raises
+    ------
+    CaseError
+        As `check_drivetrain`, without a model.
+    """
+    model = model or check_drivetrain(case)
+    speeds = case_speeds(case, model)
+    warned = (
+        _runaway(case, speeds),
+        _rates(case, model, speeds),
+        _spectra(case, model),
+        _undamped(case),
+    )
+    return (*case.notices, *(text for some in warned for text in some))
+
+
+def _undamped(case: DrivetrainCase) -> Iterator[str]:
+    """Runs in which nothing takes energy out of vibration."""
+    if case.simulation.damping_ratio == 0.0:
+        yield (
+            "[W-DAMPING] simulation.damping_ratio: 0, no damping at all: vibration of the start never dies "
+            "away, resonances grow until something else stops them, and teeth seem to part that would not; "
+            "gear trains are commonly computed with 0.02 to 0.05"
+        )
+
+
+def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
+    """Torques that change the speed more than a run is meant for."""
+    first = speeds.first
+    if speeds.highest <= _CHANGE * first and speeds.lowest >= first / _CHANGE:
+        return
+    rpm = [f"{value / RPM:.6g}" for value in (first, speeds.last, speeds.lowest, speeds.highest)]
+    between = (
+        "" if speeds.last in (speeds.lowest, speeds.highest) else f" ({rpm[2]} to {rpm[3]} rpm on the way)"
+    )
+    turns = " and turn it back" if speeds.lowest < 0.0 else ""
+    yield (
+        f"[W-SPEED] operation.torque: the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
+        f"{case.simulation.duration:g} s{between}{turns}; share = 1.0 on another body balances them"
+    )
+
+
+def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[str]:
+    """Steps and records that are too slow for the highest mesh frequency, at the fastest speed."""
+    name, top = highest_mesh(model, speeds.fastest)
+    rate, record = case.simulation.rate, record_rate(case, model)
+    where = f"{top:.4g} Hz"
+    if speeds.fastest > 1.01 * speeds.first:
+        where += f" at {speeds.fastest / RPM:.6g} rpm, the fastest"
+    if rate < GOOD_STEPS * top:
+        yield (
+            f"[W-RATE] simulation.rate: {rate / top:.3g} steps a period of the {name} ({where}) shift and "
+            f"damp it; take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz"
+        )
+    # modes above the last line of the mesh stiffness answer as springs
+    mode = mesh_mode(model, top * case.simulation.harmonics)
+    if (shift := frequency_shift(mode, rate)) > _SHIFT:
+        yield (
+            f"[W-RATE] simulation.rate: steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the "
+            f"meshes drive, by {shift:.2%}; {_up(shift_rate(mode, _SHIFT))} Hz lowers it by {_SHIFT:.0%}, "
+            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {_SMALL_SHIFT:.1%}"
+        )
+    if 0.5 * PASS_BAND * record < top:
+        yield (
+            f"[W-RECORD] simulation.record: records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, "
+            f"below the {name} ({where})"
+        )
+
+
+def _up(value: float) -> str:
+    """Three digits, rounded up."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return f"{math.ceil(value / unit) * unit:.12g}"
+
+
+def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
+    """Runs that stop before the spectra, which would be refused."""
+    if not len(model.meshes):
+        return
+    try:
+        check_spectrum(case, model)
+    except CaseError as error:
+        yield f"[W-SPECTRUM] {error.key}: {error.message}: the stage spectrum refuses this ({error.code})"
+
+
+def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tuple[str, ...]]:
+    """Number of motions besides the free spin that no spring resists, and what moves most in them.
+
+    Whether a motion is resisted does not depend on how stiff the springs are. Therefore all of them get like
+    stiffnesses, 1 N/m across and 1 N/m times a length squared against rotation; the coordinates are scaled by
+    their own stiffness, ``D K D`` with ones on the diagonal, and what is left is a matter of rank (null space
+    of the stiffness: M. Geradin and D. J. Rixen, Mechanical Vibrations, 3rd ed., section 2.9).
+
+    Parameters
+    ----------
+    train : Drivetrain
+    turning : bool
+        As of `drivetrain_model`.
+
+    Returns
+    -------
+    count : int
+    names : tuple of str
+        Coordinates of those motions, the largest first, rotations last.
+
+    Raises
+    ------
+    CaseError
+        As `drivetrain_model`.
+    """
+    from scipy import linalg
+
+    model = drivetrain_model(_like_springs(train), harmonics=1, turning=turning)
+    system = model.system
+    stiffness = system.K + (system.W * model.mean_stiffness) @ system.W.T
+    own = np.diag(stiffness)
+    size = np.sqrt(np.where(own > 0.0, own, 1.0))
+    # the spin is known, and held
+    spin = model.rigid * size
+    scaled = stiffness / np.outer(size, size) + np.outer(spin, spin) / (spin @ spin)
+    count = int(np.count_nonzero(linalg.eigvalsh(scaled) < _NOT_RESISTED))
+    if not count:
+        return 0, ()
+    return count, _names(train, model, linalg.eigh(scaled, subset_by_index=(0, count - 1))[1])
+
+
+def _names(train: Drivetrain, model: DrivetrainModel, motions) -> tuple[str, ...]:
+    """Coordinates of bodies before those of planets and shaft stations, rotations last."""
+    size, bodies = np.abs(motions).max(axis=1), {body.name for body in train.bodies}
+    order = [i for i in np.argsort(-size, kind="stable") if size[i] > _MOVED * size.max()]
+    names = [model.system.dofs[i] for i in order]
+    return tuple(
+        sorted(names, key=lambda n: (n.endswith("rotation"), n.split(":")[0] not in bodies))[:_NAMED]
+    )
+
+
+def _like_springs(train: Drivetrain) -> Drivetrain:
+    """The chain with springs that are all alike, without weight and damping."""
+    lengths = [one.length for one in train.shafts]
+    lengths += [one.first_radius for one in train.parallel] + [one.sun_radius for one in train.planetary]
+    arm = math.exp(np.mean(np.log(lengths))) if lengths else 1.0
+    return replace(
+        train,
+        shafts=tuple(_shaft(one, arm) for one in train.shafts),
+        parallel=tuple(replace(one, mesh=replace(one.mesh, stiffness=1.0)) for one in train.parallel),
+        planetary=tuple(
+            replace(
+                one,
+                sun_mesh=replace(one.sun_mesh, stiffness=1.0),
+                ring_mesh=replace(one.ring_mesh, stiffness=1.0),
+                planet_bearing=_unit(one.planet_bearing),
+            )
+            for one in train.planetary
+        ),
+        bearings=tuple(_bearing(one, arm) for one in train.bearings),
+        gravity=0.0,
+        damping_ratio=0.0,
+    )
+
+
+def _unit(stiffness: float, unit: float = 1.0) -> float:
+    """The unit in place of a spring that is there and not rigid."""
+    return stiffness if stiffness == 0.0 or math.isinf(stiffness) else unit
+
+
+def _bearing(one: ChainBearing, arm: float) -> ChainBearing:
+    return replace(
+        one, radial=_unit(one.radial), tilt=_unit(one.tilt, arm**2), torsion=_unit(one.torsion, arm**2)
+    )
+
+
+def _shaft(one: ChainShaft, arm: float) -> ChainShaft:
+    if not one.elements:
+        springs = one.springs
+        return replace(
+            one, section=None, bending=_unit(springs.bending, arm**2), torsion=_unit(springs.torsion, arm**2),
+            shear=_unit(springs.shear),
+        )  # fmt: skip
+    # a slender shaft of 12 E I / l^3 = 1 N/m
+    diameter = 0.1 * one.length
+    modulus = one.length**3 / (12.0 * math.pi * diameter**4 / 64.0)
+    assert one.section is not None  # elements need one
+    section = replace(one.section, outer_diameter=diameter, inner_diameter=0.0, young=modulus)
+    return replace(one, section=section)
+
+
+def check_spread(case: DrivetrainCase, train: Drivetrain) -> None:
+    """Refuse slow motions that rounding hides beside the free spin.
+
+    Raises
+    ------
+    CaseError
+        E-SPREAD, with the softest support where that is the cause, else with the fastest and the slowest
+        coordinate.
+    """
+    from scipy import linalg
+
+    model = drivetrain_model(replace(train, damping_ratio=0.0), turning=case.simulation.turning)
+    n, mass = len(model.rigid), model.system.M
+    stiffness = model.system.K + (model.system.W * model.mean_stiffness) @ model.system.W.T
+    values = linalg.eigvalsh(stiffness, mass)
+    # what the modes take for rigid: a share of a norm, which is up to sqrt(n) above the largest
+    share = math.sqrt(n) * max(1e-12, 10.0 * n * np.finfo(float).eps)
+    if n == 1 or values[1] > share * values[-1]:
+        return
+    own = np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2.0 * math.pi)
+    fast = int(np.argmax(own))
+    factor = f"a factor of {1.0 / math.sqrt(share):.1g}"
+    shown = {"code": "E-SPREAD", "limit": f"frequencies within {factor}"}
+    words = "natural frequencies are too far apart for double precision: "
+    words += f"{model.system.dofs[fast]} by itself has {own[fast]:.3g} Hz, and "
+    soft, (place, name), value = _softest(train)
+    # a support is the cause where it lies further from the middle than the fastest coordinate does
+    if soft * 2.0 * math.pi * own[fast] < (2.0 * math.pi * np.median(own)) ** 2:
+        raise CaseError(
+            f"{words}{name} on its bearings alone has {soft / (2.0 * math.pi):.3g} Hz, slower by more than "
+            f"{factor}",
+            key=place, value=value, file=case.location(place), **shown,
+            remedy=f"stiffen the bearings of {name}: theirs are the softest",
+        )  # fmt: skip
+    second = _slowest(model, stiffness)
+    names = [body.name for body in case.body]
+    members = [name.split(":")[0] for name in (model.system.dofs[fast], second)]
+    key = f"body[{names.index(members[0])}]" if members[0] in names else "shaft"
+    raise CaseError(
+        f"{words}{second} moves slower by more than {factor}", key=key, file=case.location(key), **shown,
+        remedy=f"give {members[0]} more mass or inertia or rigid springs, or stiffen what holds {members[1]}",
+    )  # fmt: skip
+
+
+def _slowest(model: DrivetrainModel, stiffness) -> str:
+    """Coordinate with most of the kinetic energy of the slowest motion besides the free spin."""
+    from scipy import linalg
+
+    mass = model.system.M
+    slow = linalg.eigh(stiffness, mass, subset_by_index=(0, 1))[1]
+    slow = slow - np.outer(model.rigid, model.rigid @ mass @ slow) / model.inertia
+    energy = np.abs(slow * (mass @ slow)).max(axis=1)
+    return model.system.dofs[int(np.argmax(energy))]
+
+
+def _softest(train: Drivetrain) -> tuple[float, tuple[str, str], str]:
+    """Slowest body on its own bearings: frequency [rad/s], key and body, stiffness; infinite without any."""
+    found = [(math.inf, ("", ""), "")]
+    for body in train.bodies:
+        places = [i for i, one in enumerate(train.bearings) if one.body == body.name and not one.station]
+        inertias = ("radial", body.mass, "N/m"), ("tilt", body.transverse_inertia, "N m/rad")
+        for kind, inertia, unit in inertias if body.tilts else inertias[:1]:
+            springs = [getattr(train.bearings[i], kind) for i in places]
+            if sum(springs) > 0.0:
+                first = places[int(np.argmax(springs))]
+                speed = math.sqrt(sum(springs) / inertia)
+                found.append((speed, (f"bearing[{first}].{kind}", body.name), f"{max(springs):g} {unit}"))
+    return min(found)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.shaft import JointSprings, ShaftSection, joint_springs
+from femgear.system.shaft import JointSprings, ShaftSection, beam_element, joint_springs
 
 # Stiffness against the spin, over that of the rotations, that is rounding.
 _FREE = 1e-9
@@ -107,14 +107,22 @@ class ChainShaft:
     @property
     def springs(self) -> JointSprings:
         """Of the joint."""
-        own = None if self.section is None else joint_springs(self.section, self.length)
-        bending = own.bending if self.bending is None else self.bending
-        torsion = own.torsion if self.torsion is None else self.torsion
-        shear = self.shear
+        bending, torsion, shear = self.bending, self.torsion, self.shear
+        if self.section is not None:
+            own = joint_springs(self.section, self.length)
+            shear = own.shear if bending is None and shear is None else shear
+            bending = own.bending if bending is None else bending
+            torsion = own.torsion if torsion is None else torsion
+        assert bending is not None and torsion is not None  # or there is a section
         if shear is None:
-            exact = own is not None and self.bending is None
-            shear = own.shear if exact else 12.0 * bending / ((1.0 + self.shear_ratio) * self.length**2)
+            shear = 12.0 * bending / ((1.0 + self.shear_ratio) * self.length**2)
         return JointSprings(bending, torsion, shear)
+
+    @property
+    def element_matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Mass, stiffness, and gyroscopic matrix per unit speed, of one element (10, 10)."""
+        assert self.section is not None  # elements need one
+        return beam_element(self.section, self.length / self.elements)
 
 
 @dataclass(frozen=True)
@@ -264,6 +272,17 @@ class PlanetaryStage:
         )  # fmt: skip
         check_numbers(self.name, self, positive=positive, least=("planet_transverse_inertia",))
         check_driver(f"stage {self.carrier} to {self.sun}", self.driver, self.ends)
+        angles = self.planet_angles
+        if not angles or not all(math.isfinite(a) for a in angles) or not self.planet_bearing > 0.0:
+            raise CaseError(
+                f"planets of {self.name}", code="E-DRIVETRAIN",
+                limit="one finite angle or more, a bearing stiffness above 0 N/m or infinite",
+            )  # fmt: skip
+        if any(b <= a for a, b in itertools.pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi:
+            raise CaseError(
+                f"planet angles {angles} rad of {self.name}", code="E-DRIVETRAIN",
+                limit="ascending within one turn",
+            )  # fmt: skip
 
     @property
     def name(self) -> str:
@@ -363,7 +382,30 @@ class Drivetrain:
     damping_ratio: float = 0.0
 
     def __post_init__(self):
-        check_train(self)
+        names = [body.name for body in self.bodies]
+        if not names or len(set(names)) < len(names):
+            raise CaseError(f"bodies {names}", code="E-DRIVETRAIN", limit="one body or more, no name twice")
+        links = [(one.first, one.second) for one in self.shafts]
+        links += [one.ends for one in (*self.parallel, *self.planetary)]
+        for first, second in (*links, *((one.body, one.body) for one in self.bearings)):
+            for name in (first, second):
+                if name not in names:
+                    raise CaseError(f"there is no body {name!r}", code="E-DRIVETRAIN", limit=", ".join(names))
+        if any(first == second for first, second in links):
+            raise CaseError("a shaft or stage joins a body to itself", code="E-DRIVETRAIN")
+        reached = {names[0]}
+        for _ in names:
+            reached |= {end for link in links if reached & set(link) for end in link}
+        if set(names) - reached:
+            raise CaseError(
+                f"nothing joins {', '.join(sorted(set(names) - reached))} to {names[0]}", code="E-DRIVETRAIN",
+                remedy="add a shaft or a gear stage",
+            )  # fmt: skip
+        if not 0.0 <= self.damping_ratio < 1.0 or not math.isfinite(self.gravity):
+            raise CaseError(
+                f"damping ratio {self.damping_ratio}, gravity {self.gravity} m/s^2", code="E-DRIVETRAIN",
+                limit="a ratio from 0 to below 1, finite gravity",
+            )  # fmt: skip
 
     def body(self, name: str) -> ChainBody:
         """The body of that name."""
@@ -409,7 +451,7 @@ class TorqueHistory:
 
 def constant_torques(torques: dict[str, float]) -> tuple[TorqueHistory, ...]:
     """Histories of constant torques on bodies [N m]."""
-    return tuple(TorqueHistory(body, [0.0], [value]) for body, value in torques.items())
+    return tuple(TorqueHistory(body, np.zeros(1), np.array([value])) for body, value in torques.items())
 
 
 def numbered(names: Sequence[str]) -> list[str]:
@@ -452,48 +494,4 @@ def check_free_spin(model) -> None:
             "a bearing holds the rotation of a chain that turns", code="E-BEARING", key="bearing.torsion",
             limit="no torsion stiffness against the housing",
             remedy="leave it out; a torque on the body takes its place",
-        )  # fmt: skip
-
-
-def check_train(train) -> None:
-    """Refuse unknown or repeated names, pieces that do not hang together, wrong ratios of damping."""
-    names = [body.name for body in train.bodies]
-    if not names or len(set(names)) < len(names):
-        raise CaseError(f"bodies {names}", code="E-DRIVETRAIN", limit="one body or more, no name twice")
-    links = [(one.first, one.second) for one in (*train.shafts, *train.parallel)]
-    links += [(one.carrier, one.sun) for one in train.planetary]
-    for first, second in (*links, *((one.body, one.body) for one in train.bearings)):
-        for name in (first, second):
-            if name not in names:
-                raise CaseError(f"there is no body {name!r}", code="E-DRIVETRAIN", limit=", ".join(names))
-    if any(first == second for first, second in links):
-        raise CaseError("a shaft or stage joins a body to itself", code="E-DRIVETRAIN")
-    reached = {names[0]}
-    for _ in names:
-        reached |= {end for link in links if reached & set(link) for end in link}
-    if set(names) - reached:
-        raise CaseError(
-            f"nothing joins {', '.join(sorted(set(names) - reached))} to {names[0]}", code="E-DRIVETRAIN",
-            remedy="add a shaft or a gear stage",
-        )  # fmt: skip
-    for stage in train.planetary:
-        _check_planets(stage)
-    if not 0.0 <= train.damping_ratio < 1.0 or not math.isfinite(train.gravity):
-        raise CaseError(
-            f"damping ratio {train.damping_ratio}, gravity {train.gravity} m/s^2", code="E-DRIVETRAIN",
-            limit="a ratio from 0 to below 1, finite gravity",
-        )  # fmt: skip
-
-
-def _check_planets(stage) -> None:
-    angles = stage.planet_angles
-    if not angles or not all(math.isfinite(a) for a in angles) or not stage.planet_bearing > 0.0:
-        raise CaseError(
-            f"planets of {stage.name}", code="E-DRIVETRAIN",
-            limit="one finite angle or more, a bearing stiffness above 0 N/m or infinite",
-        )  # fmt: skip
-    if any(b <= a for a, b in itertools.pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi:
-        raise CaseError(
-            f"planet angles {angles} rad of {stage.name}", code="E-DRIVETRAIN",
-            limit="ascending within one turn",
         )  # fmt: skip

@@ -1,16 +1,19 @@
 """Figures of a drivetrain case: modes.nc, transient.nc, spectrum.nc, and the lowest elastic modes in space.
 
-The first figures take plain curves: mesh stiffness, signals over time, spectra with named lines, forces with
-contact loss, sensitivity to assumed inputs. Their panels stand at places given in inches: looking for places
-takes matplotlib longer than drawing the figure. Those after them read the files; `drivetrain_layout` places
-the bodies in space for the pictures of modes. `FIGURES` at the end ties the pictures of the report to their
+The first figures take plain curves: mesh stiffness, signals over time, spectra with named lines. Their panels
+stand at places given in inches: looking for places takes matplotlib longer than drawing the figure. Those
+after them read the files. `drivetrain_layout` places the bodies in space, where `drivetrain_pictures` draws
+modes as discs on shafts, at rest and moved. `FIGURES` at the end ties the pictures of the report to their
 captions.
 """
 
 from __future__ import annotations
 
+import io
+import itertools
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,11 +22,20 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from femgear.report.frequency import campbell
-from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
+from femgear.report.scene import add_coloured, load_pyvista
+from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below
 from femgear.storage.dataset import RPM
+from femgear.storage.files import replace_file
+from femgear.system.fourier import FourierSeries
+from femgear.trains.drivetrain.checks import case_model
 from femgear.trains.drivetrain.data import Drivetrain, numbered
-from femgear.trains.drivetrain.model import DrivetrainModel, coordinates_of, free_coordinates
-from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, symbols
+from femgear.trains.drivetrain.model import (
+    DrivetrainModel,
+    coordinates_of,
+    free_coordinates,
+    stiffness_levels,
+)
+from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, pass_band, separating, symbols
 from femgear.trains.drivetrain.time import PASS_BAND
 from femgear.trains.protocol import Drawn, Figures
 
@@ -56,6 +68,19 @@ _LEAST_LINES = 24
 _PLAIN, _WHEEL_GAP = 0.9, 0.45
 # Phi of a shaft that shears and hardly bends: more does not show.
 _SHEAR_ALONE = 1e6
+
+_EDGES = {"boundary_edges": True, "feature_edges": True, "manifold_edges": False, "non_manifold_edges": False}
+_REST, _MOVED = "#B0B0B0", "#D55E00"
+_COLOURS = "displacement over the largest"
+_VIEW = np.array([1.0, 0.55, -0.9])
+# Lines stand this share of the size in front of the faces that they lie on; from afar nothing is shifted.
+_FRONT = 3e-3
+# Height of the picture over its width.
+_HEIGHT = 0.72
+# Shares of the height between which the drivetrain stands.
+_ROOM = (0.22, 0.88)
+# Largest displacement over the size of the drivetrain.
+_SHARE = 0.12
 
 
 def panels(
@@ -96,7 +121,7 @@ def panels(
     rows, gap = -(-len(titles) // columns), _SHARED if columns == 1 else _GAP
     top, step = _TOP + bool(title) * _TITLE + named * _NAMES, _LEFT + width + _RIGHT
     size = (columns * step, top + rows * height + (rows - 1) * gap + _BOTTOM)
-    figure, axes = Figure(figsize=size, layout="none"), []
+    figure, axes = Figure(figsize=size), []
     for number in range(len(titles)):
         row, column = divmod(number, columns)
         left, bottom = column * step + _LEFT, size[1] - top - row * (height + gap) - height
@@ -202,13 +227,13 @@ def name_lines(ax, lines: Sequence[tuple], width: float) -> None:
         )  # fmt: skip
 
 
-def finished(figure):
+def finished(figure: Figure) -> Figure:
     """The figure with its legend."""
     legend_below(figure)
     return figure
 
 
-def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, title: str = ""):
+def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, title: str = "") -> Figure:
     """Mesh stiffness over the mesh period: the series and the rectangular wave that it stands for.
 
     Parameters
@@ -217,10 +242,6 @@ def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, 
         Fractions of the period.
     curves, steps : sequences of (text, stiffness (n,) [N/m])
         Series, and rectangular waves in the same order.
-
-    Returns
-    -------
-    Figure
     """
     figure, axes = panels(
         [text for text, _ in curves], columns=len(curves), width=3.1, height=2.4, x="mesh period [1]",
@@ -247,7 +268,7 @@ def over_time(
     columns: int = 1,
     title: str = "",
     zero: bool = True,
-):
+) -> Figure:
     """Signals of several runs over time, one panel each; the first run stands in front.
 
     Where there are many more instants than pixels, the band between the least and the largest value of every
@@ -266,10 +287,6 @@ def over_time(
         Above all panels.
     zero : bool
         Draw zero; False shows changes of what is far from it.
-
-    Returns
-    -------
-    Figure
     """
     figure, axes = panels(
         [text for text, _ in signals], columns=columns, width=7.0 if columns == 1 else 5.2, x="time [s]",
@@ -296,7 +313,7 @@ def spectra(
     factor: float = 1.0,
     x: str = "",
     title: str = "",
-):
+) -> Figure:
     """Amplitude spectra of several runs, one panel each, with named lines; the first run stands in front.
 
     Parameters
@@ -313,10 +330,6 @@ def spectra(
         Label of the abscissa, the frequency when not given.
     title : str
         Above all panels.
-
-    Returns
-    -------
-    Figure
     """
     frequency = np.asarray(frequency)
     lines = [(text, at) for text, at in lines if frequency[0] <= at <= frequency[-1]]
@@ -333,64 +346,8 @@ def spectra(
     return finished(figure)
 
 
-def sensitivity(names: Sequence[str], quantities: Sequence[tuple], *, title: str = ""):
-    """What assumed inputs do: quantity at half and at twice the input over that at the input itself.
-
-    Parameters
-    ----------
-    names : (k,) sequence
-    quantities : sequence of (text, ratio (k, 2))
-
-    Returns
-    -------
-    Figure
-    """
-    count = len(names)
-    figure, axes = new_figure(
-        columns=len(quantities), width=3.6 * len(quantities) + 2.4, height=0.3 * count + 1.8, sharey=True
-    )
-    at = np.arange(count)[::-1]
-    for ax, (text, ratio) in zip(axes, quantities):
-        ratio = np.asarray(ratio, float)
-        for side, (colour, note) in enumerate(((COLOURS[0], "lower input"), (COLOURS[1], "higher input"))):
-            ax.barh(
-                at + 0.18 - 0.36 * side, ratio[:, side] - 1.0, height=0.34, left=1.0, color=colour, label=note
-            )
-        ax.axvline(1.0, color=BLACK, linewidth=0.8)
-        ax.set_yticks(at, names)
-        label(ax, "ratio [1]", title=text)
-    if title:
-        figure.suptitle(title, fontsize=SIZE)
-    legend_below(figure)
-    return figure
-
-
-def backlash_forces(time, curves: Sequence[tuple], *, title: str = ""):
-    """Mesh force over a short time with and without contact loss; the first run stands in front.
-
-    Parameters
-    ----------
-    time : (n,) array
-        [s]
-    curves : sequence of (text, force (n,) [N])
-
-    Returns
-    -------
-    Figure
-    """
-    return over_time(time, [(title, curves)], unit="mesh force [kN]", factor=1e-3)
-
-
-def stiffness_figure(model: DrivetrainModel):
-    """Series of the mesh stiffness of every stage, and the rectangular wave.
-
-    Returns
-    -------
-    Figure
-    """
-    from femgear.system.fourier import FourierSeries
-    from femgear.trains.drivetrain.model import stiffness_levels
-
+def stiffness_figure(model: DrivetrainModel) -> Figure:
+    """Series of the mesh stiffness of every stage, and the rectangular wave."""
     train, phase = model.train, np.linspace(0.0, 2.0, 1601)
     names, row, waves = numbered(model.meshes), 0, []
     # by position: the planetary stages come first, with all suns' meshes before the rings'
@@ -409,13 +366,8 @@ def stiffness_figure(model: DrivetrainModel):
     return stiffness_series(phase, curves, steps, title=f"series of {model.stiffness.shape[1] - 1} terms")
 
 
-def campbell_figure(modes: xr.Dataset):
-    """Campbell diagram with the mesh lines of modes.nc.
-
-    Returns
-    -------
-    Figure
-    """
+def campbell_figure(modes: xr.Dataset) -> Figure:
+    """Campbell diagram with the mesh lines of modes.nc."""
     frequency = modes["campbell_frequency"].values
     top = frequency.max()
     critical = zip(modes["critical_speed"].values, modes["critical_frequency"].values)
@@ -450,7 +402,7 @@ def transient_figures(data: xr.Dataset) -> dict:
     }
     if meshes:
         contact = "linear meshes keep contact"
-        if separates(data):
+        if separating(data):
             contact = f"meshes part, for up to {float(data['lost'].max()):.2%} of the time"
         notes = (contact, passed, passed and "least and largest force of all steps in the table")
         figures["transient_forces"] = _signals(
@@ -472,15 +424,7 @@ def _signals(data: xr.Dataset, name: str, columns, titles, **options):
 
 def _pass_band(data: xr.Dataset) -> str:
     """What the low pass of the records of transient.nc leaves."""
-    attrs = data.attrs
-    if attrs["filter"] == "none":
-        return ""
-    return f"low-passed to {0.5 * PASS_BAND / (attrs['step'] * attrs['every']):.4g} Hz"
-
-
-def separates(data: xr.Dataset) -> bool:
-    """Whether the meshes of transient.nc part and meet their back flanks."""
-    return data.attrs.get("contact") == "separating"
+    return "" if data.attrs["filter"] == "none" else f"low-passed to {pass_band(data):.4g} Hz"
 
 
 def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> dict:
@@ -776,15 +720,189 @@ def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
     ], axis=-1) / (1.0 + phi)  # fmt: skip
 
 
+@dataclass(frozen=True)
+class ModeView:
+    """One picture of a mode shape.
+
+    Parameters
+    ----------
+    path : path-like
+        PNG file.
+    title : str
+    move, turn : (n, 3) arrays
+        Translation and rotation vector of every place, in the proportions of the mode.
+    shafts : sequence of (rest (k, 3), displacement (k, 3))
+        Centre lines [m].
+    """
+
+    path: str | os.PathLike
+    title: str
+    move: np.ndarray
+    turn: np.ndarray
+    shafts: Sequence[tuple[np.ndarray, np.ndarray]] = ()
+
+
+def drivetrain_pictures(views: Iterable[ModeView], layout: Layout, *, size: int = 1000) -> list[float]:
+    """Pictures of mode shapes: every disc moves as a rigid body, shafts are the lines that they are given.
+
+    Parameters
+    ----------
+    views : iterable of ModeView
+    layout : Layout
+        Discs, and the names of the places that are written beside them.
+    size : int
+        Width in pixels.
+
+    Returns
+    -------
+    list of float
+        The factors of the shapes.
+
+    Raises
+    ------
+    FemgearError
+        See `load_pyvista`.
+    StorageError
+        When a file cannot be written.
+    """
+    pv = load_pyvista()
+    discs = [_disc(pv, wheel) for wheel in layout.wheels]
+    # one window for all: opening it takes as long as drawing
+    plotter = pv.Plotter(off_screen=True, window_size=[size, round(_HEIGHT * size)])
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.set_background("white")  # type: ignore[call-arg]
+    plotter.enable_parallel_projection()  # type: ignore[call-arg]
+    found = []
+    try:
+        for view in views:
+            plotter.suppress_rendering = True
+            plotter.clear()
+            scale, points = _add_shape(pv, plotter, view, discs, layout, size)
+            _add_texts(plotter, view.title, layout, size)
+            _frame(plotter, points)
+            plotter.suppress_rendering = False
+            plotter.render()
+            _write(plotter, view.path)
+            found.append(scale)
+    finally:
+        plotter.close()
+    return found
+
+
+def _add_shape(pv, plotter, view: ModeView, discs, layout: Layout, size: int):
+    """Discs and shafts, at rest and moved; the factor of the shape, and all points of the discs (n, 3)."""
+    move, turn = np.asarray(view.move, float), np.asarray(view.turn, float)
+    centres, places = layout.centre, [wheel.body for wheel in layout.wheels]
+    lines = [tuple(np.asarray(one, float) for one in pair) for pair in view.shafts]
+    fields = [move[p] + np.cross(turn[p], d.points - centres[p]) for d, p in zip(discs, places)]
+    lengths = [np.linalg.norm(one, axis=1) for one in (*fields, *(across for _, across in lines))]
+    extent = np.ptp(np.vstack([disc.points for disc in discs]), axis=0).max()
+    # a shaft may move more than any disc
+    reach = max(length.max() for length in lengths)
+    scale = _SHARE * extent / reach if reach > 0.0 else 0.0
+    moves = [(centres[p], scale * move[p], scale * turn[p]) for p in places]
+    rest, whole = pv.merge(discs, merge_points=False), pv.merge(discs, merge_points=False)
+    whole.points = np.vstack([_moved(disc.points, *own) for disc, own in zip(discs, moves)])
+    length = np.concatenate(lengths[: len(discs)])
+    whole[_COLOURS] = length / (length.max() or 1.0)
+    add_coloured(plotter, whole, _COLOURS, size, cmap="cividis", limits=(0.0, 1.0))
+    spokes = [_spoke(wheel) for wheel in layout.wheels]
+    turned = [_moved(spoke, *own) for spoke, own in zip(spokes, moves)]
+    for mesh, colour, width, front in (
+        (rest.extract_feature_edges(**_EDGES), _REST, 2.0, 0.0),
+        (_polylines(pv, [*spokes, *(line for line, _ in lines)]), _REST, 3.0, 0.0),
+        (whole.extract_feature_edges(**_EDGES), "black", 2.0, _FRONT),
+        (_polylines(pv, turned), _MOVED, 6.0, _FRONT),
+        (_polylines(pv, [line + scale * across for line, across in lines]), _MOVED, 9.0, 0.0),
+    ):
+        if mesh.n_points:
+            mesh.points = mesh.points + front * extent * _VIEW
+            plotter.add_mesh(mesh, color=colour, line_width=width, lighting=False)
+    return float(scale), np.vstack([rest.points, whole.points])
+
+
+def _add_texts(plotter, title: str, layout: Layout, size: int) -> None:
+    """Title, names beside the places, and the colour bar where this flat picture has room for it."""
+    height = round(_HEIGHT * size)
+    plotter.scalar_bars[" "].SetPosition(0.2, 0.065)
+    radius = np.zeros(len(layout.centre))
+    for wheel in layout.wheels:
+        radius[wheel.body] = max(radius[wheel.body], wheel.radius)
+    plotter.add_point_labels(
+        layout.centre + np.array([0.0, 1.0, 0.0]) * radius[:, None] * 1.15, list(layout.names),
+        font_size=max(size // 60, 10), shape="rect", shape_color="white", shape_opacity=0.6, margin=1,
+        show_points=False, text_color="black", always_visible=True,
+    )  # fmt: skip
+    if title:
+        place = (0.02 * size, height - 0.045 * size)
+        plotter.add_text(title, position=place, font_size=max(size / 75, 7.0), color="black", name="title")
+
+
+def _frame(plotter, points) -> None:
+    """Parallel view that holds all points (n, 3), with room for title and colour bar."""
+    away = _VIEW / np.linalg.norm(_VIEW)
+    right = np.cross([0.0, 1.0, 0.0], away)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(away, right), away])
+    low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+    half = 0.5 * (high - low)
+    camera, bottom, top = plotter.camera, *_ROOM
+    scale = max(half[1] / (top - bottom), 1.06 * _HEIGHT * half[0])
+    middle = 0.5 * (low + high) - [0.0, (bottom + top - 1.0) * scale, 0.0]
+    camera.focal_point = middle @ axes
+    camera.position = camera.focal_point + 10.0 * half.max() * away
+    camera.up, camera.parallel_scale = (0.0, 1.0, 0.0), scale
+    plotter.reset_camera_clipping_range()
+
+
+def _write(plotter, path) -> None:
+    """The picture whole or not at all; the window stays open."""
+    import imageio.v3 as iio
+
+    stream, image = io.BytesIO(), plotter.screenshot(filename=None, return_img=True)
+    iio.imwrite(stream, image, extension=".png", compress_level=4)
+    data = stream.getvalue()
+    replace_file(path, lambda temporary: temporary.write_bytes(data), size=len(data))
+
+
+def _moved(points, centre, shift, turn) -> np.ndarray:
+    """Points turned by a rotation vector about a centre, and shifted: rigid, however large the angle."""
+    from pyvista.core.utilities.transformations import axis_angle_rotation
+
+    angle = float(np.linalg.norm(turn))
+    if angle > 0.0:
+        points = centre + (points - centre) @ axis_angle_rotation(turn / angle, angle, deg=False)[:3, :3].T
+    return points + shift
+
+
+def _spoke(wheel: Wheel) -> np.ndarray:
+    """A radius on the front face of a disc (2, 3), which shows how far it turns."""
+    face = np.asarray(wheel.centre) - np.array([0.0, 0.0, 0.51 * wheel.width])
+    return np.array([face, face + np.array([0.0, wheel.radius, 0.0])])
+
+
+def _disc(pv, wheel: Wheel):
+    """A disc with its axis along z."""
+    axis = (0.0, 0.0, 1.0)
+    disc = pv.Cylinder(
+        center=wheel.centre, direction=axis, radius=wheel.radius, height=wheel.width, resolution=48
+    )
+    return disc.triangulate()
+
+
+def _polylines(pv, lines):
+    """Several lines (k, 3) as one mesh."""
+    ends = np.cumsum([0, *(len(line) for line in lines)])
+    cells = [np.append(b - a, np.arange(a, b)) for a, b in itertools.pairwise(ends)]
+    return pv.PolyData(np.vstack(lines), lines=np.concatenate(cells)) if lines else pv.PolyData()
+
+
 def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count: int) -> list[str]:
     """The lowest elastic modes as PNG files; returns their names.
 
     Modes have the numbers of the table: the free spin, which is not drawn, is the first.
     """
-    from femgear.trains.drivetrain.scene import ModeView, drivetrain_pictures
-
     layout = drivetrain_layout(model.train)
-    wheels = [(w.centre, w.radius, w.width, w.body) for w in layout.wheels]
     kinds, hertz = modes["kind"].values.astype(str), modes["frequency"].values
     names, views = [], []
     for mode in np.flatnonzero(kinds != "rigid")[:count].tolist():
@@ -794,21 +912,17 @@ def mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset, count
         moved = layout_motion(model, layout, shape)
         views.append(ModeView(folder / names[-1], title, *moved, shaft_lines(model, layout, shape)))
     if views:
-        drivetrain_pictures(views, wheels=wheels, centres=layout.centre, names=layout.names)
+        drivetrain_pictures(views, layout)
     return names
 
 
 def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
-    from femgear.trains.drivetrain.setup import case_model
-
     model = case_model(drawn.case)
     figures = {"stiffness_series": stiffness_figure(model)} if len(model.meshes) else {}
     return figures | {"campbell": campbell_figure(drawn.data["modes"])}
 
 
 def _write_modes(drawn: Drawn, folder: Path) -> list[str]:
-    from femgear.trains.drivetrain.setup import case_model
-
     count = drawn.case.simulation.modes
     return mode_pictures(folder, case_model(drawn.case), drawn.data["modes"], count)
 

@@ -11,10 +11,9 @@ tangential and the axial part of the normal are reversed, the radial one is not.
 both flanks, and teeth wedge (Y. Guo and R. G. Parker, Eur. J. Mech. A 29, 2010, 1022-1033; for parallel axes
 the left and the right line of action of ISO 21771).
 
-The purely torsional counterpart has one rotation a body and a planet: A. Kahraman, J. Sound Vib. 173, 1994,
-125-130, for the planetary stage; W. Shi, C.-W. Chung and others, Int. J. Precis. Eng. Manuf. 14, 2013, model
-wind turbine drivetrains so. `torsional_matrices` writes its matrices down and does not take them from those
-of `drivetrain_model`, which must turn into them when shafts cannot bend nor bodies move.
+The purely torsional counterpart, `torsional_model`, has one rotation a body and a planet: A. Kahraman,
+J. Sound Vib. 173, 1994, 125-130, for the planetary stage; W. Shi, C.-W. Chung and others, Int. J. Precis.
+Eng. Manuf. 14, 2013, model wind turbine drivetrains so.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from femgear.system.assembler import mesh_directions, pin_directions
 from femgear.system.elements import positive_part
 from femgear.system.fourier import FourierSeries, phase_of
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.system.shaft import AXES, beam_element, disc_matrices, joint_deflections
+from femgear.system.shaft import AXES, disc_matrices, joint_deflections
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.drivetrain.data import (
     ChainBearing,
@@ -104,7 +103,7 @@ class DrivetrainModel:
     @property
     def mean_stiffness(self) -> np.ndarray:
         """(n_meshes,) [N/m]"""
-        return self.stiffness[:, 0].real
+        return np.real(self.stiffness[:, 0])
 
     @property
     def still(self) -> MechanicalSystem:
@@ -151,8 +150,7 @@ def drivetrain_model(
     spin = rigid_rotation(train, place)
     if turning:
         _check_turning(train)
-    M, G = _inertia(train, place, spin)
-    K = _stiffness(train, place)
+    M, K, G = _matrices(train, place, spin)
     T, names = free_coordinates(train, place)
     geometry = mesh_geometry(train, place, spin)
     weight = np.zeros(place.count)
@@ -167,7 +165,7 @@ def drivetrain_model(
     C = np.zeros_like(reduced.C)
     if train.damping_ratio:
         still = replace(reduced, gyroscopic=None)
-        C = modal_damping(still, stiffness[:, 0].real, train.damping_ratio)
+        C = modal_damping(still, np.real(stiffness[:, 0]), train.damping_ratio)
     rigid = np.linalg.lstsq(T, spin, rcond=None)[0]
     load, carried = T.T @ M @ weight, reduced.M @ rigid
     # over a turn the weight of planets that do not balance one another has no moment about the carrier
@@ -213,7 +211,9 @@ def drivetrain_problem(
             own = np.flatnonzero((geometry.stage == stage) & ((number >= count) == back))
             if len(own):
                 elements.append(_flanks(model, geometry, own, int(stage), separates))
-    load = model.system.load + torque_vector(model, torques or {})
+    load = model.system.load.copy()
+    for name, torque in (torques or {}).items():
+        load[model.index(f"{name}: rotation")] += torque
     system = replace(model.system, W=geometry.basic, load=load)
     return NonlinearSystem(system, tuple(elements), speed=speed)
 
@@ -231,18 +231,9 @@ def _flanks(
     used = [contacts.columns[j] for j in own]
     order = tuple(int(b == model.mesh_base[meshes[0]]) for b in range(n_bases))
     turn = tuple(int(planetary and b == 2 * stage) for b in range(n_bases))
-    return TurningMeshes(
-        np.array(used), *(np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd)),
-        FourierSeries(model.stiffness[meshes], order), turn, contacts.gap[own], separates,
-    )  # fmt: skip
-
-
-def torque_vector(model: DrivetrainModel, torques: dict[str, float]) -> np.ndarray:
-    """Load (n,) of torques on bodies [N m]."""
-    load = np.zeros(len(model.rigid))
-    for name, torque in torques.items():
-        load[model.index(f"{name}: rotation")] += torque
-    return load
+    fixed, even, odd = (np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd))
+    stiffness = FourierSeries(model.stiffness[meshes], order)
+    return TurningMeshes(np.array(used), fixed, even, odd, stiffness, turn, contacts.gap[own], separates)
 
 
 def balanced_torque(model: DrivetrainModel, driver: str, torque: float, output: str) -> dict[str, float]:
@@ -263,21 +254,32 @@ def _check_turning(train: Drivetrain) -> None:
             )  # fmt: skip
 
 
-def _inertia(train: Drivetrain, place: Coordinates, spin: np.ndarray):
-    """Mass (n, n), and gyroscopic matrix per unit speed of the first body."""
-    M, G = np.zeros((2, place.count, place.count))
+def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
+    """Mass and stiffness (n, n) without meshes, and gyroscopic matrix per unit speed of the first body."""
+    M, K, G = np.zeros((3, place.count, place.count))
     for body in train.bodies:
         first = place.body[body.name]
         own, _ = disc_matrices(body.mass, body.inertia, body.transverse_inertia)
         M[first : first + 5, first : first + 5] += own
         _add_gyroscopic(G, first, body.inertia * spin[first + 4])
     for shaft, inner in zip(train.shafts, place.inner):
+        if not shaft.elements:
+            s = shaft.springs
+            K += _springs(joint_rows(place, shaft), [s.shear, s.shear, s.bending, s.bending, s.torsion])
+            continue
         ends = (place.body[shaft.first], *inner, place.body[shaft.second])
-        for one, two in itertools.pairwise(ends) if shaft.elements else ():
+        mass, stiffness, gyroscopic = shaft.element_matrices
+        for one, two in itertools.pairwise(ends):
             at = np.r_[one : one + 5, two : two + 5]
-            mass, _, gyroscopic = beam_element(shaft.section, shaft.length / shaft.elements)
             M[np.ix_(at, at)] += mass
+            K[np.ix_(at, at)] += stiffness
             G[np.ix_(at, at)] += gyroscopic * spin[ends[0] + 4]
+    for bearing in train.bearings:
+        rows = np.zeros((5, place.count))
+        first = bearing_place(train, place, bearing)
+        rows[np.arange(5), first + np.arange(5)] = 1.0
+        rows[0, first + 3], rows[1, first + 2] = bearing.offset, -bearing.offset
+        K += _springs(rows, [bearing.radial] * 2 + [bearing.tilt] * 2 + [bearing.torsion])
     for number, stage in enumerate(train.planetary):
         carrier = place.body[stage.carrier]
         B = lumped_map(stage, place, number)
@@ -289,37 +291,15 @@ def _inertia(train: Drivetrain, place: Coordinates, spin: np.ndarray):
         M[carrier + 3, carrier + 3] += tilt
         polar = n * stage.planet_mass * a**2 * spin[carrier + 4]
         _add_gyroscopic(G, carrier, polar + n * stage.planet_inertia * spin[place.planets[number][0, 2]])
-    return M, G
+        if math.isfinite(stage.planet_bearing):
+            rows = planet_bearing_rows(train, stage, place, number)
+            K += _springs(rows, [stage.planet_bearing] * len(rows))
+    return M, K, G
 
 
 def _add_gyroscopic(G, first: int, momentum: float) -> None:
     G[first + 2, first + 3] += momentum
     G[first + 3, first + 2] -= momentum
-
-
-def _stiffness(train: Drivetrain, place: Coordinates) -> np.ndarray:
-    """Shafts, bearings and planet bearings of finite stiffness."""
-    K = np.zeros((place.count, place.count))
-    for shaft, inner in zip(train.shafts, place.inner):
-        ends = (place.body[shaft.first], *inner, place.body[shaft.second])
-        if shaft.elements:
-            for one, two in itertools.pairwise(ends):
-                at = np.r_[one : one + 5, two : two + 5]
-                K[np.ix_(at, at)] += beam_element(shaft.section, shaft.length / shaft.elements)[1]
-            continue
-        s = shaft.springs
-        K += _springs(joint_rows(place, shaft), [s.shear, s.shear, s.bending, s.bending, s.torsion])
-    for bearing in train.bearings:
-        rows = np.zeros((5, place.count))
-        first = bearing_place(train, place, bearing)
-        rows[np.arange(5), first + np.arange(5)] = 1.0
-        rows[0, first + 3], rows[1, first + 2] = bearing.offset, -bearing.offset
-        K += _springs(rows, [bearing.radial] * 2 + [bearing.tilt] * 2 + [bearing.torsion])
-    for number, stage in enumerate(train.planetary):
-        if math.isfinite(stage.planet_bearing):
-            rows = planet_bearing_rows(train, stage, place, number)
-            K += _springs(rows, [stage.planet_bearing] * len(rows))
-    return K
 
 
 def _springs(rows, stiffness) -> np.ndarray:
@@ -454,7 +434,7 @@ def _eliminated(rows, free, place):
     table = table[np.abs(table).max(axis=1, initial=0.0) > _RANK * size]
     if not len(table):
         return np.eye(place.count)[:, free], tuple(place.names[i] for i in free)
-    _, triangle, order = linalg.qr(table, mode="economic", pivoting=True)
+    _, triangle, order = linalg.qr(table, mode="economic", pivoting=True)  # type: ignore[misc]
     diagonal = np.abs(np.diag(triangle))
     rank = int(np.count_nonzero(diagonal > _RANK * diagonal[0]))
     bound, rest = backwards[order[:rank]], np.sort(backwards[order[rank:]])
@@ -545,16 +525,6 @@ def stiffness_levels(wave: MeshWave) -> tuple[float, float, float]:
     ratio = pairs / (pairs + 1.0) if wave.low_share is None else wave.low_share
     high = wave.stiffness / (ratio + (1.0 - ratio) * share)
     return ratio * high, high, share
-
-
-def gibbs_overshoot(wave: MeshWave, harmonics: int) -> float:
-    """Largest overshoot of the cut series beyond the upper stiffness, over the jump.
-
-    Without end 0.0895 (J. W. Gibbs, Nature 59, 1899); the maximum is searched on a fine grid.
-    """
-    low, high, _ = stiffness_levels(wave)
-    phase = np.linspace(0.0, 2.0 * np.pi, 400 * harmonics + 1)[:, None]
-    return float((FourierSeries(rectangular_series(wave, harmonics)).at(phase).max() - high) / (high - low))
 
 
 @dataclass(frozen=True)
@@ -777,18 +747,6 @@ class TurningMeshes:
         return force[..., None] * S, slope[..., None, None] * S[..., :, None] * S[..., None, :]
 
 
-def mesh_force(x, k, backlash, *, separates: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Force and tangent of meshes with the stiffness k at the approach x; drive side from ``x = 0`` on.
-
-    The back side is that of gears whose axes keep their distance: its approach is -x.
-    """
-    if not separates:
-        return k * x, np.broadcast_to(k, np.shape(x))
-    drive, closed = positive_part(x)
-    back, behind = positive_part(-x - backlash)
-    return k * (drive - back), k * (closed + behind)
-
-
 @dataclass(frozen=True)
 class FlankContacts:
     """Contacts with the forces ``k max(x - gap, 0)`` along their own normals.
@@ -857,7 +815,7 @@ def flank_contacts(
     for whole, part in ((fixed, geometry.fixed), (even, geometry.even), (odd, geometry.odd)):
         whole[..., : len(geometry.fixed), :count] = part
     columns = [np.append(j, _shared(geometry, j)) for j in range(count)]
-    for column, j in enumerate(behind, start=count):
+    for column, j in enumerate(behind.tolist(), start=count):
         stage, own, radial = geometry.stage[j], _shared(geometry, j), [extra[j]] if j in extra else []
         fixed[j, column], fixed[radial, column] = -1.0, 1.0
         if stage < len(planar):
@@ -912,62 +870,3 @@ def held_train(train: Drivetrain) -> Drivetrain:
 def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:
     """Model of `held_train`, for the same solvers; options as for `drivetrain_model`."""
     return drivetrain_model(held_train(train), **options)
-
-
-def torsional_matrices(train: Drivetrain) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[str, ...]]:
-    """Mass and shaft stiffness (n, n), mesh columns (n, n_meshes) [m], names of the coordinates.
-
-    Shafts without elements. The approach of a mesh is the sum of base radius times rotation of its gears,
-    with the signs of the loaded flanks.
-    """
-    names, at = [], {}
-    for body in train.bodies:
-        at[body.name] = len(names)
-        names.append(f"{body.name}: rotation")
-        for number, stage in enumerate(train.planetary):
-            if stage.carrier == body.name:
-                prefix = "planet" if len(train.planetary) == 1 else f"planet of {body.name}"
-                at[number] = len(names) + np.arange(len(stage.planet_angles))
-                names += [f"{prefix} {p + 1}: rotation" for p in range(len(stage.planet_angles))]
-    M, K = np.zeros((2, len(names), len(names)))
-    for body in train.bodies:
-        M[at[body.name], at[body.name]] += body.inertia
-    for shaft in train.shafts:
-        ends = [at[shaft.first], at[shaft.second]]
-        K[np.ix_(ends, ends)] += shaft.springs.torsion * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    for bearing in train.bearings:
-        K[at[bearing.body], at[bearing.body]] += bearing.torsion
-    spin = _senses(train)
-    columns = []
-    for number, stage in enumerate(train.planetary):
-        cosine, sense = math.cos(stage.pressure_angle), stage.flank * spin[stage.carrier]
-        c, s, planets = at[stage.carrier], at[stage.sun], at[number]
-        M[c, c] += len(planets) * stage.planet_mass * stage.centre_distance**2
-        sun, ring = np.zeros((2, len(planets), len(names)))
-        for p, place in enumerate(planets):
-            M[place, place] += stage.planet_inertia
-            # the pin pushes the planet: its flanks approach sun and ring ahead of it
-            sun[p, [c, s, place]] = stage.centre_distance, -stage.sun_radius, -stage.planet_radius
-            ring[p, [c, place]] = stage.centre_distance, stage.planet_radius
-        columns += list(sense * cosine * sun) + list(sense * cosine * ring)
-    for stage in train.parallel:
-        row = np.zeros(len(names))
-        row[[at[stage.first], at[stage.second]]] = stage.first_radius, stage.second_radius
-        lean = math.hypot(1.0, math.tan(stage.helix_angle) * math.cos(stage.pressure_angle))
-        columns.append(stage.flank * spin[stage.first] * math.cos(stage.pressure_angle) / lean * row)
-    return M, K, np.array(columns).reshape(-1, len(names)).T, tuple(names)
-
-
-def _senses(train: Drivetrain) -> dict[str, float]:
-    """Sense of rotation of every body, the first one positive: external gears turn it round."""
-    sense = {train.bodies[0].name: 1.0}
-    links = [(one.first, one.second, 1.0) for one in train.shafts]
-    links += [(one.first, one.second, -1.0) for one in train.parallel]
-    links += [(one.carrier, one.sun, 1.0) for one in train.planetary]
-    for _ in train.bodies:
-        for first, second, factor in links:
-            if first in sense:
-                sense.setdefault(second, factor * sense[first])
-            elif second in sense:
-                sense[first] = factor * sense[second]
-    return sense

@@ -1,8 +1,7 @@
 """Results of a drivetrain case: modes.nc, transient.nc, spectrum.nc, their tables and warnings.
 
 Every variable of a file carries its units. `transient_warnings` tells what the motion says against itself;
-`describe_drivetrain` and `drivetrain_warnings` are about the chain of the case, the other tables about the
-numbers of a run.
+`describe_drivetrain` is about the chain of the case, the other tables about the numbers of a run.
 """
 
 from __future__ import annotations
@@ -15,29 +14,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.errors import CaseError
 from femgear.report.tables import Block
 from femgear.storage.dataset import RPM, dataset
-from femgear.trains.drivetrain.data import numbered
-from femgear.trains.drivetrain.time import (
-    GOOD_STEPS,
-    PASS_BAND,
-    frequency_shift,
-    highest_mesh,
-    mesh_mode,
-    shift_rate,
-)
+from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
+from femgear.trains.drivetrain.data import TorqueHistory, numbered
+from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
+from femgear.trains.drivetrain.time import BALANCE, PASS_BAND, DrivetrainRun
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.solvers.linear.tracking import CampbellData
     from femgear.system.system import Modes
-    from femgear.trains.drivetrain.data import TorqueHistory
-    from femgear.trains.drivetrain.model import DrivetrainModel
-    from femgear.trains.drivetrain.section import DrivetrainCase
-    from femgear.trains.drivetrain.spectra import AveragedSpectrum, MeshLine
-    from femgear.trains.drivetrain.time import DrivetrainRun, SpeedRange
+
+_LOW_PASS = "linear-phase low pass, 0.8 to 1.0 of half the record rate, 80 dB"
 
 # Panels of a figure.
 MOST_PANELS = 6
@@ -47,8 +38,6 @@ _PLANET = re.compile(r"(?:^|-)planet (\d+)(?: \d+)?(?:-ring of |$)")
 # Share of rotations in the kinetic energy above which a mode is torsional; bending below what is left.
 _TORSION = 0.9
 
-# The step rule keeps energy and momentum exactly: more is rounding that grew, or a motion that runs away.
-_BALANCE = 1e-6
 # Linear meshes: a free motion that grows by more than this over a run is no longer small.
 GROWN = 10.0
 # The same between any two instants of it.
@@ -58,10 +47,6 @@ _NOTHING = 1e-6
 
 # Modes of the table.
 _SHOWN = 16
-# A speed that changes by more is worth a remark.
-_CHANGE = 2.0
-# Share by which steps may lower the frequency of a mode that the meshes drive, and a small one.
-_SHIFT, _SMALL_SHIFT = 1e-2, 1e-3
 
 
 @dataclass(frozen=True)
@@ -75,8 +60,45 @@ class DrivetrainModesResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc."""
-
-        return drivetrain_modes_dataset(self)
+        modes, model, found = self.modes, self.model, self.campbell
+        members, energy, rotation = _energies(model, modes.shape)
+        bases, mode, base, crossing = np.unique(model.mesh_base), ("mode",), ("base",), ("crossing",)
+        orders, critical = model.base_ratio[bases], found.critical
+        variables = {
+            "frequency": (mode, modes.frequency, "Hz", "undamped natural frequency"),
+            "damping_ratio": (mode, modes.damping_ratio, "1", "fraction of critical damping"),
+            "kind": (mode, _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
+            "rotation_share": (mode, rotation, "1", "share of rotations in the kinetic energy"),
+            "energy": (("member", "mode"), energy, "1", "share of the member in the kinetic energy"),
+            "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+            "mesh_stiffness": (("mesh",), model.mean_stiffness, "N/m", "mean mesh stiffness"),
+            "mesh_deflection": (
+                ("mesh", "mode"), modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode",
+            ),
+            "ratio": (("body",), list(model.ratio.values()), "1", "speed over that of the first body"),
+            "base_order": (base, orders, "1", "mesh frequency over the first body's turn"),
+            "mesh_frequency": (
+                base, orders * self.speed / (2 * np.pi), "Hz", "mesh frequency at the speed of the operation",
+            ),
+            "campbell_frequency": (
+                ("campbell_speed", "branch"), found.frequency, "Hz", "natural frequency over the speed",
+            ),
+            "critical_speed": (
+                crossing, [c.speed / RPM for c in critical], "rpm", "speed of a mesh line on a branch",
+            ),
+            "critical_frequency": (crossing, [c.frequency for c in critical], "Hz", "frequency there"),
+        }  # fmt: skip
+        coords = {
+            "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
+            "dof": _names("dof", model.system.dofs, "degree of freedom"),
+            "member": _names("member", members, "body, planet or shaft station"),
+            "mesh": _names("mesh", model.meshes, "gear mesh"),
+            "body": _names("body", model.ratio, "body"),
+            "base": _names("base", [model.bases[b] for b in bases], "mesh of a stage"),
+            "campbell_speed": (("campbell_speed",), found.speed / RPM, "rpm", "speed of the first body"),
+        }
+        attrs = {"title": "modes of the drivetrain, mean mesh stiffness", "unknowns": len(modes.shape)}
+        return dataset(variables, coords, attrs)
 
 
 @dataclass(frozen=True)
@@ -89,8 +111,105 @@ class TransientResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of transient.nc."""
+        runs = list(self.runs.values())
+        first, model = runs[0], next(iter(self.models.values()))
+        ratio, bodies = np.array(list(model.ratio.values())), list(model.ratio)
+        torque = np.zeros((len(first.time), len(bodies)))
+        for history in self.torques:
+            torque[:, bodies.index(history.body)] += history.at(first.time)
+        negative = "on the back flank" if first.contact_loss else "where the linear mesh pulls"
+        time, mesh, moving = ("time",), ("mesh",), ("time", "body")
+        of_runs = (
+            ("spin", time, lambda r: r.spin, "rad", "angle of the first body without its deviation"),
+            (
+                "speed", moving, lambda r: r.spin_speed[:, None] * ratio + r.velocity, "rad/s",
+                "speed of rotation",
+            ),
+            (
+                "deviation", moving, lambda r: r.motion, "rad",
+                "rotation less that of the free spin, ratio times spin",
+            ),
+            (
+                "mesh_force", ("time", "mesh"), lambda r: r.force, "N",
+                f"mesh force along the line of action; negative {negative}",
+            ),
+            ("least_force", mesh, lambda r: r.extremes[0], "N", "least mesh force at any step"),
+            ("largest_force", mesh, lambda r: r.extremes[1], "N", "largest mesh force at any step"),
+            ("pulling", mesh, lambda r: r.pulling, "1", "share of steps with a negative force"),
+            ("lost", mesh, lambda r: r.lost, "1", "share of steps in which no flank touches"),
+            (
+                "growth", (), lambda r: r.growth, "1/s",
+                "mean rate of the logarithm of the free motion: above zero it grows",
+            ),
+            (
+                "gain", (), lambda r: r.gain, "1",
+                "largest growth of the free motion between two instants of the run, as a factor",
+            ),
+        )  # fmt: skip
+        variables = {
+            name: (("variant", *dims), [value(run) for run in runs], unit, text)
+            for name, dims, value, unit, text in of_runs
+        }
+        energy, momentum = [run.energy_balance.error for run in runs], [run.momentum for run in runs]
+        variables |= {
+            "torque": (moving, torque, "N m", "external torque"),
+            "ratio": (("body",), ratio, "1", "speed over that of the first body"),
+            "energy_error": (("variant",), energy, "1", "error of the energy balance, relative"),
+            "momentum_error": (("variant",), momentum, "1", "error of the angular momentum, relative"),
+        }
+        coords = {
+            "variant": _names("variant", self.runs, "model"),
+            "time": (("time",), first.time, "s", "time"),
+            "body": _names("body", bodies, "body"),
+            "mesh": _names("mesh", first.meshes, "gear mesh"),
+        }
+        every = 1 if len(first.time) < 2 else round((first.time[1] - first.time[0]) / first.step)
+        attrs = {
+            "title": "motion of the drivetrain in time",
+            "step": first.step,
+            "steps": first.steps,
+            "every": every,
+            "contact": "separating" if first.contact_loss else "linear",
+            "damping_ratio": model.train.damping_ratio,
+            "filter": _LOW_PASS if every > 1 else "none",
+        }
+        return dataset(variables, coords, attrs)
 
-        return transient_dataset(self)
+
+@dataclass(frozen=True)
+class MeshLine:
+    """A line: its name, the integer orders of the bases, and the order of the first body."""
+
+    name: str
+    orders: tuple[int, ...]
+    order: float
+
+
+@dataclass(frozen=True)
+class AveragedSpectrum:
+    """Single-sided amplitude spectrum, the root of the mean of squared segments.
+
+    Parameters
+    ----------
+    frequency : (F,) array
+        [Hz], or orders.
+    amplitude : (..., F) array
+        Peak values: a sine that falls on a line shows its amplitude.
+    resolution : float
+        Distance of lines.
+    bandwidth : float
+        Equivalent noise bandwidth.
+    window : str
+    segments : int
+        Averaged.
+    """
+
+    frequency: np.ndarray
+    amplitude: np.ndarray
+    resolution: float
+    bandwidth: float
+    window: str
+    segments: int
 
 
 @dataclass(frozen=True)
@@ -105,61 +224,69 @@ class SpectrumResult:
     lines: tuple[MeshLine, ...]
     amplitudes: dict[str, np.ndarray]
     order_distance: float
+    resolved: np.ndarray
 
     def dataset(self) -> xr.Dataset:
         """Contents of spectrum.nc."""
-
-        return spectrum_dataset(self)
+        transient = self.transient
+        model, variants = next(iter(transient.models.values())), list(self.spectra)
+        some, tracked = self.spectra[variants[0]], self.orders
+        length = min(len(one.frequency) for one in tracked.values())
+        order = tracked[variants[0]].frequency[:length]
+        lines, distance = self.lines, self.order_distance
+        variables = {
+            "amplitude": (
+                ("variant", "mesh", "frequency"), [self.spectra[v].amplitude for v in variants], "N",
+                "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values",
+            ),
+            "order_amplitude": (
+                ("variant", "mesh", "order"), [tracked[v].amplitude[:, :length] for v in variants], "N",
+                "amplitude of the mesh force over orders of the first body, one segment, peak values",
+            ),
+            "line_order": (("line",), [line.order for line in lines], "1", "order of the first body"),
+            "line_frequency": (
+                ("line",), [line.order * self.speed / (2 * np.pi) for line in lines], "Hz",
+                "frequency at the mean speed",
+            ),
+            "line_amplitude": (
+                ("variant", "line", "mesh"), [self.amplitudes[v] for v in variants], "N",
+                "amplitude of the line, peak value; NaN beyond the pass band",
+            ),
+            "line_orders": (
+                ("line", "base"), [line.orders for line in lines], "1", "multiples of the base frequencies",
+            ),
+            "mesh_base": (("mesh",), model.mesh_base, "1", "number of the base of the mesh stiffness"),
+            "resolved": (
+                ("line",), self.resolved, "1",
+                "whether the record parts the line from its neighbours",
+            ),
+        }  # fmt: skip
+        coords = {
+            "variant": _names("variant", variants, "model"),
+            "mesh": _names("mesh", model.meshes, "gear mesh"),
+            "frequency": (("frequency",), some.frequency, "Hz", "frequency"),
+            "order": (("order",), order, "1", "order of the first body"),
+            "line": _names("line", [line.name for line in lines], "line"),
+            "base": _names("base", model.bases, "base frequency: turn of a carrier, or mesh"),
+        }
+        attrs = {
+            "title": "spectra of the mesh forces",
+            "window": some.window,
+            "segments": some.segments,
+            "overlap": 0.5,
+            "resolution": some.resolution,
+            "bandwidth": some.bandwidth,
+            "order_resolution": distance,
+            "settle": self.settle,
+            "speed": self.speed,
+            "planetary_stages": len(model.train.planetary),
+        }
+        return dataset(variables, coords, attrs)
 
 
 def _names(name: str, values, long_name: str) -> tuple:
     """A coordinate of names, those that come again with a number."""
     return (name,), numbered([str(value) for value in values]), "1", long_name
-
-
-def drivetrain_modes_dataset(result: DrivetrainModesResult) -> xr.Dataset:
-    """Contents of modes.nc of a drivetrain."""
-    modes, model, found = result.modes, result.model, result.campbell
-    members, energy, rotation = _energies(model, modes.shape)
-    bases = np.unique(model.mesh_base)
-    variables = {
-        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
-        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
-        "kind": (("mode",), _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
-        "rotation_share": (("mode",), rotation, "1", "share of rotations in the kinetic energy"),
-        "energy": (("member", "mode"), energy, "1", "share of the member in the kinetic energy"),
-        "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
-        "mesh_stiffness": (("mesh",), model.mean_stiffness, "N/m", "mean mesh stiffness"),
-        "mesh_deflection": (
-            ("mesh", "mode"), modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode",
-        ),
-        "ratio": (("body",), list(model.ratio.values()), "1", "speed over that of the first body"),
-        "base_order": (("base",), model.base_ratio[bases], "1", "mesh frequency over the first body's turn"),
-        "mesh_frequency": (
-            ("base",), model.base_ratio[bases] * result.speed / (2 * np.pi), "Hz",
-            "mesh frequency at the speed of the operation",
-        ),
-        "campbell_frequency": (
-            ("campbell_speed", "branch"), found.frequency, "Hz", "natural frequency over the speed",
-        ),
-        "critical_speed": (
-            ("crossing",), [c.speed / RPM for c in found.critical], "rpm", "speed of a mesh line on a branch",
-        ),
-        "critical_frequency": (
-            ("crossing",), [c.frequency for c in found.critical], "Hz", "frequency there",
-        ),
-    }  # fmt: skip
-    coords = {
-        "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-        "dof": _names("dof", model.system.dofs, "degree of freedom"),
-        "member": _names("member", members, "body, planet or shaft station"),
-        "mesh": _names("mesh", model.meshes, "gear mesh"),
-        "body": _names("body", model.ratio, "body"),
-        "base": _names("base", [model.bases[b] for b in bases], "mesh of a stage"),
-        "campbell_speed": (("campbell_speed",), found.speed / RPM, "rpm", "speed of the first body"),
-    }
-    attrs = {"title": "modes of the drivetrain, mean mesh stiffness", "unknowns": len(modes.shape)}
-    return dataset(variables, coords, attrs)
 
 
 def _energies(model, shape):
@@ -182,137 +309,6 @@ def _kinds(frequency, rotation) -> list[str]:
     return [str(word) for word in np.where(rigid, "rigid", words)]
 
 
-def transient_dataset(result: TransientResult) -> xr.Dataset:
-    """Contents of transient.nc."""
-    runs = list(result.runs.values())
-    first, model = runs[0], next(iter(result.models.values()))
-    ratio = np.array(list(model.ratio.values()))
-    bodies, tvb = list(model.ratio), ("variant", "time", "body")
-    torque = np.zeros((len(first.time), len(bodies)))
-    for history in result.torques:
-        torque[:, bodies.index(history.body)] += history.at(first.time)
-    speed = [run.spin_speed[:, None] * ratio + run.velocity for run in runs]
-    negative = "on the back flank" if first.contact_loss else "where the linear mesh pulls"
-    books = {
-        "energy_error": ([run.ledger.error for run in runs], "error of the energy balance, relative"),
-        "momentum_error": ([run.momentum for run in runs], "error of the angular momentum, relative"),
-    }
-    variables = {
-        "spin": (
-            ("variant", "time"), [run.spin for run in runs], "rad",
-            "angle of the first body without its deviation",
-        ),
-        "speed": (tvb, speed, "rad/s", "speed of rotation"),
-        "deviation": (
-            tvb, [run.motion for run in runs], "rad", "rotation less that of the free spin, ratio times spin",
-        ),
-        "mesh_force": (
-            ("variant", "time", "mesh"), [run.force for run in runs], "N",
-            f"mesh force along the line of action; negative {negative}",
-        ),
-        "least_force": (
-            ("variant", "mesh"), [run.extremes[0] for run in runs], "N", "least mesh force at any step",
-        ),
-        "largest_force": (
-            ("variant", "mesh"), [run.extremes[1] for run in runs], "N", "largest mesh force at any step",
-        ),
-        "pulling": (
-            ("variant", "mesh"), [run.pulling for run in runs], "1", "share of steps with a negative force",
-        ),
-        "lost": (
-            ("variant", "mesh"), [run.lost for run in runs], "1", "share of steps in which no flank touches",
-        ),
-        "growth": (
-            ("variant",), [run.growth for run in runs], "1/s",
-            "mean rate of the logarithm of the free motion: above zero it grows",
-        ),
-        "gain": (
-            ("variant",), [run.gain for run in runs], "1",
-            "largest growth of the free motion between two instants of the run, as a factor",
-        ),
-        "torque": (("time", "body"), torque, "N m", "external torque"),
-        "ratio": (("body",), ratio, "1", "speed over that of the first body"),
-        **{name: (("variant",), values, "1", words) for name, (values, words) in books.items()},
-    }  # fmt: skip
-    coords = {
-        "variant": _names("variant", result.runs, "model"),
-        "time": (("time",), first.time, "s", "time"),
-        "body": _names("body", bodies, "body"),
-        "mesh": _names("mesh", first.meshes, "gear mesh"),
-    }
-    every = 1 if len(first.time) < 2 else round((first.time[1] - first.time[0]) / first.step)
-    attrs = {
-        "title": "motion of the drivetrain in time",
-        "step": first.step,
-        "steps": first.steps,
-        "every": every,
-        "contact": "separating" if first.contact_loss else "linear",
-        "damping_ratio": model.train.damping_ratio,
-        "filter": "linear-phase low pass, 0.8 to 1.0 of half the record rate, 80 dB" if every > 1 else "none",
-    }
-    return dataset(variables, coords, attrs)
-
-
-def spectrum_dataset(result: SpectrumResult) -> xr.Dataset:
-    """Contents of spectrum.nc."""
-    from femgear.trains.drivetrain.spectra import resolved_lines
-
-    transient = result.transient
-    model, variants = next(iter(transient.models.values())), list(result.spectra)
-    some, tracked = result.spectra[variants[0]], result.orders
-    length = min(len(one.frequency) for one in tracked.values())
-    order = tracked[variants[0]].frequency[:length]
-    lines, distance = result.lines, result.order_distance
-    variables = {
-        "amplitude": (
-            ("variant", "mesh", "frequency"), [result.spectra[v].amplitude for v in variants], "N",
-            "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values",
-        ),
-        "order_amplitude": (
-            ("variant", "mesh", "order"), [tracked[v].amplitude[:, :length] for v in variants], "N",
-            "amplitude of the mesh force over orders of the first body, one segment, peak values",
-        ),
-        "line_order": (("line",), [line.order for line in lines], "1", "order of the first body"),
-        "line_frequency": (
-            ("line",), [line.order * result.speed / (2 * np.pi) for line in lines], "Hz",
-            "frequency at the mean speed",
-        ),
-        "line_amplitude": (
-            ("variant", "line", "mesh"), [result.amplitudes[v] for v in variants], "N",
-            "amplitude of the line, peak value; NaN beyond the pass band",
-        ),
-        "line_orders": (
-            ("line", "base"), [line.orders for line in lines], "1", "multiples of the base frequencies",
-        ),
-        "mesh_base": (("mesh",), model.mesh_base, "1", "number of the base of the mesh stiffness"),
-        "resolved": (
-            ("line",), resolved_lines(model, lines, distance), "1",
-            "whether the record parts the line from its neighbours",
-        ),
-    }  # fmt: skip
-    coords = {
-        "variant": _names("variant", variants, "model"),
-        "mesh": _names("mesh", model.meshes, "gear mesh"),
-        "frequency": (("frequency",), some.frequency, "Hz", "frequency"),
-        "order": (("order",), order, "1", "order of the first body"),
-        "line": _names("line", [line.name for line in lines], "line"),
-        "base": _names("base", model.bases, "base frequency: turn of a carrier, or mesh"),
-    }
-    attrs = {
-        "title": "spectra of the mesh forces",
-        "window": some.window,
-        "segments": some.segments,
-        "overlap": 0.5,
-        "resolution": some.resolution,
-        "bandwidth": some.bandwidth,
-        "order_resolution": distance,
-        "settle": result.settle,
-        "speed": result.speed,
-        "planetary_stages": len(model.train.planetary),
-    }
-    return dataset(variables, coords, attrs)
-
-
 def transient_warnings(data: xr.Dataset) -> Iterator[str]:
     """What transient.nc says against itself."""
     pulling, least = data["pulling"].values, data["least_force"].values
@@ -328,7 +324,7 @@ def transient_warnings(data: xr.Dataset) -> Iterator[str]:
     yield from _parted_warnings(data)
     yield from _growth_warnings(data)
     for name, words in (("energy_error", "energy"), ("momentum_error", "angular momentum")):
-        if not (error := float(data[name].max())) <= _BALANCE:
+        if not (error := float(data[name].max())) <= BALANCE:
             yield f"[W-BALANCE] the balance of {words} misses {error:.1e} of its largest term"
 
 
@@ -409,10 +405,8 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
     Raises
     ------
     CaseError
-        As `femgear.trains.drivetrain.setup.check_drivetrain`.
+        As `femgear.trains.drivetrain.checks.check_drivetrain`.
     """
-    from femgear.trains.drivetrain.setup import check_drivetrain
-
     model = check_drivetrain(case)
     return (
         Block(case.title),
@@ -422,100 +416,6 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
         _operation(case, model),
         Block("Warnings", notes=drivetrain_warnings(case, model) or ("none",)),
     )
-
-
-def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = None) -> tuple[str, ...]:
-    """What is allowed but deserves a look, in sentences; the model is made where it is not given.
-
-    Raises
-    ------
-    CaseError
-        As `femgear.trains.drivetrain.setup.check_drivetrain`, without a model.
-    """
-    from femgear.trains.drivetrain.setup import case_speeds, check_drivetrain
-
-    model = model or check_drivetrain(case)
-    speeds = case_speeds(case, model)
-    warned = (
-        _runaway(case, speeds),
-        _rates(case, model, speeds),
-        _spectra(case, model),
-        _undamped(case),
-    )
-    return (*case.notices, *(text for some in warned for text in some))
-
-
-def _undamped(case: DrivetrainCase) -> Iterator[str]:
-    """Runs in which nothing takes energy out of vibration."""
-    if case.simulation.damping_ratio == 0.0:
-        yield (
-            "[W-DAMPING] simulation.damping_ratio: 0, no damping at all: vibration of the start never dies "
-            "away, resonances grow until something else stops them, and teeth seem to part that would not; "
-            "gear trains are commonly computed with 0.02 to 0.05"
-        )
-
-
-def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[str]:
-    """Torques that change the speed more than a run is meant for."""
-    first = speeds.first
-    if speeds.highest <= _CHANGE * first and speeds.lowest >= first / _CHANGE:
-        return
-    rpm = [f"{value / RPM:.6g}" for value in (first, speeds.last, speeds.lowest, speeds.highest)]
-    between = (
-        "" if speeds.last in (speeds.lowest, speeds.highest) else f" ({rpm[2]} to {rpm[3]} rpm on the way)"
-    )
-    turns = " and turn it back" if speeds.lowest < 0.0 else ""
-    yield (
-        f"[W-SPEED] operation.torque: the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
-        f"{case.simulation.duration:g} s{between}{turns}; share = 1.0 on another body balances them"
-    )
-
-
-def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[str]:
-    """Steps and records that are too slow for the highest mesh frequency, at the fastest speed."""
-    from femgear.trains.drivetrain.setup import record_rate
-
-    name, top = highest_mesh(model, speeds.fastest)
-    rate, record = case.simulation.rate, record_rate(case, model)
-    where = f"{top:.4g} Hz"
-    if speeds.fastest > 1.01 * speeds.first:
-        where += f" at {speeds.fastest / RPM:.6g} rpm, the fastest"
-    if rate < GOOD_STEPS * top:
-        yield (
-            f"[W-RATE] simulation.rate: {rate / top:.3g} steps a period of the {name} ({where}) shift and "
-            f"damp it; take {GOOD_STEPS} or more, {GOOD_STEPS * top:.4g} Hz"
-        )
-    # modes above the last line of the mesh stiffness answer as springs
-    mode = mesh_mode(model, top * case.simulation.harmonics)
-    if (shift := frequency_shift(mode, rate)) > _SHIFT:
-        yield (
-            f"[W-RATE] simulation.rate: steps of {rate:g} Hz lower the mode of {mode:.4g} Hz, which the "
-            f"meshes drive, by {shift:.2%}; {_up(shift_rate(mode, _SHIFT))} Hz lowers it by {_SHIFT:.0%}, "
-            f"{_up(shift_rate(mode, _SMALL_SHIFT))} Hz by {_SMALL_SHIFT:.1%}"
-        )
-    if 0.5 * PASS_BAND * record < top:
-        yield (
-            f"[W-RECORD] simulation.record: records of {record:g} Hz end at {0.5 * PASS_BAND * record:g} Hz, "
-            f"below the {name} ({where})"
-        )
-
-
-def _up(value: float) -> str:
-    """Three digits, rounded up."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return f"{math.ceil(value / unit) * unit:.12g}"
-
-
-def _spectra(case: DrivetrainCase, model: DrivetrainModel) -> Iterator[str]:
-    """Runs that stop before the spectra, which would be refused."""
-    from femgear.trains.drivetrain.setup import check_spectrum
-
-    if not len(model.meshes):
-        return
-    try:
-        check_spectrum(case, model)
-    except CaseError as error:
-        yield f"[W-SPECTRUM] {error.key}: {error.message}: the stage spectrum refuses this ({error.code})"
 
 
 def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
@@ -588,8 +488,6 @@ def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
 
 
 def _operation(case: DrivetrainCase, model: DrivetrainModel) -> Block:
-    from femgear.trains.drivetrain.setup import case_speeds, record_rate, torque_histories
-
     rows, drive = [], 0.0
     for one in torque_histories(case, model.ratio):
         low, high = one.values.min(), one.values.max()
@@ -667,11 +565,15 @@ def describe_transient(data: xr.Dataset) -> Block:
 
 def _recorded(data: xr.Dataset, thinned: bool) -> Iterator[str]:
     if thinned:
-        top = 0.5 * PASS_BAND / (float(data.attrs["step"]) * int(data.attrs["every"]))
         yield (
             f"recorded: what is left of them in files and pictures, every {data.attrs['every']}th step "
-            f"behind a low pass that ends at {top:.4g} Hz"
+            f"behind a low pass that ends at {pass_band(data):.4g} Hz"
         )
+
+
+def pass_band(data: xr.Dataset) -> float:
+    """End of the pass band of the records of transient.nc [Hz]."""
+    return 0.5 * PASS_BAND / (float(data.attrs["step"]) * int(data.attrs["every"]))
 
 
 def _growth_notes(data: xr.Dataset) -> Iterator[str]:

@@ -3,7 +3,7 @@
 `build_drivetrain` reads such a case from the tables of a file; a torque series in a CSV file that the case
 names is read once and kept inside the case. `cross_check` refuses entries that contradict one another: names,
 chain, teeth and radii, places of the planets, torques, times. `notices` says what is allowed but deserves a
-look.
+look. `drivetrain_of` and `torque_histories` are the data of the chain that the entries stand for.
 """
 
 from __future__ import annotations
@@ -12,25 +12,16 @@ import difflib
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    StrictBool,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-)
+import numpy as np
+from pydantic import BeforeValidator, Field, StrictBool, ValidationError, ValidationInfo, field_validator
 
-from femgear.case import text
-from femgear.case.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
 from femgear.case.problems import combine, translate
-from femgear.case.tables import Columns, embedded, read_columns
+from femgear.case.tables import Columns, embed_points, read_columns
 from femgear.case.text import ReadCase, text_with_points
 from femgear.case.units import (
     ACCELERATION,
@@ -49,6 +40,17 @@ from femgear.case.units import (
     Dimension,
 )
 from femgear.errors import CaseError
+from femgear.system import shaft as shafts
+from femgear.trains.drivetrain.data import (
+    ChainBearing,
+    ChainBody,
+    ChainShaft,
+    Drivetrain,
+    MeshWave,
+    ParallelStage,
+    PlanetaryStage,
+    TorqueHistory,
+)
 
 MODEL = "drivetrain"
 FORMAT = 1
@@ -68,7 +70,6 @@ _REMARK = 1e-4
 
 MOST_STEPS = 1e8
 MOST_VALUES = 2.5e8
-LEAST_RECORDS = 64
 MOST_COORDINATES = 1500
 
 _DIMENSIONS = {"time": TIME, "torque": TORQUE}
@@ -150,11 +151,7 @@ def _driver(value: str | None, ends) -> str | None:
     return value
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class BodySection(_Section):
+class BodySection(Section):
     """A rigid body on its axis; the first body gives the speed."""
 
     name: Name
@@ -164,7 +161,7 @@ class BodySection(_Section):
     tilts: StrictBool = True
 
 
-class ShaftSection(_Section):
+class ShaftSection(Section):
     """A shaft between two bodies: springs of its joint, or a round section."""
 
     between: Pair(Reference)
@@ -181,7 +178,7 @@ class ShaftSection(_Section):
     elements: Count(0, 100) = 0
 
 
-class MeshSection(_Section):
+class MeshSection(Section):
     """Rectangular mesh stiffness by the number of tooth pairs in contact."""
 
     stiffness: Quantity(STIFFNESS, 1e3, 1e13)
@@ -191,7 +188,7 @@ class MeshSection(_Section):
     backlash: Quantity(LENGTH, 0.0, 0.05) | None = None
 
 
-class ParallelSection(_Section):
+class ParallelSection(Section):
     """Two external gears; sizes by pitch radii, base radii, or the transverse module."""
 
     between: Pair(Reference)
@@ -212,7 +209,7 @@ class ParallelSection(_Section):
         return _driver(value, info.data.get("between", ()))
 
 
-class PlanetarySection(_Section):
+class PlanetarySection(Section):
     """Carrier, sun and planets in a ring that the housing holds."""
 
     carrier: Reference
@@ -242,7 +239,7 @@ class PlanetarySection(_Section):
         return _driver(value, [info.data[key] for key in ("carrier", "sun") if key in info.data])
 
 
-class BearingSection(_Section):
+class BearingSection(Section):
     """Bearing in the housing, of a body or of a station inside a shaft of several elements."""
 
     body: Reference | None = None
@@ -253,13 +250,13 @@ class BearingSection(_Section):
     offset: Offset = 0.0
 
 
-class GravitySection(_Section):
+class GravitySection(Section):
     """Weight of all bodies along -y."""
 
     acceleration: Quantity(ACCELERATION, 0.0, 1e3) = 9.80665
 
 
-class TorqueSection(_Section):
+class TorqueSection(Section):
     """Torque on a body: constant, a series, or a share of what balances the others."""
 
     body: Reference
@@ -270,14 +267,14 @@ class TorqueSection(_Section):
     share: Number(0.0, 10.0) | None = None
 
 
-class OperationSection(_Section):
+class OperationSection(Section):
     """Speed of the first body at the start, and the torques."""
 
     speed: Quantity(SPEED, 1e-3 * SPEED.scale, 1e6 * SPEED.scale)
     torque: Annotated[tuple[TorqueSection, ...], Field(max_length=MOST_PARTS)] = ()
 
 
-class SimulationSection(_Section):
+class SimulationSection(Section):
     """Integration in time, what is kept of it, and its spectra."""
 
     duration: Quantity(TIME, 1e-3, 1e5)
@@ -294,16 +291,12 @@ class SimulationSection(_Section):
     resolution: Frequency | None = None
 
 
-class DrivetrainCase(_Section, ReadCase):
+class DrivetrainCase(Section, ReadCase):
     """A chain of bodies, its operation and how to integrate it, in SI units.
 
     The fields carry the names of the case file; ``source`` is the text that gives this case, ``notices`` what
     deserves to be said.
     """
-
-    # sections of planetary sets, which code for all kinds of cases asks for
-    planar: ClassVar[None] = None
-    helical: ClassVar[None] = None
 
     format: Count(1, 2**31) = FORMAT
     model: Literal[MODEL]
@@ -387,6 +380,120 @@ def need_drivetrain(case: object) -> DrivetrainCase:
             file=getattr(case, "name", None) or None,
         )
     return case
+
+
+def drivetrain_of(case: DrivetrainCase) -> Drivetrain:
+    """The chain of a case.
+
+    Parameters
+    ----------
+    case : DrivetrainCase
+
+    Returns
+    -------
+    Drivetrain
+    """
+    return Drivetrain(
+        bodies=tuple(ChainBody(**body.model_dump()) for body in case.body),
+        shafts=tuple(_shaft(one) for one in case.shaft),
+        parallel=tuple(_parallel(one) for one in case.parallel),
+        planetary=tuple(_planetary(one) for one in case.planetary),
+        bearings=tuple(_bearing(one) for one in case.bearing),
+        gravity=0.0 if case.gravity is None else case.gravity.acceleration,
+        damping_ratio=case.simulation.damping_ratio,
+    )
+
+
+def _shaft(one: ShaftSection) -> ChainShaft:
+    first, second = one.between
+    section = None
+    if one.outer_diameter is not None:
+        section = shafts.ShaftSection(
+            one.outer_diameter, one.inner_diameter, one.youngs_modulus, one.poisson_ratio, one.density
+        )
+    springs = one.bending, one.torsion, one.shear
+    return ChainShaft(first, second, one.length, *springs, one.shear_ratio, section, one.elements)
+
+
+def _wave(one: MeshSection) -> MeshWave:
+    backlash = math.inf if one.backlash is None else one.backlash
+    return MeshWave(one.stiffness, one.contact_ratio, one.low_share, one.phase, backlash)
+
+
+def _bearing(one: BearingSection) -> ChainBearing:
+    body, other = one.shaft or (one.body or "", None)
+    return ChainBearing(body, one.radial, one.tilt, one.offset, other=other, station=one.station or 0)
+
+
+def _parallel(one: ParallelSection) -> ParallelStage:
+    if one.module is not None:
+        radii = [0.5 * one.module * teeth for teeth in one.teeth]
+    else:
+        radii = one.radii or [radius / math.cos(one.pressure_angle) for radius in one.base_radii or ()]
+    return ParallelStage(
+        first=one.between[0],
+        second=one.between[1],
+        first_radius=radii[0],
+        second_radius=radii[1],
+        first_teeth=one.teeth[0],
+        mesh=_wave(one.mesh),
+        pressure_angle=one.pressure_angle,
+        helix_angle=one.helix_angle,
+        direction=one.direction,
+        first_offset=one.offsets[0],
+        second_offset=one.offsets[1],
+        driver=one.driver,
+    )
+
+
+def _planetary(one: PlanetarySection) -> PlanetaryStage:
+    if one.module is not None:
+        # half teeth of the planet are a matter of its profile shift
+        teeth = one.sun_teeth, 0.5 * (one.ring_teeth - one.sun_teeth)
+        sun, planet = (0.5 * one.module * number for number in teeth)
+    elif one.sun_base_radius is not None and one.planet_base_radius is not None:
+        cosine = math.cos(one.pressure_angle)
+        sun, planet = one.sun_base_radius / cosine, one.planet_base_radius / cosine
+    else:
+        assert one.sun_radius is not None and one.planet_radius is not None  # one of three ways
+        sun, planet = one.sun_radius, one.planet_radius
+    same = ("carrier", "sun", "ring_teeth", "sun_teeth", "pressure_angle", "planet_bearing", "driver")
+    same += ("planet_mass", "planet_inertia", "planet_transverse_inertia")
+    return PlanetaryStage(
+        sun_radius=sun,
+        planet_radius=planet,
+        sun_mesh=_wave(one.sun_mesh),
+        ring_mesh=_wave(one.ring_mesh),
+        planet_angles=one.planet_angles or tuple(2.0 * math.pi * p / one.planets for p in range(one.planets)),
+        **{name: getattr(one, name) for name in same},
+    )
+
+
+def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[TorqueHistory, ...]:
+    """Torques of a case; a share balances the others over the speed ratios.
+
+    Parameters
+    ----------
+    case : DrivetrainCase
+    ratio : mapping of str to float
+        Speeds of the bodies over that of the first one.
+
+    Returns
+    -------
+    tuple of TorqueHistory
+    """
+    entries = case.operation.torque
+    found = [
+        TorqueHistory(one.body, np.array(one.times or [0.0]), np.array(one.torques or [one.torque]))
+        for one in entries
+        if one.share is None
+    ]
+    for one in entries:
+        if one.share is not None:
+            times = np.unique(np.concatenate([history.times for history in found]))
+            power = sum(ratio[history.body] * history.at(times) for history in found)
+            found.append(TorqueHistory(one.body, times, -one.share * power / ratio[one.body]))
+    return tuple(found)
 
 
 def cross_check(case: DrivetrainCase) -> list[CaseError]:
@@ -557,7 +664,7 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
                 key=f"{key}.{given[0] if given else 'torque'}",
                 limit="torque, file, times with torques, or share",
             )
-        elif series:
+        elif one.times is not None and one.torques is not None:
             if len(one.times) != len(one.torques) or any(b <= a for a, b in pairwise(one.times)):
                 yield CaseError(
                     "the series needs ascending times, and as many torques",
@@ -621,25 +728,6 @@ def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
             f"{size:.3g} kept numbers are too many", code="E-RANGE", key="simulation.record",
             value=FREQUENCY.show(record), limit=f"{MOST_VALUES:g} numbers",
             remedy=f"take {FREQUENCY.show(record * MOST_VALUES / size)} or less, or a shorter duration",
-        )  # fmt: skip
-
-
-def spectrum_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
-    """Why the records of a run have no spectra; parameters as of `record_problems`."""
-    s = case.simulation
-    late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
-    if late * record < LEAST_RECORDS:
-        yield CaseError(
-            f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
-            key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
-            limit=f"{LEAST_RECORDS} records or more after simulation.settle",
-            remedy="take a longer duration, a shorter settle or more records, or write --only transient",
-        )  # fmt: skip
-    elif s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
-        yield CaseError(
-            "the record has no such resolution", code="E-RANGE", key="simulation.resolution",
-            value=FREQUENCY.show(s.resolution),
-            limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(record / 16.0)}",
         )  # fmt: skip
 
 
@@ -799,7 +887,7 @@ def notices(case: DrivetrainCase) -> tuple[str, ...]:
             (stage.sun_radius, stage.planet_radius),
             (stage.sun_base_radius, stage.planet_base_radius),
         ):
-            if sun is not None:
+            if sun is not None and planet is not None:
                 found.append(
                     (f"planetary[{i}]", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)
                 )
@@ -859,16 +947,12 @@ def embed_torques(data: dict, name: str) -> dict[str, str]:
         if table.keys() & {"torque", "times", "torques", "share"}:
             continue
         key = f"operation.torque[{i}]"
-        file = table.pop("file")
-        times, torques = embedded(file, name, f"{key}.file", read_torques)
-        table["times"] = [f"{value:{_DIGITS}} s" for value in times]
-        table["torques"] = [f"{value:{_DIGITS}} N m" for value in torques]
-        found[key] = text.printable(file)
+        found[key] = embed_points(table, name, key, read_torques, {"times": "s", "torques": "N m"})
     return found
 
 
-def read_torques(path: str | os.PathLike) -> tuple[list[float], list[float]]:
-    """Instants [s] and torques [N m] of a CSV file.
+def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
+    """``"times"`` [s] and ``"torques"`` [N m] of a CSV file.
 
     Parameters
     ----------
@@ -880,9 +964,9 @@ def read_torques(path: str | os.PathLike) -> tuple[list[float], list[float]]:
     Raises
     ------
     CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-CSV`` with the number of the line: unknown
-        columns or units, numbers that are none, not finite or beyond the limits of a case file, decimal
-        commas beside decimal points, times that do not ascend.
+        ``E-FILE``, ``E-FILE-ENC`` (see `femgear.case.text.read_text`); ``E-CSV`` with the number of the line:
+        unknown columns or units, numbers that are none, not finite or beyond the limits of a case file,
+        decimal commas beside decimal points, times that do not ascend.
     """
     found = read_columns(path, _DIMENSIONS, least=1, most=MOST_POINTS, remedy=_COLUMNS)
     times, torques = (_column(found, key) for key in ("time", "torque"))
@@ -892,7 +976,7 @@ def read_torques(path: str | os.PathLike) -> tuple[list[float], list[float]]:
                 "the times do not ascend", line, value=f"{after:g} s", limit=f"above {before:g} s",
                 remedy="sort the lines by time, and keep one line of every instant",
             )  # fmt: skip
-    return times, torques
+    return {"times": times, "torques": torques}
 
 
 def _column(found: Columns, key: str) -> list[float]:

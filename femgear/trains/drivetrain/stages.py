@@ -1,28 +1,46 @@
 """The pipeline of a drivetrain case: modes, transient -> spectrum.
 
+Spectra of mesh forces are windowed and averaged, over frequency and over orders of the first body. Lines are
+named for what makes them: mesh harmonics, side bands of the turning carriers, sums and differences of two
+meshes.
+
 `DRIVETRAIN` at the end is the train: the table of its stages, with what the report says and draws of each,
 and the case file of its own.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.errors import ConvergenceError
+from femgear.errors import CaseError, ConvergenceError
 from femgear.threads import one_blas_thread
+from femgear.trains.drivetrain.checks import (
+    BENDING,
+    TORSIONAL,
+    case_model,
+    check_drivetrain,
+    check_spectrum,
+    check_turning,
+    drivetrain_warnings,
+    record_every,
+    record_rate,
+)
+from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.results import (
+    AveragedSpectrum,
     DrivetrainModesResult,
+    MeshLine,
     SpectrumResult,
     TransientResult,
     describe_drivetrain,
     describe_drivetrain_modes,
     describe_spectrum,
     describe_transient,
-    drivetrain_warnings,
     transient_warnings,
 )
 from femgear.trains.drivetrain.section import (
@@ -30,28 +48,22 @@ from femgear.trains.drivetrain.section import (
     build_drivetrain,
     is_drivetrain,
     settle_time,
-)
-from femgear.trains.drivetrain.setup import (
-    BENDING,
-    TORSIONAL,
-    case_model,
-    check_drivetrain,
-    check_spectrum,
-    check_turning,
-    record_every,
-    record_rate,
     torque_histories,
 )
+from femgear.trains.drivetrain.time import PASS_BAND, DrivetrainRun, Records, march_drivetrain
 from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
-    from femgear.trains.drivetrain.time import DrivetrainRun
 
 # Campbell diagram: speeds, and modes up to so many times those of operation and mesh lines.
 _SPEEDS, _FASTEST, _HIGHEST, _MOST_BRANCHES = 21, 10.0 / 3.0, 2.5, 40
 # Orders are read off up to this share of the record rate: beyond it the interpolation takes more than 1.4 %.
 _ORDERS = 0.25
+# Mesh harmonics and side bands of the carrier's turn that have names.
+HARMONICS, SIDE_BANDS = 3, 3
+# Of the spectra, and half the width of its main lobe in lines (F. J. Harris, Proc. IEEE 66, 1978, 51-83).
+WINDOW, _LOBE = "hann", 2.0
 # Growth of the free motion from which linear meshes are asked whether the motion means anything, and the
 # vibration of a body over its own speed that means nothing.
 GROWN, _WILD = 1e3, 100.0
@@ -98,8 +110,6 @@ def solve_transient_run(case: DrivetrainCase, *, progress: Progress | None = Non
 
 
 def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
-    from femgear.trains.drivetrain.time import march_drivetrain
-
     s = case.simulation
     try:
         run = march_drivetrain(
@@ -110,8 +120,7 @@ def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
             speed=case.operation.speed,
             start=s.start,
             outputs=[f"{body.name}: rotation" for body in model.train.bodies],
-            every=record_every(case, model),
-            lowpass=True,
+            records=Records(record_every(case, model), lowpass=True),
             contact_loss=s.contact_loss,
         )
     except ConvergenceError as error:
@@ -123,7 +132,7 @@ def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
 
 
 def _check_sense(run: DrivetrainRun, variant: str, ratio) -> None:
-    """Refuse motions that have grown beyond sense, however exact their books are."""
+    """Refuse motions that have grown beyond sense, however exact their balances are."""
     if not run.gain > GROWN:
         return
     fastest = np.abs(run.spin_speed).max() * np.abs(ratio)
@@ -154,15 +163,8 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
     Raises
     ------
     CaseError
-        As `femgear.trains.drivetrain.setup.check_spectrum`.
+        As `femgear.trains.drivetrain.checks.check_spectrum`.
     """
-    from femgear.trains.drivetrain.spectra import (
-        averaged_spectrum,
-        line_amplitudes,
-        mesh_lines,
-        order_spectrum,
-    )
-
     check_spectrum(case, transient.models[BENDING])
     first, settle = next(iter(transient.runs.values())), settle_time(case)
     rate = record_rate(case, transient.models[BENDING])
@@ -186,17 +188,154 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
             found, frequency=found.frequency[kept], amplitude=found.amplitude[..., kept]
         )
         amplitudes[variant] = line_amplitudes(force, angle, run.spin_speed[late], lines, record_rate=rate)
-    return SpectrumResult(transient, settle, speed, spectra, tracked, lines, amplitudes, distance)
+    resolved = resolved_lines(transient.models[BENDING], lines, distance)
+    return SpectrumResult(transient, settle, speed, spectra, tracked, lines, amplitudes, distance, resolved)
+
+
+def mesh_lines(model: DrivetrainModel) -> tuple[MeshLine, ...]:
+    """Mesh harmonics, side bands of the carrier's turn, sums and differences of two meshes."""
+    count, planets = len(model.bases), len(model.geometry.even)
+    meshes = [base for base in range(count) if base % 2 or base >= 2 * planets]
+    found = []
+
+    def add(name: str, orders: dict[int, int]) -> None:
+        vector = np.zeros(count, int)
+        vector[list(orders)] = list(orders.values())
+        order = float(vector @ model.base_ratio)
+        if order:
+            found.append(MeshLine(name, tuple(int(o) for o in vector), abs(order)))
+
+    for base in meshes:
+        text = model.bases[base]
+        if base < 2 * planets:
+            add(model.bases[base - 1], {base - 1: 1})
+        for h in range(1, HARMONICS + 1):
+            add(text if h == 1 else f"{h} x {text}", {base: h})
+        for k in (*range(-SIDE_BANDS, 0), *range(1, SIDE_BANDS + 1)) if base < 2 * planets else ():
+            words = f"{'+' if k > 0 else '-'} {abs(k)} turn{'s' if abs(k) > 1 else ''}"
+            add(f"{text} {words}", {base: 1, base - 1: k})
+    for one, two in itertools.combinations(meshes, 2):
+        for sign, word in ((1, "+"), (-1, "-")):
+            add(f"{model.bases[two]} {word} {model.bases[one]}", {two: 1, one: sign})
+    return tuple(found)
+
+
+def resolved_lines(model: DrivetrainModel, lines, distance: float) -> np.ndarray:
+    """Whether (L,) Hann's window parts a line from others and mesh harmonics; distance of orders."""
+    order = np.array([line.order for line in lines])
+    harmonics = np.outer(np.arange(1, 11), model.base_ratio[np.unique(model.mesh_base)]).ravel()
+    apart = np.abs(order[:, None] - np.concatenate([order, harmonics]))
+    # the line itself, twice where it is a mesh harmonic
+    apart[apart < 1e-9 * order.max(initial=1.0)] = np.inf
+    return apart.min(axis=1, initial=np.inf) >= _LOBE * distance
+
+
+def line_amplitudes(signal, angle, speed, lines, *, record_rate: float) -> np.ndarray:
+    """Amplitudes (L, c) of lines in signals (n, c), by projection on them at their exact orders.
+
+    Hann's window over the angle; the mean is taken off. NaN beyond the pass band of the records.
+
+    Parameters
+    ----------
+    signal : (n, c) array
+        Records of equal distance in time.
+    angle, speed : (n,) arrays
+        Of the first body [rad], [rad/s].
+    lines : sequence of MeshLine
+    record_rate : float
+        [Hz]
+    """
+    part = (angle - angle[0]) / (angle[-1] - angle[0])
+    weight = (0.5 - 0.5 * np.cos(2.0 * np.pi * part)) * speed
+    weight = weight / weight.sum()
+    signal = np.asarray(signal, float)
+    signal = signal - weight @ signal
+    found = np.full((len(lines), signal.shape[1]), np.nan)
+    for row, line in enumerate(lines):
+        if line.order * np.abs(speed).max() / (2.0 * np.pi) <= 0.5 * PASS_BAND * record_rate:
+            found[row] = 2.0 * np.abs((weight * np.exp(-1j * line.order * angle)) @ signal)
+    return found
+
+
+def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpectrum:
+    """Spectrum of a signal (n, ...) sampled every ``step`` seconds, segments under Hann's window.
+
+    P. D. Welch, IEEE Trans. Audio Electroacoust. 15, 1967, 70-73, of amplitudes instead of densities; the
+    segments overlap by half, and the mean of every one is taken off.
+
+    Parameters
+    ----------
+    signal : (n, ...) array
+    step : float
+        [s], or turns for orders.
+    resolution : float
+        Wanted distance of lines [Hz]; the segments take ``1 / resolution`` seconds.
+    """
+    from scipy.signal import get_window
+
+    signal = np.asarray(signal, float)
+    length = round(1.0 / (resolution * step)) if resolution > 0.0 and step > 0.0 else 0
+    if not 8 <= length <= len(signal):
+        raise CaseError(
+            f"segments of {length} of {len(signal)} samples", code="E-SPECTRUM",
+            limit="8 samples up to the whole signal", remedy="take a coarser resolution or a longer signal",
+        )  # fmt: skip
+    weight = np.asarray(get_window(WINDOW, length))
+    hop = max(1, round(0.5 * length))
+    starts = range(0, len(signal) - length + 1, hop)
+    power = 0.0
+    for start in starts:
+        part = signal[start : start + length]
+        line = np.fft.rfft((part - part.mean(axis=0)).T * weight, axis=-1)
+        power = power + np.abs(line) ** 2
+    amplitude = 2.0 * np.sqrt(power / len(starts)) / weight.sum()
+    bandwidth = np.sum(weight**2) / weight.sum() ** 2 / step
+    return AveragedSpectrum(
+        np.fft.rfftfreq(length, step), amplitude, 1.0 / (length * step), float(bandwidth), WINDOW, len(starts)
+    )
+
+
+def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> AveragedSpectrum:
+    """Spectrum over orders of an angle that need not grow evenly.
+
+    The signal is taken at equal steps of the angle by cubic splines (K. R. Fyfe and E. D. S. Munck, Mech.
+    Syst. Signal Process. 11, 1997, 187-205), then as in `averaged_spectrum`.
+
+    Parameters
+    ----------
+    signal : (n, ...) array
+    angle : (n,) array
+        Ascending [rad].
+    resolution : float
+        Distance of orders.
+    per_turn : int
+        Samples a turn, more than twice the highest order; orders above a half of it alias.
+    """
+    from scipy.interpolate import CubicSpline
+
+    angle = np.asarray(angle, float)
+    if len(angle) < 4 or np.any(np.diff(angle) <= 0.0):
+        raise CaseError(
+            "the angle of order tracking must ascend", code="E-SPECTRUM", limit="4 samples or more"
+        )
+    count = int((angle[-1] - angle[0]) / (2.0 * np.pi) * per_turn)
+    even = angle[0] + 2.0 * np.pi / per_turn * np.arange(count)
+    tracked = CubicSpline(angle, np.asarray(signal, float))(even)
+    return averaged_spectrum(tracked, 1.0 / per_turn, resolution=resolution)
 
 
 def _transient_verdict(result: TransientResult) -> dict:
     runs = result.runs.values()
     return {
         "steps": next(iter(runs)).steps,
-        "energy": max(run.ledger.error for run in runs),
+        "energy": max(run.energy_balance.error for run in runs),
         "momentum": max(run.momentum for run in runs),
         "pulling": {variant: float(np.max(run.pulling, initial=0.0)) for variant, run in result.runs.items()},
     }
+
+
+def _check(case: DrivetrainCase) -> None:
+    check_drivetrain(case)
 
 
 def _figures() -> Mapping[str, Figures]:
@@ -228,7 +367,7 @@ DRIVETRAIN = Train(
                 "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
             },
             describe=lambda results: describe_drivetrain_modes(results.modes),
-            check=check_drivetrain,
+            check=_check,
         ),
         Stage(
             name="transient",
@@ -236,7 +375,7 @@ DRIVETRAIN = Train(
             solve=lambda case, _, context: solve_transient_run(case, progress=context.progress),
             verdict=_transient_verdict,
             describe=lambda results: describe_transient(results.transient),
-            check=check_drivetrain,
+            check=_check,
         ),
         Stage(
             name="spectrum",

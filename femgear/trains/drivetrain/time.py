@@ -1,8 +1,7 @@
 """Newmark's method for a drivetrain through time, with meshes that are linear or separate.
 
 `march_drivetrain` takes the steps. What it works with stands below it: the start, one step with the loads and
-meshes of many, flanks that part, the free motion, the books of energy and momentum, the records, and how fast
-the chain turns under its torques, which asks for steps and records.
+meshes of many, flanks that part, the free motion, the balances of energy and momentum, and the records.
 
 A step is a linear map of the state and the loads. The meshes, few against the coordinates, enter by the
 Woodbury formula: with ``A = M + gamma h C + beta h^2 K`` factorised once and ``F = beta h^2 U^T A^-1 U`` the
@@ -14,9 +13,8 @@ Meshes that separate add the search for the flanks that touch. Drive and back fl
 (`femgear.trains.drivetrain.model`) with the force ``k max(u, 0)`` of their overlap u, the approach less the
 gap. With the contacts known that touch, the overlaps at the end of a step obey a small linear system. The
 forces do not fall with the overlap and the flexibility takes no energy back, so that there is one solution.
-Changing the wrong contacts and solving again mostly ends after one round; where it does not, the way from a
-known point is followed across the borders of the contacts, which always ends (J. Katzenelson, Bell Syst.
-Tech. J. 44, 1965, 1605-1620; T. Fujisawa and E. S. Kuh, SIAM J. Appl. Math. 22, 1972, 307-328).
+Changing the wrong contacts and solving again mostly ends after one round; where it does not, only the first
+wrong one changes, which always ends (K. G. Murty, Opsearch 11, 1974, 123-130).
 
 Beside the motion goes the free one without loads, whose growth tells a parametric resonance. It takes the
 same steps, with the tangents of the meshes, and is brought back to size one every few steps; the slope of the
@@ -28,17 +26,16 @@ With linear meshes at a constant speed it is the largest Floquet exponent, at an
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.time.steps import AVERAGE_ACCELERATION, StepRule
+from femgear.solvers.time.steps import AVERAGE_ACCELERATION
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.data import TorqueHistory, check_free_spin
-from femgear.trains.drivetrain.model import DrivetrainModel, contact_model
+from femgear.trains.drivetrain.model import DrivetrainModel, FlankContacts, contact_model
 
 # Errors of the balances, relative, beyond which a run is refused.
 BALANCE = 1e-6
@@ -62,8 +59,8 @@ _TABLE = 8192
 
 # Rounding of an overlap relative to the largest one without mesh forces.
 _OVERLAP_ROUNDING = 1e-12
-# Rounds of changing all wrong contacts; borders crossed a contact; starts for the way across them.
-_ROUNDS, _CROSSINGS, _STARTS = 12, 40, 5
+# Rounds of changing all wrong contacts, and of changing one.
+_ROUNDS, _SINGLE = 12, 10_000
 # Steps that are tried at once with all drive flanks and no others in touch, first and last.
 _FEW, _MANY = 8, 64
 
@@ -75,14 +72,22 @@ _CARRIED = 1e-6
 # Steps whose loads and meshes are made at once.
 _BLOCK = 4096
 
-# Steps a period that can follow a mesh at all, and well: average acceleration lowers its frequency by
-# (2 pi / steps)^2 / 12, 21 % for four, 0.4 % for thirty.
-# Not enough where modes lie far above the mesh lines: see `mesh_mode`.
-LEAST_STEPS, GOOD_STEPS = 4, 30
-# Records that nobody chose keep this multiple of the highest mesh frequency, and come this often [Hz].
-KEPT_HARMONIC, LEAST_RECORD_RATE = 3, 1000.0
-# Share of its strain energy that a mode has in the meshes where they drive it noticeably.
-MESH_SHARE = 0.1
+
+@dataclass(frozen=True)
+class Records:
+    """What a run keeps of its steps.
+
+    Parameters
+    ----------
+    every : int
+        Steps a record.
+    lowpass : bool
+        Records are low-passed (`Decimator`), so that nothing beyond half their rate appears as something
+        else; False takes the motion at these instants as it is.
+    """
+
+    every: int = 1
+    lowpass: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,8 +105,8 @@ class DrivetrainRun:
         Of the drive flanks [m]; of the meshes, drive less back flank [N].
     spin, spin_speed : (n,) arrays
         Angle and speed of the first body without its deviation [rad], [rad/s].
-    meshes, ledger
-        Names, energies.
+    meshes : tuple of str
+    energy_balance : EnergyBalance
     drift : float
         Largest spin found in the deviations after a block, before it was taken out [rad].
     momentum : float
@@ -133,7 +138,7 @@ class DrivetrainRun:
     spin: np.ndarray
     spin_speed: np.ndarray
     meshes: tuple[str, ...]
-    ledger: Ledger
+    energy_balance: EnergyBalance
     drift: float
     momentum: float
     steps: int
@@ -155,10 +160,7 @@ def march_drivetrain(
     speed: float,
     start="static",
     outputs: Sequence[str] | None = None,
-    every: int = 1,
-    lowpass: bool = False,
-    rule: StepRule = AVERAGE_ACCELERATION,
-    separate_spin: bool = True,
+    records: Records = Records(),
     contact_loss: bool = False,
 ) -> DrivetrainRun:
     """Step a drivetrain through time.
@@ -169,7 +171,7 @@ def march_drivetrain(
     torques : sequence of TorqueHistory
     duration, step : float
         [s]. Any step is taken; cases are refused below four steps a mesh period
-        (`femgear.trains.drivetrain.setup.check_drivetrain`, E-RATE), and warned of below thirty and of modes
+        (`femgear.trains.drivetrain.checks.check_drivetrain`, E-RATE), and warned of below thirty and of modes
         that the step lowers (W-RATE).
     speed : float
         Of the first body at the start [rad/s]; gyroscopic terms keep this value.
@@ -177,96 +179,73 @@ def march_drivetrain(
         Deviations and their velocities: static under the first loads, none (loads set in suddenly), or given.
     outputs : sequence of str, optional
         Coordinates to record; all rotations when not given.
-    every : int
-        Steps between records.
-    lowpass : bool
-        Records are low-passed (`Decimator`), so that nothing beyond half
-        their rate appears as something else; False takes the motion at these instants as it is.
-    rule : StepRule
-        Newmark's gamma and beta; without the averaging of generalised alpha.
-    separate_spin : bool
-        False integrates the spin with the rest, to show what it does.
+    records : Records
     contact_loss : bool
         Drive flanks part, and back flanks touch after the backlash; False lets meshes pull.
 
     Raises
     ------
     CaseError
-        Steps and durations that are none, an explicit or averaged rule (E-STEP, E-STEP-RULE), a start that
-        does not fit (E-START), bearings that hold the rotation (E-BEARING), a negative stiffness of meshes
-        that separate (E-STIFFNESS).
+        Steps and durations that are none (E-STEP), a start that does not fit (E-START), bearings that hold
+        the rotation (E-BEARING), a negative stiffness of meshes that separate (E-STIFFNESS).
     ConvergenceError
         The motion outgrows the numbers (E-DIVERGED); no flanks fit a step (E-CONTACT-STATE).
     """
-    _check(model, duration, step, every, rule)
+    _check(model, duration, step, records.every)
     count = max(1, round(duration / step))
     stepped = contact_model(model) if contact_loss else model
-    track = Spin(stepped, torques, step, speed, separate_spin)
-    scheme = Scheme.of(stepped, rule, step, speed, track.directions)
-    names = _outputs(model, outputs)
-    at = np.array([model.index(name) for name in names], int)
+    spin = Spin(stepped, torques, step, speed)
+    scheme = Scheme.of(stepped, step, speed, spin.directions)
+    if outputs is None:
+        outputs = [name for name in model.system.dofs if name.endswith("rotation")]
+    at = np.array([model.index(name) for name in outputs], int)
     if contact_loss:
-        check_pushing(model, track.table)
-    record = Record(model, count, every, at, lowpass=lowpass, contact_loss=contact_loss)
+        check_pushing(model, spin.table)
+    record = Record(model, count, records, at, contact_loss=contact_loss)
     with np.errstate(over="ignore", invalid="ignore"):
-        motion = _Motion(model, scheme, track, start, count, contact_loss)
-        books = Books(stepped, scheme, track, motion.state)
+        motion = _Motion(model, scheme, spin, start, count, contact_loss)
+        balances = Balances(stepped, scheme, spin, motion.state)
         for first in range(0, count, _BLOCK):
             states, block = motion.block(first, min(_BLOCK, count - first))
-            books.add(states, block)
-            books.check(
-                states, block, first=first, exact=(rule.gamma, rule.beta) == (0.5, 0.25),
-                free=motion.free, contact_loss=contact_loss,
-            )  # fmt: skip
+            balances.add(states, block)
+            balances.check(states, block, first, free=motion.free, contact_loss=contact_loss)
             record.take(first, len(states) - 1, states, block)
-            motion.state = books.without_drift(states[-1]) if separate_spin else states[-1].copy()
+            motion.state = balances.without_drift(states[-1])
     return DrivetrainRun(
-        step * every * np.arange(count // every + 1), names, *record.columns(), model.meshes, books.ledger(),
-        books.drift, books.momentum_error(), count, step,
-        record.extremes, record.pulled / record.steps, record.lost / record.steps, contact_loss,
-        motion.free.growth(), motion.free.gain(),
+        outputs=tuple(outputs), **record.columns(step), meshes=model.meshes, energy_balance=balances.works(),
+        drift=balances.drift, momentum=balances.momentum_error(), steps=count, step=step,
+        contact_loss=contact_loss, growth=motion.free.growth(), gain=motion.free.gain(),
     )  # fmt: skip
 
 
-def _check(model, duration, step, every, rule) -> None:
+def _check(model: DrivetrainModel, duration: float, step: float, every: int) -> None:
     if not (np.isfinite(duration) and np.isfinite(step) and 0.0 < step <= duration):
         raise CaseError(
             f"{duration} s in steps of {step} s", code="E-STEP", limit="0 < step <= duration", key="step"
         )
     if int(every) != every or every < 1:
         raise CaseError(f"every {every} steps", code="E-STEP", key="every", limit="1 or more")
-    if rule.mass or rule.force or rule.beta < 0.25 or rule.gamma < 0.5:
-        raise CaseError(
-            f"the rule {rule} is not stable for any step", code="E-STEP-RULE",
-            limit="Newmark's rules with gamma of 1/2 or more and beta of 1/4 or more",
-        )  # fmt: skip
     check_free_spin(model)
-
-
-def _outputs(model, outputs) -> tuple[str, ...]:
-    if outputs is None:
-        return tuple(name for name in model.system.dofs if name.endswith("rotation"))
-    return tuple(outputs)
 
 
 class _Motion:
     """The motion and the free motion beside it, block by block."""
 
-    def __init__(self, model, scheme, track, start, count, contact_loss):
-        self.scheme, self.track, self.piece = scheme, track, piece_length(count)
-        self.meshes = len(model.meshes)
-        contacts = model.contacts if contact_loss else None
-        self.state = start_state(model, scheme, track, start, contacts=contacts)
+    def __init__(self, model: DrivetrainModel, scheme: Scheme, spin: Spin, start, count: int, contact_loss):
+        self.scheme, self.spin, self.meshes = scheme, spin, len(model.meshes)
+        # steps between two sizes of the free motion
+        self.piece = max(1, min(PIECE, count // _SIZES))
+        self.state = start_state(model, scheme, spin, start, model.contacts if contact_loss else None)
         self.free = FreeMotion(model, scheme)
         self.free_row = self.free.start()
         self.march = march_closed
         if contact_loss and model.meshes:
-            self.march = Separating(contacts.gap, self.meshes).march
+            self.march = Separating(model.contacts.gap, self.meshes).march
 
     def block(self, first: int, number: int):
         """States (number + 1, 2 n + m) of the next steps, and their loads and meshes."""
-        scheme, h = self.scheme, self.track.step
-        block = self.track.block(first, number)
+        scheme, h = self.scheme, self.spin.step
+        block = self.spin.block(first, number)
         meshes = MeshBlock.of(scheme, block, self.meshes)
         loads = block.loads[:-1] @ scheme.loads_before + block.loads[1:] @ scheme.loads_after
         rows = np.empty((number + 1, 2, len(scheme.advance)))
@@ -279,11 +258,10 @@ class _Motion:
         return scheme.states(rows[:, 0]), block
 
 
-def start_state(model, scheme, track, start, *, contacts=None) -> np.ndarray:
-    """State ``(q, v, g)`` at the first instant; `track` stays there.
-
-    With `contacts` (`femgear.trains.drivetrain.model`), to which `scheme` and `track` belong then, meshes
-    separate.
+def start_state(
+    model: DrivetrainModel, scheme: Scheme, spin: Spin, start, contacts: FlankContacts | None
+) -> np.ndarray:
+    """State ``(q, v, g)`` at the first instant; with `contacts` meshes separate.
 
     Raises
     ------
@@ -291,15 +269,15 @@ def start_state(model, scheme, track, start, *, contacts=None) -> np.ndarray:
         A start that is none, or loads that part flanks behind which nothing holds the gears (E-START).
     """
     n, U = scheme.n, scheme.basic
-    angle, speed = track.angle, track.speed
-    block = track.block(0, 1)
-    track.angle, track.speed = angle, speed
+    angle, speed = spin.angle, spin.speed
+    block = spin.block(0, 1)
+    spin.angle, spin.speed = angle, speed
     S, k = block.selection[0], block.stiffness[0]
     if isinstance(start, str):
         q, v = np.zeros((2, n))
         if start == "static":
-            load = track.directions @ block.loads[0]
-            load = load - track.carried * (model.rigid @ load) / track.inertia
+            load = spin.directions @ block.loads[0]
+            load = load - spin.carried * (model.rigid @ load) / spin.inertia
             q = static_deviations(model, U @ S, k, load, contacts=contacts)
         elif start != "zero":
             raise CaseError(f"a start {start!r}", code="E-START", limit="static, zero or two arrays")
@@ -312,7 +290,7 @@ def start_state(model, scheme, track, start, *, contacts=None) -> np.ndarray:
     return np.concatenate([q, v, S @ force])
 
 
-def static_deviations(model, W, k, load, *, contacts=None) -> np.ndarray:
+def static_deviations(model: DrivetrainModel, W, k, load, *, contacts: FlankContacts | None = None):
     """Deviations (n,) under a load that does not drive the spin, meshes or contacts W (n, c) at one instant.
 
     Drive flanks that part, and back flanks that touch, are found as corrections of drive flanks that all
@@ -329,9 +307,9 @@ def static_deviations(model, W, k, load, *, contacts=None) -> np.ndarray:
     free, first = W.T @ q - contacts.gap, np.arange(len(k)) < meshes
     if np.array_equal(free >= 0.0, first):
         return q
-    law = ContactLaw(np.where(first, 0.0, k), np.where(first, -(1.0 - _SLIGHT) * k, 0.0))
+    touching, parted = np.where(first, 0.0, k), np.where(first, -(1.0 - _SLIGHT) * k, 0.0)
     drawn = flexible @ W
-    u, closed = solve_contact(W.T @ drawn, free, law, first)
+    u, closed = solve_overlaps(W.T @ drawn, free, first, touching, parted)
     loose = _SLIGHT * stiffness * np.abs(u[:meshes])
     loose[closed[:meshes] | np.isfinite(model.backlash)] = 0.0
     scale = (k * (np.abs(W).T @ (np.abs(flexible) @ np.abs(load)))).max()
@@ -342,7 +320,7 @@ def static_deviations(model, W, k, load, *, contacts=None) -> np.ndarray:
             remedy="name the driver of the stage that these loads press, give the mesh a backlash, or"
             " start = \"zero\"",
         )  # fmt: skip
-    return q - drawn @ (law.slopes(closed) * u)
+    return q - drawn @ (np.where(closed, touching, parted) * u)
 
 
 @dataclass(frozen=True)
@@ -377,15 +355,15 @@ class Block:
 class Spin:
     """The free spin, exact for torques that are linear in a step, and the loads that are left."""
 
-    def __init__(self, model, torques, step, speed, separate):
-        self.model, self.torques, self.step, self.separate = model, tuple(torques), step, separate
+    def __init__(self, model: DrivetrainModel, torques: Sequence[TorqueHistory], step: float, speed: float):
+        self.model, self.torques, self.step = model, tuple(torques), step
         self.angle, self.speed = 0.0, float(speed)
         carried = model.system.M @ model.rigid
         self.inertia = float(model.rigid @ carried)
         columns = [np.eye(len(carried))[model.index(f"{t.body}: rotation")] for t in self.torques]
         self.carried = carried
         self.share = np.array([column @ model.rigid for column in columns])
-        kept = [c - carried * (s / self.inertia if separate else 0.0) for c, s in zip(columns, self.share)]
+        kept = [c - carried * (s / self.inertia) for c, s in zip(columns, self.share)]
         self.directions = np.column_stack([model.system.load, *kept])
         self.table = np.zeros((_TABLE + 1, 0))
         if len(model.meshes):
@@ -395,8 +373,9 @@ class Spin:
     def block(self, first: int, count: int) -> Block:
         """The next `count` steps, which begin with step `first`; the spin moves on to their end."""
         times = self.step * np.arange(first, first + count + 1)
-        values = np.stack([one.at(times) for one in self.torques], axis=1) if self.torques else None
-        values = np.zeros((count + 1, 0)) if values is None else values
+        values = np.zeros((count + 1, len(self.torques)))
+        for column, one in enumerate(self.torques):
+            values[:, column] = one.at(times)
         torque, h = values @ self.share, self.step
         rate = torque / self.inertia
         speed = self.speed + np.append(0.0, np.cumsum(0.5 * h * (rate[1:] + rate[:-1])))
@@ -435,12 +414,13 @@ class Scheme:
     n: int
 
     @classmethod
-    def of(cls, model, rule, h, speed, directions) -> Scheme:
+    def of(cls, model: DrivetrainModel, h: float, speed: float, directions) -> Scheme:
+        """Factorise average acceleration in steps h [s] at a speed of the first body [rad/s]."""
         from scipy import linalg
 
-        system, U = model.system, model.geometry.basic
+        rule, system, U = AVERAGE_ACCELERATION, model.system, model.geometry.basic
         M, K, n = system.M, system.K, len(system.M)
-        D = system.C + speed * system.gyroscopic
+        D = system.C if system.gyroscopic is None else system.C + speed * system.gyroscopic
         # columns: q, v, g, loads before, loads after, mesh forces after
         ends = np.cumsum([n, n, U.shape[1], directions.shape[1], directions.shape[1], U.shape[1]])
         blank = np.zeros((n, ends[-1]))
@@ -522,30 +502,7 @@ def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -
         drawn[:] = dot(drawn, closed[i])
 
 
-@dataclass(frozen=True)
-class ContactLaw:
-    """Forces ``touching u`` (n,) of the overlaps u of contacts that touch, ``parted u`` of the others.
-
-    Parameters
-    ----------
-    touching, parted : (n,) arrays
-        [N/m]
-    """
-
-    touching: np.ndarray
-    parted: np.ndarray
-
-    def slopes(self, closed):
-        """(n,) [N/m]"""
-        return np.where(closed, self.touching, self.parted)
-
-
-def one_sided(stiffness) -> ContactLaw:
-    """Contacts that push only."""
-    return ContactLaw(stiffness, np.zeros_like(stiffness))
-
-
-def solve_contact(flexibility, free, law: ContactLaw, closed) -> tuple[np.ndarray, np.ndarray]:
+def solve_overlaps(flexibility, free, closed, touching, parted=0.0) -> tuple[np.ndarray, np.ndarray]:
     """Overlaps and the contacts that touch (n,), with ``u + flexibility force(u) = free``.
 
     Parameters
@@ -554,64 +511,37 @@ def solve_contact(flexibility, free, law: ContactLaw, closed) -> tuple[np.ndarra
         With a symmetric part that is not negative [m/N].
     free : (n,) array
         Overlaps without the forces [m].
-    law : ContactLaw
     closed : (n,) bool array
         First guess.
+    touching, parted : (n,) arrays
+        Forces over overlaps of contacts that touch, and of the others [N/m].
 
     Raises
     ------
     ConvergenceError
         No contacts fit (E-CONTACT-STATE).
     """
-    for _ in range(_ROUNDS):
-        u, found = _solved(flexibility, free, law, closed)
-        if np.array_equal(found, closed):
+    rounding = _OVERLAP_ROUNDING * np.abs(free).max(initial=0.0)
+    for number in range(_ROUNDS + _SINGLE):
+        slopes = np.where(closed, touching, parted)
+        u = np.linalg.solve(np.eye(len(free)) + flexibility * slopes, free)
+        found = changed(u, closed, rounding)
+        wrong = np.flatnonzero(found != closed)
+        if not len(wrong):
             return u, closed
-        closed = found
-    return _across_borders(flexibility, free, law)
-
-
-def _solved(flexibility, free, law, closed):
-    """Overlaps with these contacts, and the contacts that touch with them."""
-    u = np.linalg.solve(np.eye(len(free)) + flexibility * law.slopes(closed), free)
-    return u, changed(u, closed, _OVERLAP_ROUNDING * np.abs(free).max(initial=0.0))
-
-
-def changed(u, closed, rounding):
-    """The contacts that touch with overlaps u; within rounding as before."""
-    return np.where(closed, u >= -rounding, u > rounding)
-
-
-def _across_borders(flexibility, free, law):
-    """Katzenelson's way from `free`; at a corner of several borders it begins again beside it."""
-    random, size = np.random.default_rng(0), np.abs(free).max()
-    for attempt in range(_STARTS):
-        closed = _one_way(flexibility, free, law, free + attempt * size * random.standard_normal(len(free)))
-        if closed is not None:
-            u, found = _solved(flexibility, free, law, closed)
-            if np.array_equal(found, closed):
-                return u, closed
+        # all that are wrong, or the first one alone
+        wrong = wrong if number < _ROUNDS else wrong[:1]
+        closed = closed.copy()
+        closed[wrong] = found[wrong]
     raise ConvergenceError(
         "no contacts of the meshes fit the end of a step", code="E-CONTACT-STATE",
         remedy="take shorter steps, or the start \"zero\"",
     )  # fmt: skip
 
 
-def _one_way(flexibility, free, law, u):
-    """Contacts at the end of the straight way of ``u + flexibility force(u)`` to `free`; None in a circle."""
-    closed = u >= 0.0
-    left = free - u - flexibility @ (law.slopes(closed) * u)
-    for _ in range(_CROSSINGS * len(u)):
-        way = np.linalg.solve(np.eye(len(u)) + flexibility * law.slopes(closed), left)
-        leaves = np.where(closed, way < 0.0, way > 0.0)
-        share = np.full(len(u), np.inf)
-        share[leaves] = np.maximum(-u[leaves] / way[leaves], 0.0)
-        first = int(np.argmin(share))
-        if share[first] >= 1.0:
-            return closed
-        u, left = u + share[first] * way, (1.0 - share[first]) * left
-        u[first], closed[first] = 0.0, not closed[first]
-    return None
+def changed(u, closed, rounding: float) -> np.ndarray:
+    """The contacts that touch with overlaps u; within rounding as before."""
+    return np.where(closed, u >= -rounding, u > rounding)
 
 
 def check_pushing(model, table) -> None:
@@ -638,9 +568,10 @@ class Separating:
     """
 
     def __init__(self, gap, meshes: int):
-        from scipy.linalg.lapack import dgesv
+        from scipy.linalg import get_lapack_funcs
 
-        self.gap, self.dgesv = gap, dgesv
+        self.gap = gap
+        (self.dgesv,) = get_lapack_funcs(("gesv",), dtype=float)
         self.drive = np.arange(len(gap)) < meshes
         # what leaves the drive flanks, and no others, in touch is not below zero
         self.sense = np.where(self.drive, 1.0, -1.0)
@@ -700,7 +631,7 @@ class Separating:
         if np.array_equal(found, self.closed):
             return forces
         flexibility = np.dot(S.T, np.dot(scheme.flexibility, S))
-        self._take(solve_contact(flexibility, free, one_sided(meshes.stiffness[i]), found)[1])
+        self._take(solve_overlaps(flexibility, free, found, meshes.stiffness[i])[1])
         return self._solved(scheme, meshes, i, x)[0]
 
     def _solved(self, scheme, meshes, i, x):
@@ -719,20 +650,13 @@ class Separating:
         return forces, np.dot(x[0] - np.dot(forces[0], flexible), S) - self.gap
 
 
-def piece_length(count: int) -> int:
-    """Steps between two sizes of the free motion in a run of `count` steps."""
-    return max(1, min(PIECE, count // _SIZES))
-
-
 class FreeMotion:
     """Size of the free motion: the root of twice its energy, meshes included and the spin left out."""
 
-    def __init__(self, model, scheme, *, seed: int = 0):
+    def __init__(self, model: DrivetrainModel, scheme: Scheme, *, seed: int = 0):
         self.system, self.rigid, self.scheme = model.system, model.rigid, scheme
-        self.carried = model.system.M @ model.rigid
-        self.inertia = model.inertia
+        self.carried, self.inertia, self.seed = model.system.M @ model.rigid, model.inertia, seed
         self.times, self.sizes = [0.0], [0.0]
-        self.seed = seed
 
     def start(self) -> np.ndarray:
         """Row ``z`` (2 n + m,) of random velocities of like energy."""
@@ -787,54 +711,58 @@ class FreeMotion:
 
 
 @dataclass(frozen=True)
-class Ledger:
-    """Energies [J] of a run: what was there at the ends, and the work in between.
-
-    Over the largest of its terms, `error` is what the balance ``kinetic + strain = work of the torques and
-    weight - damping - meshes`` misses. The step rule "average acceleration" keeps it exactly.
-    """
+class EnergyBalance:
+    """Energies [J] of a run: what was there at the ends, and the work in between."""
 
     before: float
     after: float
     loads: float
     damping: float
     meshes: float
-    error: float
+
+    @property
+    def error(self) -> float:
+        """What ``kinetic + strain = work of the torques and weight - damping - meshes`` misses.
+
+        Over the largest of its terms; average acceleration keeps the balance exactly.
+        """
+        rest = self.after - self.before - self.loads + self.damping + self.meshes
+        terms = [self.after - self.before, self.loads, self.damping, self.meshes]
+        size = max(*map(abs, terms), _WORK_ROUNDING * self.before, _WORK_ROUNDING * self.after) or 1.0
+        return abs(rest) / size
 
 
-class Books:
+class Balances:
     """Energy and momentum of the deviations and of the spin."""
 
-    def __init__(self, model, scheme, track, state):
-        self.model, self.scheme, self.track = model, scheme, track
+    def __init__(self, model: DrivetrainModel, scheme: Scheme, spin: Spin, state):
+        self.model, self.scheme, self.spin = model, scheme, spin
         self.carried = model.system.M @ model.rigid
         self.loads = self.damping = self.meshes = self.drift = self.impulse = 0.0
         self.effort = self.swing = self.missed = 0.0
-        self.first_speed = track.speed
-        self.before = self.energy(state, track.speed)
-        self.momentum = self.first_momentum = self._momentum(state, track.speed)
-        self.after = self.before
+        self.before = self.after = self.energy(state, spin.speed)
+        self.momentum = self.first_momentum = self._momentum(state, spin.speed)
         self.largest = abs(self.momentum)
 
-    def energy(self, state, speed) -> float:
+    def energy(self, state, speed: float) -> float:
+        """Kinetic energy and strain of a state, without the meshes [J]."""
         n, system = self.scheme.n, self.model.system
         q, v = state[:n], state[n : 2 * n]
-        spin = 0.5 * self.track.inertia * speed**2 if self.track.separate else 0.0
+        spin = 0.5 * self.spin.inertia * speed**2
         return float(0.5 * v @ system.M @ v + 0.5 * q @ system.K @ q + spin)
 
-    def _momentum(self, state, speed) -> float:
-        spin = self.track.inertia * (speed if self.track.separate else self.first_speed)
-        return float(self.carried @ state[self.scheme.n : 2 * self.scheme.n]) + spin
+    def _momentum(self, state, speed: float) -> float:
+        return float(self.carried @ state[self.scheme.n : 2 * self.scheme.n]) + self.spin.inertia * speed
 
-    def add(self, states, block):
-        n, h, track = self.scheme.n, self.track.step, self.track
+    def add(self, states, block: Block) -> None:
+        """Add the works and impulses of a block of steps."""
+        n, h, spin = self.scheme.n, self.spin.step, self.spin
         moved = np.diff(states[:, :n], axis=0)
         mean = 0.5 * (block.loads[1:] + block.loads[:-1])
-        self.loads += float(np.sum((moved @ track.directions) * mean))
+        self.loads += float(np.sum((moved @ spin.directions) * mean))
         half = 0.5 * (block.torque[1:] + block.torque[:-1])
-        if track.separate:
-            # exact for a torque that is linear in the step
-            self.loads += float(h * half @ (0.5 * (block.speed[1:] + block.speed[:-1])))
+        # exact for a torque that is linear in the step
+        self.loads += float(h * half @ (0.5 * (block.speed[1:] + block.speed[:-1])))
         self.damping += float(np.sum((moved @ self.model.system.C) * moved)) / h
         forces = 0.5 * (states[1:, 2 * n :] + states[:-1, 2 * n :])
         self.meshes += float(np.sum((moved @ self.scheme.basic) * forces))
@@ -852,7 +780,7 @@ class Books:
         """The state less the spin that rounding has put into the deviations."""
         n, rigid = self.scheme.n, self.model.rigid
         angle, rate = (
-            float(self.carried @ part) / self.track.inertia for part in (state[:n], state[n : 2 * n])
+            float(self.carried @ part) / self.spin.inertia for part in (state[:n], state[n : 2 * n])
         )
         self.drift = max(self.drift, abs(angle))
         state = state.copy()
@@ -860,29 +788,17 @@ class Books:
         state[n : 2 * n] -= rate * rigid
         return state
 
-    def ledger(self) -> Ledger:
-        rest = self.after - self.before - self.loads + self.damping + self.meshes
-        terms = [self.after - self.before, self.loads, self.damping, self.meshes]
-        size = max(*map(abs, terms), _WORK_ROUNDING * self.before, _WORK_ROUNDING * self.after) or 1.0
-        return Ledger(self.before, self.after, self.loads, self.damping, self.meshes, abs(rest) / size)
+    def works(self) -> EnergyBalance:
+        """Energies up to here."""
+        return EnergyBalance(self.before, self.after, self.loads, self.damping, self.meshes)
 
     def momentum_error(self) -> float:
         """Largest error after any block, over the largest momentum or impulse of the torques."""
         size = max(self.largest, self.effort) or self.swing
         return self.missed / size if self.missed else 0.0
 
-    def check(self, states, block, *, first: int, exact: bool, free, contact_loss: bool) -> None:
-        """Refuse a motion that has outgrown the numbers.
-
-        Parameters
-        ----------
-        states : (t, 2 n + m) array
-            Of the block that begins with step `first`.
-        block : Block
-        exact : bool
-            Whether the step rule keeps energy and impulse.
-        free : FreeMotion
-            Tells its growth.
+    def check(self, states, block: Block, first: int, *, free: FreeMotion, contact_loss: bool) -> None:
+        """Refuse a motion that has outgrown the numbers, states (t, 2 n + m) from step `first` on.
 
         Raises
         ------
@@ -890,8 +806,7 @@ class Books:
             Momentum or energy are lost, or the motion is beyond all numbers (E-DIVERGED).
         """
         finite = np.isfinite(states).all(axis=1)
-        energy = self.ledger().error if exact else 0.0
-        momentum = self.momentum_error() if exact or self.track.separate else 0.0
+        energy, momentum = self.works().error, self.momentum_error()
         if finite.all() and energy <= BALANCE and momentum <= BALANCE:
             return
         last = len(states) - 1 if finite.all() else max(int(np.argmin(finite)) - 1, 0)
@@ -900,20 +815,19 @@ class Books:
         if not contact_loss:
             remedy += ", or write contact_loss = true: real meshes separate"
         raise ConvergenceError(
-            f"the motion has outgrown the numbers by t = {self.track.step * (first + last):.4g} s ({missed})"
+            f"the motion has outgrown the numbers by t = {self.spin.step * (first + last):.4g} s ({missed})"
             f"{self._mesh(states[last], block, last)}; the free motion {_rate(free.growth())}",
             code="E-DIVERGED",
             limit=f"balances of energy and momentum to {BALANCE:g}",
             remedy=remedy,
         )
 
-    def _mesh(self, state, block, last) -> str:
+    def _mesh(self, state, block: Block, last: int) -> str:
         """The mesh with the most strain energy."""
-        n = self.scheme.n
         if not self.model.meshes:
             return ""
         # of size one, so that its square is finite
-        approach = (state[:n] @ self.scheme.basic) @ block.selection[last]
+        approach = (state[: self.scheme.n] @ self.scheme.basic) @ block.selection[last]
         strain = block.stiffness[last] * (approach / max(np.abs(approach).max(), 1e-300)) ** 2
         return f", most in mesh {self.model.meshes[int(np.argmax(strain))]}"
 
@@ -955,15 +869,16 @@ class Decimator:
         half = min(length // 2, count) if every > 1 else 0
         self.half = half
         middle = 0.5 * (1.0 + PASS_BAND) / every
-        self.weights = firwin(2 * half + 1, middle, window=("kaiser", beta)) if half else np.ones(1)
+        window = ("kaiser", beta)
+        self.weights = firwin(2 * half + 1, middle, window=window) if half else np.ones(1)  # type: ignore
         self.slope = _end_slope(min(half, 2 * every)) if half else np.zeros(1)
-        self.buffer, self.first, self.done = None, 0, 0
+        self.buffer, self.first, self.done = np.zeros((0, 0)), 0, 0
 
     def push(self, rows) -> np.ndarray:
         """Records (k, c) that become complete with further rows (n, c)."""
         rows = np.asarray(rows, float)
+        self.buffer = np.vstack([self.buffer, rows]) if self.seen else rows.copy()
         self.seen += len(rows)
-        self.buffer = rows.copy() if self.buffer is None else np.vstack([self.buffer, rows])
         half, last = self.half, self.seen == self.count + 1
         if self.done == 0 and self.first == 0:
             if len(self.buffer) <= half and not last:
@@ -1012,20 +927,20 @@ def _end_slope(steps: int) -> np.ndarray:
 class Record:
     """What a run keeps: coordinates, meshes, spin."""
 
-    def __init__(self, model, count: int, every: int, at, *, lowpass: bool, contact_loss: bool):
-        self.every, self.at = every, at
+    def __init__(self, model: DrivetrainModel, count: int, records: Records, at, *, contact_loss: bool):
+        self.every, self.at = records.every, at
         self.contacts = model.contacts if contact_loss else None
         self.basic = (self.contacts or model).geometry.basic
-        rows, meshes = count // every + 1, len(model.meshes)
+        rows, meshes = count // self.every + 1, len(model.meshes)
         widths = [len(at), len(at), meshes, meshes, 1, 1]
         self.cuts = np.cumsum(widths)[:-1]
         self.table = np.empty((rows, sum(widths)))
-        self.decimator = Decimator(every, count) if lowpass and every > 1 else None
+        self.decimator = Decimator(self.every, count) if records.lowpass and self.every > 1 else None
         self.filled, self.steps = 0, 0
         self.extremes = np.array([np.full(meshes, np.inf), np.full(meshes, -np.inf)])
         self.pulled, self.lost = np.zeros((2, meshes))
 
-    def take(self, first: int, number: int, states, block) -> None:
+    def take(self, first: int, number: int, states, block: Block) -> None:
         """Rows of a block of `number` steps; that of its start comes with the first block alone."""
         begin = min(first, 1)
         approach = np.einsum("tmj,tm->tj", block.selection, states[:, : len(self.basic)] @ self.basic)
@@ -1055,139 +970,16 @@ class Record:
         self.lost += np.count_nonzero(~touched, axis=0)
         self.steps += len(force)
 
-    def columns(self) -> tuple[np.ndarray, ...]:
-        """Motion, velocity, approach, force (n, c each), spin angle and speed (n,)."""
+    def columns(self, step: float) -> dict[str, np.ndarray]:
+        """Arrays of a `DrivetrainRun`."""
         *tables, angle, speed = np.split(self.table, self.cuts, axis=1)
-        return (*(np.ascontiguousarray(one) for one in tables), angle[:, 0].copy(), speed[:, 0].copy())
-
-
-@dataclass(frozen=True)
-class SpeedRange:
-    """Speeds of the free spin over a run: first, last, lowest, highest and mean over time [rad/s]."""
-
-    first: float
-    last: float
-    lowest: float
-    highest: float
-    mean: float
-
-    @property
-    def fastest(self) -> float:
-        """Largest speed in either sense [rad/s]."""
-        return max(abs(self.lowest), abs(self.highest))
-
-
-def speed_range(
-    model: DrivetrainModel,
-    torques: Sequence[TorqueHistory],
-    *,
-    duration: float,
-    speed: float,
-    start: float = 0.0,
-) -> SpeedRange:
-    """Speeds of the first body as the rigid chain turns under its torques.
-
-    Newton's law of the rigid chain, d omega / dt = sum(ratio_b T_b(t)) / I with its inertia I about the axis
-    of the first body. Torques are linear between their instants, so that the speed there is a sum of
-    trapezoids, and a parabola in between with its vertex where the sum is zero.
-
-    Parameters
-    ----------
-    model : DrivetrainModel
-    torques : sequence of TorqueHistory
-    duration : float
-        [s]
-    speed : float
-        Of the first body at time zero [rad/s].
-    start : float
-        The range is that from here to the end [s].
-
-    Returns
-    -------
-    SpeedRange
-    """
-    instants = np.concatenate([[0.0, start, duration], *(one.times for one in torques)])
-    times = np.unique(np.clip(instants, 0.0, duration))
-    power = sum((model.ratio[one.body] * one.at(times) for one in torques), np.zeros(len(times)))
-    rate, step = power / model.inertia, np.diff(times)
-    speeds = speed + np.append(0.0, np.cumsum(0.5 * step * (rate[1:] + rate[:-1])))
-    begin = int(np.searchsorted(times, start))
-    rate, step, speeds = rate[begin:], step[begin:], speeds[begin:]
-    middle = speeds[:-1] + step * (3.0 * rate[:-1] + rate[1:]) / 8.0
-    # simpson's rule, exact for parabolas
-    mean = step @ (speeds[:-1] + 4.0 * middle + speeds[1:]) / (6.0 * step.sum())
-    turning = np.flatnonzero(rate[1:] * rate[:-1] < 0.0)
-    vertex = rate[turning] ** 2 / (rate[turning] - rate[turning + 1]) * step[turning]
-    every = np.append(speeds, speeds[turning] + 0.5 * vertex)
-    return SpeedRange(*map(float, (speeds[0], speeds[-1], every.min(), every.max(), mean)))
-
-
-def highest_mesh(model: DrivetrainModel, speed: float) -> tuple[str, float]:
-    """Name and frequency [Hz] of the fastest mesh at a speed of the first body; none, 0 without gears."""
-    bases = np.unique(model.mesh_base)
-    if not len(bases):
-        return "none", 0.0
-    hertz = model.frequencies(abs(speed))[bases] / (2.0 * math.pi)
-    return model.bases[bases[np.argmax(hertz)]], float(hertz.max())
-
-
-def mesh_mode(model: DrivetrainModel, limit: float) -> float:
-    """Frequency of the highest mode that the meshes drive noticeably [Hz]; 0 where there is none.
-
-    Modes at standstill with mean mesh stiffnesses; the share of the meshes in the strain energy of a mode
-    ``phi`` is ``sum(k (w^T phi)^2) / omega^2`` (R. G. Parker and J. Lin, J. Vib. Acoust. 126, 2004, 68-76).
-
-    Parameters
-    ----------
-    model : DrivetrainModel
-    limit : float
-        The highest line of the mesh stiffness [Hz]; modes above answer it as springs do, without resonance.
-    """
-    from scipy import linalg
-
-    if not len(model.meshes):
-        return 0.0
-    rows, stiffness = model.system.W, model.mean_stiffness
-    total = model.system.K + (rows * stiffness) @ rows.T
-    values, shapes = linalg.eigh(total, model.system.M)
-    # the free spin is the first
-    values, shapes = np.maximum(values[1:], 0.0), shapes[:, 1:]
-    hertz = np.sqrt(values) / (2.0 * math.pi)
-    driven = stiffness @ (rows.T @ shapes) ** 2 > MESH_SHARE * values
-    return float(hertz[driven & (hertz <= limit)].max(initial=0.0))
-
-
-def frequency_shift(hertz: float, rate: float) -> float:
-    """Share by which average acceleration lowers a natural frequency [Hz] at so many steps a second [Hz].
-
-    ``tan(Omega h / 2) = omega h / 2`` for the frequency Omega that the steps have, so that the share is
-    ``(omega h)^2 / 12`` for short steps (T. J. R. Hughes, The Finite Element Method, 1987, section 9.3).
-    """
-    half = math.pi * hertz / rate
-    return 1.0 - math.atan(half) / half if half > 0.0 else 0.0
-
-
-def shift_rate(hertz: float, share: float) -> float:
-    """Steps a second [Hz] that lower a natural frequency [Hz] by this small share or a little less."""
-    return math.pi * hertz / math.sqrt(3.0 * share)
-
-
-def default_record_rate(rate: float, highest: float) -> float:
-    """Records a second where none are given: few, but with the third harmonic of the highest mesh.
-
-    Parameters
-    ----------
-    rate : float
-        Steps a second [Hz].
-    highest : float
-        Highest mesh frequency of the run [Hz].
-
-    Returns
-    -------
-    float
-        The rate over the largest whole number for which the pass band of the records holds that harmonic and
-        there are 1000 a second; at most the rate.
-    """
-    # a hair more, so that rounding of the speed does not push the harmonic out
-    needed = max(LEAST_RECORD_RATE, 2.0 * KEPT_HARMONIC * highest * (1.0 + 1e-6) / PASS_BAND)
-    return rate / max(1, math.floor(rate / needed * (1.0 + 1e-12)))
+        names = ("motion", "velocity", "approach", "force")
+        return {
+            **{name: np.ascontiguousarray(one) for name, one in zip(names, tables)},
+            "time": step * self.every * np.arange(len(self.table)),
+            "spin": angle[:, 0].copy(),
+            "spin_speed": speed[:, 0].copy(),
+            "extremes": self.extremes,
+            "pulling": self.pulled / self.steps,
+            "lost": self.lost / self.steps,
+        }

@@ -1,0 +1,79 @@
+"""References for drivetrains: torsional matrices written down by hand, the force of meshes on held axes."""
+
+import math
+
+import numpy as np
+
+from femgear.system.elements import positive_part
+from femgear.trains.drivetrain.data import Drivetrain
+
+
+def torsional_matrices(train: Drivetrain) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Mass and shaft stiffness (n, n), mesh columns (n, n_meshes) [m], names of the coordinates.
+
+    Shafts without elements. The approach of a mesh is the sum of base radius times rotation of its gears,
+    with the signs of the loaded flanks.
+    """
+    names, at = [], {}
+    for body in train.bodies:
+        at[body.name] = len(names)
+        names.append(f"{body.name}: rotation")
+        for number, stage in enumerate(train.planetary):
+            if stage.carrier == body.name:
+                prefix = "planet" if len(train.planetary) == 1 else f"planet of {body.name}"
+                at[number] = len(names) + np.arange(len(stage.planet_angles))
+                names += [f"{prefix} {p + 1}: rotation" for p in range(len(stage.planet_angles))]
+    M, K = np.zeros((2, len(names), len(names)))
+    for body in train.bodies:
+        M[at[body.name], at[body.name]] += body.inertia
+    for shaft in train.shafts:
+        ends = [at[shaft.first], at[shaft.second]]
+        K[np.ix_(ends, ends)] += shaft.springs.torsion * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    for bearing in train.bearings:
+        K[at[bearing.body], at[bearing.body]] += bearing.torsion
+    spin = _senses(train)
+    columns = []
+    for number, stage in enumerate(train.planetary):
+        cosine, sense = math.cos(stage.pressure_angle), stage.flank * spin[stage.carrier]
+        c, s, planets = at[stage.carrier], at[stage.sun], at[number]
+        M[c, c] += len(planets) * stage.planet_mass * stage.centre_distance**2
+        sun, ring = np.zeros((2, len(planets), len(names)))
+        for p, place in enumerate(planets):
+            M[place, place] += stage.planet_inertia
+            # the pin pushes the planet: its flanks approach sun and ring ahead of it
+            sun[p, [c, s, place]] = stage.centre_distance, -stage.sun_radius, -stage.planet_radius
+            ring[p, [c, place]] = stage.centre_distance, stage.planet_radius
+        columns += list(sense * cosine * sun) + list(sense * cosine * ring)
+    for stage in train.parallel:
+        row = np.zeros(len(names))
+        row[[at[stage.first], at[stage.second]]] = stage.first_radius, stage.second_radius
+        lean = math.hypot(1.0, math.tan(stage.helix_angle) * math.cos(stage.pressure_angle))
+        columns.append(stage.flank * spin[stage.first] * math.cos(stage.pressure_angle) / lean * row)
+    return M, K, np.array(columns).reshape(-1, len(names)).T, tuple(names)
+
+
+def _senses(train: Drivetrain) -> dict[str, float]:
+    """Sense of rotation of every body, the first one positive: external gears turn it round."""
+    sense = {train.bodies[0].name: 1.0}
+    links = [(one.first, one.second, 1.0) for one in train.shafts]
+    links += [(one.first, one.second, -1.0) for one in train.parallel]
+    links += [(one.carrier, one.sun, 1.0) for one in train.planetary]
+    for _ in train.bodies:
+        for first, second, factor in links:
+            if first in sense:
+                sense.setdefault(second, factor * sense[first])
+            elif second in sense:
+                sense[first] = factor * sense[second]
+    return sense
+
+
+def mesh_force(x, k, backlash, *, separates: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Force and tangent of meshes with the stiffness k at the approach x; drive side from ``x = 0`` on.
+
+    The back side is that of gears whose axes keep their distance: its approach is -x.
+    """
+    if not separates:
+        return k * x, np.broadcast_to(k, np.shape(x))
+    drive, closed = positive_part(x)
+    back, behind = positive_part(-x - backlash)
+    return k * (drive - back), k * (closed + behind)
