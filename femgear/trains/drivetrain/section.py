@@ -28,7 +28,7 @@ from pydantic import (
 )
 
 from femgear.case import text
-from femgear.case.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.case.fields import Count, Number, Quantity, StiffnessOrRigid, Title, described, refuse
 from femgear.case.problems import combine, translate
 from femgear.case.tables import Columns, embedded, read_columns
 from femgear.case.text import ReadCase, text_with_points
@@ -46,7 +46,6 @@ from femgear.case.units import (
     TIME,
     TORQUE,
     TORSION,
-    Dimension,
 )
 from femgear.errors import CaseError
 
@@ -55,7 +54,6 @@ FORMAT = 1
 MOST_PARTS = 200
 MOST_POINTS = 20_000
 LARGEST_TORQUE, LATEST, FASTEST_RATE = 1e9, 1e6, 1e7
-RIGID = "rigid"
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
 
 # Ratios of radii and teeth that differ by more belong to no gears; profile shifts explain the rest.
@@ -97,17 +95,6 @@ def _reference(value: object) -> str:
     return value
 
 
-def Stiffness(dimension: Dimension, low: float, high: float) -> Any:
-    """Type of a stiffness that may be the text ``"rigid"``, infinite in the model."""
-    convert = Quantity(dimension, low, high).__metadata__[0].func
-
-    def rigid_too(value: object) -> float:
-        return math.inf if value == RIGID else convert(value)
-
-    schema = Field(json_schema_extra={"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
-    return Annotated[float, BeforeValidator(rigid_too), schema]
-
-
 Name = Annotated[str, BeforeValidator(_name)]
 Reference = Annotated[str, BeforeValidator(_reference)]
 Mass = Quantity(MASS, 1e-6, 1e8)
@@ -118,7 +105,7 @@ Offset = Quantity(LENGTH, -100.0, 100.0)
 Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
 PressureAngle = Quantity(ANGLE, math.radians(5), math.radians(45))
 Teeth = Count(4, 5000)
-Joint = Stiffness(TORSION, 1e-3, 1e15)
+Joint = StiffnessOrRigid(TORSION, 1e-3, 1e15)
 Torque = Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)
 Time = Quantity(TIME, 0.0, LATEST)
 Frequency = Quantity(FREQUENCY, 1e-3, 1e7)
@@ -171,7 +158,7 @@ class ShaftSection(_Section):
     length: Length
     bending: Joint | None = None
     torsion: Joint | None = None
-    shear: Stiffness(STIFFNESS, 1.0, 1e15) | None = None
+    shear: StiffnessOrRigid(STIFFNESS, 1.0, 1e15) | None = None
     shear_ratio: Number(0.0, 100.0) = 0.0
     outer_diameter: Radius | None = None
     inner_diameter: Quantity(LENGTH, 0.0, 100.0) = 0.0
@@ -230,7 +217,7 @@ class PlanetarySection(_Section):
     planet_mass: Mass
     planet_inertia: Inertia
     planet_transverse_inertia: Quantity(INERTIA, 0.0, 1e11) = 0.0
-    planet_bearing: Stiffness(STIFFNESS, 1.0, 1e15) = math.inf
+    planet_bearing: StiffnessOrRigid(STIFFNESS, 1.0, 1e15) = math.inf
     sun_mesh: MeshSection
     ring_mesh: MeshSection
     pressure_angle: PressureAngle = math.radians(20.0)
@@ -248,8 +235,8 @@ class BearingSection(_Section):
     body: Reference | None = None
     shaft: Pair(Reference) | None = None
     station: Count(1, 99) | None = None
-    radial: Stiffness(STIFFNESS, 0.0, 1e15) = 0.0
-    tilt: Stiffness(TORSION, 0.0, 1e15) = 0.0
+    radial: StiffnessOrRigid(STIFFNESS, 0.0, 1e15) = 0.0
+    tilt: StiffnessOrRigid(TORSION, 0.0, 1e15) = 0.0
     offset: Offset = 0.0
 
 

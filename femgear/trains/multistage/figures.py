@@ -8,6 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure
+from femgear.storage.dataset import RPM
+from femgear.trains.multistage.model import train_speeds
+from femgear.trains.multistage.section import multistage_of
+from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -135,3 +139,50 @@ def stage_forces(
     label(axes[-1], "speed of the input [1/min]")
     legend_below(figure, axes[0], columns=3)
     return figure
+
+
+def draw_modes(drawn: Drawn) -> dict[str, Figure]:
+    """Energies of the modes, and where the mesh frequencies meet them."""
+    data, given = drawn.data["modes"], drawn.case.response
+    frequency, kinds = data["frequency"].values, [str(kind) for kind in data["kind"].values]
+    figures = {"stage_energy": stage_energy(frequency, kinds, data["energy"].values)}
+    if given is not None and drawn.case.operation is not None:
+        speed = np.linspace(given.lowest, given.highest, given.points)
+        mesh = speed[:, None] * train_speeds(multistage_of(drawn.case), 1.0).mesh_frequency
+        elastic = np.flatnonzero(frequency)
+        figures["mesh_orders"] = mesh_orders(
+            speed / RPM, mesh, frequency[elastic], [kinds[n] for n in elastic], harmonics=given.harmonics
+        )
+    return figures
+
+
+def draw_response(drawn: Drawn) -> dict[str, Figure]:
+    """Dynamic forces by the stage that excites, with harmonic balance beside them."""
+    data, marks = drawn.data["response"], {}
+    forces = {"all stages": data["total_force"].values}
+    for n, force in zip(data["excited_by"].values, data["first_force"].values):
+        forces[f"meshes of stage {n}"] = force
+    if "balance" in drawn.data:
+        other = drawn.data["balance"]
+        marks["harmonic balance, k(t) of all meshes"] = other["speed"].values, other["total_force"].values
+    return {"stage_forces": stage_forces(data["speed"].values, forces, marks=marks)}
+
+
+FIGURES = {
+    "modes": Figures(
+        {
+            "stage_energy": "Share of every stage in the kinetic energy of the modes; modes of one frequency "
+            "stand once, with their mean share.",
+            "mesh_orders": "Mesh frequencies of the stages and their harmonics over the speed of the input; "
+            "horizontal lines are natural frequencies.",
+        },
+        draw_modes,
+    ),
+    "response": Figures(
+        {
+            "stage_forces": "Dynamic forces of mesh sun-planet 1 of every stage over the speed of the input, "
+            "by the stage whose meshes excite; circles: harmonic balance with the stiffnesses of all meshes."
+        },
+        draw_response,
+    ),
+}

@@ -1,15 +1,15 @@
-"""Modes and response of planetary stages in series.
+"""The pipeline of a multistage case: modes -> response, and balance.
 
 Modes come with their kinds and the stage in which each one lives; the response is that to transmission errors
-of every stage, by modal summation, or that of the nonlinear train. No case file describes such a train: there
-is no table of stages, and the functions are called from Python.
+of every stage, by modal summation; harmonic balance has the stiffnesses k(t) of all meshes. `MULTISTAGE` at
+the end is the train: the table of its stages, with what the report says and draws of each.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,7 +21,9 @@ from femgear.system.elements import GearMeshes
 from femgear.system.entries import checked_numbers
 from femgear.system.mode_kinds import class_energies, named_kinds, planar_motions
 from femgear.system.nonlinear import NonlinearSystem
+from femgear.system.series import FourierSeries, distinct_lines, harmonics_of, sample
 from femgear.system.system import MechanicalSystem, Modes
+from femgear.threads import one_blas_thread
 from femgear.trains.multistage.model import (
     MultistageSet,
     Stage,
@@ -32,48 +34,26 @@ from femgear.trains.multistage.model import (
     multistage_system,
     stage_slices,
     train_speeds,
+    train_torques,
     turning_couplings,
     turning_wave,
 )
+from femgear.trains.multistage.results import (
+    BalanceResult,
+    MultistageModes,
+    ResponseResult,
+    balance_warnings,
+    describe_forces,
+    describe_modes,
+    describe_multistage,
+    multistage_warnings,
+)
+from femgear.trains.multistage.section import MultistageCase, build_multistage, multistage_of, stage_gears
+from femgear.trains.protocol import Figures, OwnFile, Progress, Train
+from femgear.trains.protocol import Stage as RunStage
 
 # relative distance of frequencies that count as one
 _MULTIPLE = 1e-7
-
-
-@dataclass(frozen=True, eq=False)
-class MultistageModes:
-    """Modes of the whole train.
-
-    Parameters
-    ----------
-    modes : Modes
-        ``kind``: ``rigid``; ``rotational``, ``translational`` or ``planet`` where at least 99 % of the
-        kinetic energy belongs to that class in all stages together; else ``mixed``. With equally spaced
-        planets every mode is pure: rotational and translational modes reach over all stages, a planet mode
-        stays in one (Kiracofe and Parker, J. Vib. Acoust. 129, 2007).
-    share : (S, m) array
-        Of every stage in the kinetic energy.
-    strain : (S + 1, m) array
-        Of every stage's meshes in the strain energy, and of everything else (supports, bearings, couplings)
-        in the last row; zero for rigid motions.
-    """
-
-    modes: Modes
-    share: np.ndarray
-    strain: np.ndarray
-
-    @property
-    def stage(self) -> np.ndarray:
-        """Stage (m,) with most of the kinetic energy, from 1."""
-        return self.share.argmax(axis=0) + 1
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Such as ``"planet, stage 2 (100 %)"``."""
-        return tuple(
-            f"{kind}, stage {stage} ({100.0 * share[stage - 1]:.0f} %)"
-            for kind, stage, share in zip(self.modes.kind, self.stage.tolist(), self.share.T)
-        )
 
 
 def multistage_modes(
@@ -102,7 +82,7 @@ def multistage_modes(
     modes = _by_stage(modes, masses)
     share = stage_shares(masses, modes.shape)
     kinds = multistage_kinds(data, modes.shape, frequency=modes.frequency)
-    return MultistageModes(replace(modes, kind=kinds), share, _strain(data, system, modes))
+    return MultistageModes(data, replace(modes, kind=kinds), share, _strain(data, system, modes))
 
 
 def stage_masses(data: MultistageSet) -> np.ndarray:
@@ -420,3 +400,161 @@ def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int
         wave = turning_wave(tuple(orders), phase=phase)
         elements.append(TurningSprings(np.arange(first, first + 4)[None], [one.lateral], wave))
     return tuple(elements)
+
+
+def solve_multistage_modes(case: MultistageCase) -> MultistageModes:
+    """Natural frequencies, modes, their kinds and stages."""
+    ratio = 0.0 if case.response is None else case.response.damping_ratio
+    return multistage_modes(multistage_of(case), damping_ratio=ratio)
+
+
+@one_blas_thread()
+def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResult:
+    """Response to the transmission errors that the changing number of tooth pairs makes under the torque."""
+    given = case.response
+    speed = np.linspace(given.lowest, given.highest, given.points)
+    errors = loaded_errors(case, modes.data)
+    return ResponseResult(modes.data, speed, error_response(modes.data, speed, errors, modes=modes.modes))
+
+
+@one_blas_thread()
+def solve_balance(case: MultistageCase, *, progress: Progress | None = None) -> BalanceResult:
+    """Harmonic balance with the stiffnesses k(t) of all meshes, first orders of two stages together."""
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+
+    train, given = multistage_of(case), case.response
+    stages, unit = len(train.stages), np.eye(len(train.stages), dtype=int)
+    orders = [h * unit[n] for n in range(stages) for h in range(1, given.harmonics + 1)]
+    orders += [unit[n] + sign * unit[m] for n in range(stages) for m in range(n) for sign in (-1, 1)]
+    problem = multistage_problem(
+        train, meshes=wave_meshes(case, train), torque=case.operation.torque, damping=given.damping_ratio
+    )
+    speeds = np.linspace(given.lowest, given.highest, given.balance_points + 2)[1:-1]
+    found = []
+    for number, speed in enumerate(speeds):
+        if progress is not None:
+            progress("balance", number, len(speeds))
+        frequency = base_frequencies(train, speed)[:stages]
+        found.append(
+            solve_harmonic_balance(problem, frequency, orders=distinct_lines(orders), stability=False)
+        )
+    force, converged = np.array([one.force for one in found]), np.array([one.converged for one in found])
+    return BalanceResult(train, speeds, found[0].orders, force, converged)
+
+
+def stiffness_waves(case: MultistageCase, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Harmonics 1 to H of sun-planet and planet-ring stiffness over its mean, at phase zero.
+
+    Stiffness in proportion to the number of tooth pairs in contact: a pair is, from the start s to the end e
+    of its path in base pitches from the pitch point, so that ``k_h / k_0 = (exp(-2 pi i h s) - exp(-2 pi i h
+    e)) / (pi i h (e - s))``.
+
+    Parameters
+    ----------
+    case : MultistageCase
+        H is ``response.harmonics``.
+    number : int
+        Of the stage, from 1.
+
+    Returns
+    -------
+    two (H,) complex arrays
+    """
+    geared, h = stage_gears(case.stage[number - 1]), np.arange(1, case.response.harmonics + 1)
+    waves = []
+    for path in (geared.path_sun_planet, geared.path_planet_ring):
+        start, end = (one / geared.base_pitch for one in path)
+        wave = np.exp(-2j * np.pi * h * start) - np.exp(-2j * np.pi * h * end)
+        waves.append(wave / (1j * np.pi * h * (end - start)))
+    return waves[0], waves[1]
+
+
+def loaded_errors(case: MultistageCase, train: MultistageSet) -> dict[int, np.ndarray]:
+    """Transmission errors (2N, H) [m] of every stage: deflection of its meshes under their mean force.
+
+    ``e = F / k(t)`` without its mean. It stands for the stiffness k(t) in linear models where the dynamic
+    forces are small beside F.
+    """
+    errors = {}
+    on_sun = train_torques(train, case.operation.torque).sun
+    for number, stage in enumerate(train.stages, 1):
+        data = stage.data
+        force = abs(on_sun[number - 1]) / (data.n_planets * data.sun_radius)
+        mean = data.stiffness_sun_planet[0], data.stiffness_planet_ring[0]
+        waves = stiffness_waves(case, number)
+        errors[number] = stage_error(stage, *(force / k * _inverse(wave) for k, wave in zip(mean, waves)))
+    return errors
+
+
+def _inverse(wave: np.ndarray) -> np.ndarray:
+    """Harmonics 1 to H of ``1 / (1 + wave)``."""
+    samples = 32 * len(wave)
+    return harmonics_of(1.0 / sample(np.concatenate([[1.0], wave]), samples), len(wave))[1:]
+
+
+def wave_meshes(case: MultistageCase, train: MultistageSet) -> dict[int, GearMeshes]:
+    """Meshes with the stiffness waves, for `multistage_problem`; they do not part."""
+    made = {}
+    for number, stage in enumerate(train.stages, 1):
+        mean = stage.data.mesh_stiffness
+        lines = np.column_stack([np.ones(len(mean)), stage_error(stage, *stiffness_waves(case, number))])
+        stiffness = FourierSeries(mean[:, None] * lines)
+        made[number] = planar_meshes(stage.data, stiffness=stiffness, separates=False)
+    return made
+
+
+def _no_response(case: MultistageCase) -> str:
+    if case.operation is None or case.response is None:
+        return "it needs the sections operation and response"
+    return "" if case.geared else "every stage needs gears, with module, teeth and face_width"
+
+
+def _no_balance(case: MultistageCase) -> str:
+    reason = _no_response(case)
+    return reason or ("" if case.response.balance_points else "response.balance_points is 0")
+
+
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.multistage.figures import FIGURES
+
+    return FIGURES
+
+
+MULTISTAGE = Train(
+    name="multistage",
+    words="a multistage case",
+    model=MultistageCase,
+    own_file=OwnFile(
+        lambda data: data.get("model") == "multistage", build_multistage, MultistageCase.model_json_schema
+    ),
+    stages=(
+        RunStage(
+            name="modes",
+            title="Modes",
+            solve=lambda case, *_: solve_multistage_modes(case),
+            verdict=lambda result: {"modes": len(result.modes.frequency)},
+            describe=lambda results: describe_modes(results.modes),
+        ),
+        RunStage(
+            name="response",
+            title="Response",
+            solve=lambda case, results, _: solve_response(case, results["modes"]),
+            verdict=lambda result: {"speeds": len(result.speed)},
+            describe=lambda results: describe_forces(results.response, "Response"),
+            unavailable=_no_response,
+            needs=lambda case: ("modes",),
+        ),
+        RunStage(
+            name="balance",
+            title="Harmonic balance",
+            solve=lambda case, _, context: solve_balance(case, progress=context.progress),
+            verdict=lambda result: {"speeds": len(result.speed), "converged": int(result.converged.sum())},
+            describe=lambda results: describe_forces(results.balance, "Harmonic balance"),
+            unavailable=_no_balance,
+        ),
+    ),
+    describe=lambda case: describe_multistage(case, multistage_of(case)),
+    warnings=multistage_warnings,
+    result_warnings=lambda results: balance_warnings(results.balance) if "balance" in results.stages else (),
+    figures=_figures,
+)

@@ -1,0 +1,378 @@
+"""The sections of a case file with ``model = "multistage"``: planetary stages, shafts, operation, response.
+
+`multistage_of` makes the train of a case, `stage_gears` the gears of a stage that has a module. `cross_check`
+refuses entries that contradict one another, and trains that cannot turn.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, ValidationError
+
+from femgear.case.fields import Count, Number, Quantity, Section, StiffnessOrRigid, Title, described, refuse
+from femgear.case.problems import combine, translate
+from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
+from femgear.case.text import ReadCase
+from femgear.case.units import ANGLE, DENSITY, INERTIA, LENGTH, SPEED, STIFFNESS, TORQUE, TORSION
+from femgear.errors import CaseError, FemgearError
+from femgear.gears.fillet import BasicRack
+from femgear.gears.gear import Gear
+from femgear.gears.iso6336 import mesh_stiffness_method_b
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
+from femgear.system.lumped import PlanarBody, PlanarSet
+from femgear.trains.multistage.model import (
+    STIFFEST,
+    Member,
+    MultistageSet,
+    Stage,
+    StageCoupling,
+    check_turns,
+    in_series,
+    shaft_stiffness,
+    stage_of_set,
+    train_torques,
+)
+
+MODEL = "multistage"
+_MEMBER = re.compile(r"stage ([1-9]\d?) (carrier|ring|sun)")
+_RPM = SPEED.scale
+
+
+def _member(value: object) -> str:
+    if not isinstance(value, str):
+        raise refuse(f"a member of a stage is needed, not {described(value)}", code="E-TYPE", value=value)
+    if not _MEMBER.fullmatch(value):
+        limit = 'a stage and its carrier, ring or sun, such as "stage 1 sun"'
+        raise refuse("not a member of a stage", code="E-CHOICE", value=value, limit=limit)
+    return value
+
+
+MemberName = Annotated[str, BeforeValidator(_member)]
+Length = Quantity(LENGTH, 1e-4, 20.0)
+Speed = Quantity(SPEED, 1e-3 * _RPM, 1e6 * _RPM)
+Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
+Support = StiffnessOrRigid(STIFFNESS, 0.0, 1e15)
+
+
+def _several(kind, count: int):
+    """Type of so many entries."""
+    return Annotated[tuple[kind, ...], Field(min_length=count, max_length=count)]
+
+
+class DiscSection(Section):
+    """Mass and inertia of a body, or those of a disc with a hole; ``added_inertia`` comes on top."""
+
+    mass: Mass | None = None
+    inertia: Inertia | None = None
+    outer_diameter: Length | None = None
+    inner_diameter: Quantity(LENGTH, 0.0, 20.0) = 0.0
+    width: Length | None = None
+    density: Quantity(DENSITY, 100.0, 25000.0) = 7850.0
+    added_inertia: Quantity(INERTIA, 0.0, 1e8) = 0.0
+
+
+class BodySection(DiscSection):
+    """Sun, ring or carrier, and the stiffnesses that hold it in the housing."""
+
+    support_stiffness: Support = 0.0
+    torsional_stiffness: StiffnessOrRigid(TORSION, 0.0, 1e15) = 0.0
+
+
+class PlanetSection(DiscSection):
+    """One of the equal planets on its bearing."""
+
+    bearing_stiffness: StiffnessOrRigid(STIFFNESS, 1.0, 1e15)
+
+
+class StageSection(Section):
+    """A planetary set; its size by module and teeth, or by the base radii of sun and planet."""
+
+    planets: Count(1, 24) = 3
+    planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
+    teeth: _several(Count(4, 5000), 3) | None = None
+    module: Quantity(LENGTH, 5e-5, 0.5) | None = None
+    base_radii: _several(Radius, 2) | None = None
+    pressure_angle: Quantity(ANGLE, math.radians(5), math.radians(45)) = math.radians(20.0)
+    profile_shifts: _several(Number(-5.0, 5.0), 3) = (0.0, 0.0, 0.0)
+    addendum: _several(Number(0.1, 3.0), 3) = (1.0, 1.0, 1.0)
+    face_width: Quantity(LENGTH, 1e-4, 5.0) | None = None
+    mesh_stiffness: MeshStiffnessSection | None = None
+    fixed: Literal["carrier", "ring", "sun", "none"] = "ring"
+    angle: Angle = 0.0
+    sun: BodySection
+    planet: PlanetSection
+    ring: BodySection
+    carrier: BodySection
+
+
+class CouplingSection(Section):
+    """A shaft between members of two stages: springs, or a solid round section of steel."""
+
+    between: _several(MemberName, 2)
+    diameter: Length | None = None
+    length: Length | None = None
+    torsional: StiffnessOrRigid(TORSION, 1e-3, STIFFEST["torsional"]) | None = None
+    lateral: StiffnessOrRigid(STIFFNESS, 0.0, STIFFEST["lateral"]) | None = None
+
+
+class OperationSection(Section):
+    """Speed of and torque on the input, and where input and output are."""
+
+    speed: Speed
+    torque: Quantity(TORQUE, -1e9, 1e9)
+    input: MemberName = "stage 1 sun"
+    output: MemberName | None = None
+
+
+class ResponseSection(Section):
+    """Speeds of the input, harmonics of every mesh frequency, and speeds of harmonic balance beside them."""
+
+    lowest: Speed
+    highest: Speed
+    points: Count(2, 20_000) = 341
+    harmonics: Count(1, 20) = 3
+    damping_ratio: Number(0.0, 1.0, open_low=True, open_high=True) = 0.03
+    balance_points: Count(0, 200) = 0
+
+
+class MultistageCase(Section, ReadCase):
+    """Planetary stages and their couplings, the operation and what is computed, in SI units.
+
+    The fields carry the names of the case file; ``source`` is the text that gives this case.
+    """
+
+    format: Count(1, 2**31) = FORMAT
+    model: Literal[MODEL]
+    title: Title
+    stage: Annotated[tuple[StageSection, ...], Field(min_length=1, max_length=20)]
+    coupling: Annotated[tuple[CouplingSection, ...], Field(max_length=60)] = ()
+    operation: OperationSection | None = None
+    response: ResponseSection | None = None
+
+    @property
+    def geared(self) -> bool:
+        """Whether every stage has gears, and with them mesh phases and tooth pairs in contact."""
+        return all(one.module is not None for one in self.stage)
+
+
+def build_multistage(data: dict, text: str, name: str, *, numbered: bool = True) -> MultistageCase:
+    """Case of the tables of a TOML text; see `femgear.trains.protocol.OwnFile`.
+
+    Raises
+    ------
+    CaseError, GeometryError
+        Everything that is wrong with the entries, or why they make no train.
+    """
+    lines = text if numbered else ""
+    try:
+        case = MultistageCase.model_validate(data)
+    except ValidationError as error:
+        raise combine(translate(error, MultistageCase), lines, name) from None
+    if problems := list(cross_check(case)):
+        raise combine(problems, lines, name)
+    try:
+        check_train(case)
+    except FemgearError as error:
+        raise combine([error], lines, name) from None
+    case.read_from(text, lines, name)
+    return case
+
+
+def cross_check(case: MultistageCase) -> Iterator[CaseError]:
+    """What no entry shows alone."""
+    for n, stage in enumerate(case.stage):
+        yield from _sizes(stage, f"stage[{n}]")
+        for name in ("sun", "planet", "ring", "carrier"):
+            yield from _disc_problems(getattr(stage, name), f"stage[{n}].{name}")
+    named = [(f"coupling[{n}].between", one) for n, c in enumerate(case.coupling) for one in c.between]
+    if case.operation is not None:
+        named += [(f"operation.{key}", getattr(case.operation, key)) for key in ("input", "output")]
+    for key, member in named:
+        if member is not None and _member_of(member).stage > len(case.stage):
+            yield CaseError(
+                "there is no such stage", code="E-COUPLING", key=key, value=member,
+                limit=f"stage 1 to stage {len(case.stage)}",
+            )  # fmt: skip
+    for n, one in enumerate(case.coupling):
+        round_section = (one.diameter is not None, one.length is not None)
+        if round_section[0] != round_section[1] or not (round_section[0] or one.torsional is not None):
+            yield CaseError(
+                "the shaft has neither a torsional stiffness nor a whole section", code="E-CHOICE",
+                key=f"coupling[{n}].between", limit="torsional, or diameter and length",
+            )  # fmt: skip
+    response = case.response
+    if response is not None and not response.lowest < response.highest:
+        yield CaseError(
+            "the speeds do not ascend", code="E-RANGE", key="response.highest",
+            value=SPEED.show(response.highest), limit=f"above {SPEED.show(response.lowest)}",
+        )  # fmt: skip
+
+
+def _sizes(stage: StageSection, key: str) -> Iterator[CaseError]:
+    if (stage.module is None) == (stage.base_radii is None):
+        yield CaseError(
+            "the size of the gears is needed once", code="E-CHOICE", key=f"{key}.module",
+            limit="module with teeth and face_width, or base_radii with mesh_stiffness",
+        )  # fmt: skip
+        return
+    needed = ("teeth", "face_width") if stage.base_radii is None else ("mesh_stiffness",)
+    for name in needed:
+        if getattr(stage, name) is None:
+            size = "module" if stage.base_radii is None else "base_radii"
+            yield CaseError(
+                f"a stage with {size} needs it", code="E-KEY-MISSING", key=f"{key}.{name}", remedy="add it"
+            )
+
+
+def _disc_problems(body: DiscSection, key: str) -> Iterator[CaseError]:
+    given = [body.mass is not None, body.inertia is not None]
+    disc = [body.outer_diameter is not None, body.width is not None]
+    if (all(given), any(given), all(disc), any(disc)) not in (
+        (True, True, False, False),
+        (False, False, True, True),
+    ):
+        yield CaseError(
+            "the mass of the body is needed once", code="E-CHOICE", key=key,
+            limit="mass and inertia, or outer_diameter and width",
+        )  # fmt: skip
+    elif all(disc) and not body.inner_diameter < body.outer_diameter:
+        yield CaseError(
+            "the hole is as large as the disc", code="E-RANGE", key=f"{key}.inner_diameter",
+            value=LENGTH.show(body.inner_diameter), limit=f"below {LENGTH.show(body.outer_diameter)}",
+        )  # fmt: skip
+
+
+def check_train(case: MultistageCase) -> None:
+    """Refuse stages that are no sets, and trains that cannot turn, with the keys of the file."""
+    train = multistage_of(case)
+    try:
+        check_turns(train)
+        if case.operation is not None:
+            train_torques(train, case.operation.torque)
+    except CaseError as error:
+        error.key = error.key or "coupling"
+        raise
+
+
+def multistage_of(case: MultistageCase) -> MultistageSet:
+    """The train of a case.
+
+    Without couplings each carrier turns the next sun, joined rigidly.
+
+    Raises
+    ------
+    CaseError, GeometryError
+        With the keys of the file.
+    """
+    stages = [_named(_stage, f"stage[{n}]", one) for n, one in enumerate(case.stage)]
+    couplings = [_named(_coupling, f"coupling[{n}]", one) for n, one in enumerate(case.coupling)]
+    operation = case.operation
+    ends = (Member(1, "sun"), Member(len(stages), "carrier"))
+    if operation is not None:
+        ends = _member_of(operation.input), _member_of(operation.output or str(ends[1]))
+    made = couplings or in_series(stages).couplings
+    return _named(
+        lambda _: MultistageSet(stages=stages, couplings=made, input=ends[0], output=ends[1]),
+        "operation",
+        operation,
+    )
+
+
+def _named(make, key: str, section):
+    """What a function makes of a section; its refusals name the keys of the file."""
+    try:
+        return make(section)
+    except FemgearError as error:
+        entry = (error.key or "").replace("torsional_support", "torsional_stiffness")
+        error.key = f"{key}.{entry}" if entry else key
+        raise
+
+
+def _member_of(text: str) -> Member:
+    found = _MEMBER.fullmatch(text)
+    assert found is not None
+    return Member(int(found[1]), found[2])
+
+
+def _coupling(one: CouplingSection) -> StageCoupling:
+    given = {name: getattr(one, name) for name in ("torsional", "lateral") if getattr(one, name) is not None}
+    springs = {} if one.diameter is None else shaft_stiffness(one.diameter, one.length)
+    return StageCoupling(*map(_member_of, one.between), **springs | given)
+
+
+def stage_gears(stage: StageSection) -> PlanetarySet:
+    """Geared set of a stage that has a module; the rims have no effect on anything computed here."""
+    sun, planet, ring = (0.5 * stage.module * z for z in stage.teeth)
+    rims = (0.3 * sun, 0.5 * planet, ring + 4.0 * stage.module)
+    gears = [
+        Gear(
+            teeth=z,
+            module=stage.module,
+            pressure_angle=stage.pressure_angle,
+            profile_shift=shift,
+            face_width=stage.face_width,
+            rim_radius=rim,
+            internal=number == 2,
+            rack=BasicRack(addendum=addendum),
+        )
+        for number, (z, shift, rim, addendum) in enumerate(
+            zip(stage.teeth, stage.profile_shifts, rims, stage.addendum)
+        )
+    ]
+    return close_set(*gears, planet_angles=_planet_angles(stage))
+
+
+def _planet_angles(stage: StageSection) -> tuple[float, ...]:
+    return stage.planet_angles or equal_planet_angles(stage.planets)
+
+
+def _stage(stage: StageSection) -> Stage:
+    bodies = {
+        name: PlanarBody(*_inertia(one), one.support_stiffness, one.torsional_stiffness)
+        for name, one in (("sun", stage.sun), ("ring", stage.ring), ("carrier", stage.carrier))
+    }
+    bodies["planet"] = PlanarBody(*_inertia(stage.planet))
+    fixed = None if stage.fixed == "none" else stage.fixed
+    given = stage.mesh_stiffness
+    if stage.module is not None:
+        gears = stage_gears(stage)
+        stiffness = _iso_stiffness(stage, gears) if given is None else (given.sun_planet, given.planet_ring)
+        return stage_of_set(
+            gears, fixed=fixed, angle=stage.angle, **bodies, planet_bearing=stage.planet.bearing_stiffness,
+            stiffness_sun_planet=stiffness[0], stiffness_planet_ring=stiffness[1],
+        )  # fmt: skip
+    sun, planet = stage.base_radii
+    data = PlanarSet(
+        **bodies, planet_bearing=stage.planet.bearing_stiffness,
+        stiffness_sun_planet=given.sun_planet, stiffness_planet_ring=given.planet_ring,
+        sun_radius=sun, planet_radius=planet, ring_radius=sun + 2.0 * planet,
+        centre_distance=(sun + planet) / math.cos(stage.pressure_angle),
+        planet_angles=_planet_angles(stage),
+        pressure_angle_sun_planet=stage.pressure_angle, pressure_angle_planet_ring=stage.pressure_angle,
+    )  # fmt: skip
+    return Stage(data=data, teeth=stage.teeth, fixed=fixed, angle=stage.angle)
+
+
+def _iso_stiffness(stage: StageSection, gears: PlanetarySet) -> list[float]:
+    """Mean stiffness of both meshes after ISO 6336-1, method B."""
+    (sun, planet, _), (x_sun, x_planet, x_ring) = stage.teeth, stage.profile_shifts
+    # the standard's sign of the ring's shift
+    pairs = (sun, planet, x_sun, x_planet), (planet, math.inf, x_planet, -x_ring)
+    ratios = gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring
+    return [
+        stage.face_width * mesh_stiffness_method_b(*pair, ratio, pressure_angle=stage.pressure_angle)[1]
+        for pair, ratio in zip(pairs, ratios)
+    ]
+
+
+def _inertia(body: DiscSection) -> tuple[float, float]:
+    """Mass [kg] and polar inertia [kg m^2]."""
+    if body.mass is not None:
+        return body.mass, body.inertia + body.added_inertia
+    outer, inner = 0.5 * body.outer_diameter, 0.5 * body.inner_diameter
+    mass = body.density * math.pi * (outer**2 - inner**2) * body.width
+    return mass, 0.5 * mass * (outer**2 + inner**2) + body.added_inertia
