@@ -171,6 +171,11 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Any:
     return Annotated[int, BeforeValidator(convert), WithJsonSchema(schema)]
 
 
+def Several(kind: Any, count: int) -> Any:
+    """Type of a list of so many entries of one kind."""
+    return Annotated[tuple[kind, ...], Field(min_length=count, max_length=count)]
+
+
 def _one_line(value: object) -> str:
     """A printable text of at most 200 characters."""
     if not isinstance(value, str):

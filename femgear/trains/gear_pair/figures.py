@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,12 @@ from femgear.report.style import (
     legend_below,
     new_figure,
 )
+from femgear.trains.gear_pair.model import STATE_NAMES
+from femgear.trains.protocol import Drawn, Figures
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
 
 # colours of no impact, one-sided and two-sided impact, and of states that are not known
 STATE_COLOURS = (GREEN, ORANGE, VERMILION, GREY)
@@ -176,35 +183,94 @@ def phase_sections(panels: Sequence[tuple], *, x: str = "x [half backlash]", y: 
     return figure
 
 
-def line_spectrum(curves: Sequence[tuple], *, x: str = "frequency / mesh frequency [1]", y: str, floor=1e-4):
-    """Lines of spectra as stems on a logarithmic scale.
-
-    Parameters
-    ----------
-    curves : sequence of (text, frequency (L,), amplitude (L,))
-    x, y : str
-    floor : float
-        Lowest value shown, relative to the largest.
-
-    Returns
-    -------
-    Figure
-    """
-    figure, (ax,) = new_figure(width=8.5, height=4.4)
-    top = max(np.max(amplitude) for _, _, amplitude in curves)
-    for number, (text, frequency, amplitude) in enumerate(curves):
-        shown = np.asarray(amplitude) > floor * top
-        colour, at = COLOURS[number % len(COLOURS)], np.asarray(frequency)[shown]
-        ax.vlines(at, floor * top, np.asarray(amplitude)[shown], color=colour, linewidth=1.4)
-        ax.plot(at, np.asarray(amplitude)[shown], "osD^"[number % 4], color=colour, markersize=5, label=text)
-    ax.set_yscale("log")
-    ax.set_ylim(floor * top, 2.0 * top)
-    label(ax, x, y)
-    legend_below(figure)
-    return figure
-
-
 def _runs(chosen: np.ndarray) -> list[slice]:
     """Runs of chosen segments as slices of their points."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
     return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
+
+
+def contact_rows(response: xr.Dataset | None, sweep: xr.Dataset | None) -> list[tuple]:
+    """Rows of `state_bands`: the branch from limit point to limit point, and the sweeps as they ran."""
+    rows = []
+    if response is not None:
+        ratio, state = response["ratio"].values, _state_numbers(response)
+        cuts = [0, *response["fold"].values, len(ratio) - 1]
+        pieces = [slice(a, b + 1) for a, b in pairwise(cuts)]
+        names = ["upper branch", "between the limit points, unstable", "lower branch"]
+        if len(pieces) != len(names):
+            names = [f"piece {number + 1}" for number in range(len(pieces))]
+        rows += [(f"balance: {name}", ratio[part], state[part]) for name, part in zip(names, pieces)]
+    if sweep is not None:
+        ratio, (up, down) = sweep["ratio"].values, _state_numbers(sweep)
+        rows += [("integration: sweep up", ratio, up), ("integration: sweep down", ratio[::-1], down[::-1])]
+    return rows
+
+
+def _state_numbers(data: xr.Dataset) -> np.ndarray:
+    return np.vectorize(STATE_NAMES.index, otypes=[int])(data["state"].values)
+
+
+def draw_response(drawn: Drawn) -> dict[str, Figure]:
+    """Amplitude and mean of the branch, with the sweeps as markers."""
+    data, names = drawn.data["response"], ("ratio", "amplitude", "mean")
+    curve = ("harmonic balance", *(data[name].values for name in names), data["stable"].values)
+    sweeps = []
+    if "sweep" in drawn.data:
+        sweep = drawn.data["sweep"]
+        for n, direction in enumerate(sweep["direction"].values):
+            sweeps.append(
+                (f"sweep {direction}", sweep["ratio"].values, *(sweep[k].values[n] for k in names[1:]))
+            )
+    return {"amplitude_and_mean": amplitude_and_mean([curve], sweeps)}
+
+
+def draw_states(drawn: Drawn) -> dict[str, Figure]:
+    """Contact states along the branch and in the sweeps."""
+    rows = contact_rows(drawn.data.get("response"), drawn.data["sweep"])
+    return {"contact_states": state_bands(rows, STATE_NAMES)}
+
+
+def draw_chaos(drawn: Drawn) -> dict[str, Figure]:
+    """Bifurcation diagram with the exponents, and the long sections."""
+    data = drawn.data["chaos"]
+    columns = [data[name].values for name in ("ratio", "point", "exponent", "error", "lowest", "highest")]
+    figures = {"chaos": bifurcation_and_exponent(*columns[:4], lowest=columns[4], highest=columns[5])}
+    if "section_ratio" in data:
+        titles = [
+            f"Ω = {ratio:.2f}, λ = {exponent:.3f} ± {error:.3f}"
+            for ratio, exponent, error in zip(
+                *(data[f"section_{name}"].values for name in ("ratio", "exponent", "error"))
+            )
+        ]
+        motion = (data[f"section_{name}"].values for name in ("deflection", "velocity"))
+        panels = list(zip(titles, *motion))
+        figures["sections"] = phase_sections(panels, y="velocity [b $\\omega_n$]")
+    return figures
+
+
+FIGURES = {
+    "response": Figures(
+        {
+            "amplitude_and_mean": "Amplitude and mean of the relative deflection over the frequency ratio: "
+            "harmonic balance, dashed where the motion is not known to be stable; triangles: settled motions of the "
+            "sweeps in time."
+        },
+        draw_response,
+    ),
+    "sweep": Figures(
+        {
+            "contact_states": "Contact over the frequency ratio: drive flanks closed, impacts on one side, "
+            "impacts on both; a border is drawn halfway between two computed ratios."
+        },
+        draw_states,
+    ),
+    "chaos": Figures(
+        {
+            "chaos": "Deflection once a tooth period over the frequency ratio, and the largest Lyapunov exponent "
+            "with its error: above zero neighbouring motions part.",
+            "sections": "Deflection and velocity once a tooth period at some ratios Ω, with the largest "
+            "exponent λ.",
+        },
+        draw_chaos,
+    ),
+}

@@ -11,10 +11,20 @@ import re
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import BeforeValidator, Field
 
-from femgear.case.fields import Count, Number, Quantity, Section, StiffnessOrRigid, Title, described, refuse
-from femgear.case.problems import combine, translate
+from femgear.case.fields import (
+    Count,
+    Number,
+    Quantity,
+    Section,
+    Several,
+    StiffnessOrRigid,
+    Title,
+    described,
+    refuse,
+)
+from femgear.case.problems import checked_case
 from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
 from femgear.case.text import ReadCase
 from femgear.case.units import ANGLE, DENSITY, INERTIA, LENGTH, SPEED, STIFFNESS, TORQUE, TORSION
@@ -58,11 +68,6 @@ Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
 Support = StiffnessOrRigid(STIFFNESS, 0.0, 1e15)
 
 
-def _several(kind, count: int):
-    """Type of so many entries."""
-    return Annotated[tuple[kind, ...], Field(min_length=count, max_length=count)]
-
-
 class DiscSection(Section):
     """Mass and inertia of a body, or those of a disc with a hole; ``added_inertia`` comes on top."""
 
@@ -93,12 +98,12 @@ class StageSection(Section):
 
     planets: Count(1, 24) = 3
     planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
-    teeth: _several(Count(4, 5000), 3) | None = None
+    teeth: Several(Count(4, 5000), 3) | None = None
     module: Quantity(LENGTH, 5e-5, 0.5) | None = None
-    base_radii: _several(Radius, 2) | None = None
+    base_radii: Several(Radius, 2) | None = None
     pressure_angle: Quantity(ANGLE, math.radians(5), math.radians(45)) = math.radians(20.0)
-    profile_shifts: _several(Number(-5.0, 5.0), 3) = (0.0, 0.0, 0.0)
-    addendum: _several(Number(0.1, 3.0), 3) = (1.0, 1.0, 1.0)
+    profile_shifts: Several(Number(-5.0, 5.0), 3) = (0.0, 0.0, 0.0)
+    addendum: Several(Number(0.1, 3.0), 3) = (1.0, 1.0, 1.0)
     face_width: Quantity(LENGTH, 1e-4, 5.0) | None = None
     mesh_stiffness: MeshStiffnessSection | None = None
     fixed: Literal["carrier", "ring", "sun", "none"] = "ring"
@@ -112,7 +117,7 @@ class StageSection(Section):
 class CouplingSection(Section):
     """A shaft between members of two stages: springs, or a solid round section of steel."""
 
-    between: _several(MemberName, 2)
+    between: Several(MemberName, 2)
     diameter: Length | None = None
     length: Length | None = None
     torsional: StiffnessOrRigid(TORSION, 1e-3, STIFFEST["torsional"]) | None = None
@@ -164,26 +169,27 @@ def build_multistage(data: dict, text: str, name: str, *, numbered: bool = True)
 
     Raises
     ------
-    CaseError, GeometryError
+    CaseError
         Everything that is wrong with the entries, or why they make no train.
     """
     lines = text if numbered else ""
-    try:
-        case = MultistageCase.model_validate(data)
-    except ValidationError as error:
-        raise combine(translate(error, MultistageCase), lines, name) from None
-    if problems := list(cross_check(case)):
-        raise combine(problems, lines, name)
-    try:
-        check_train(case)
-    except FemgearError as error:
-        raise combine([error], lines, name) from None
+    case = checked_case(MultistageCase, data, lines, name, check=cross_check)
     case.read_from(text, lines, name)
     return case
 
 
 def cross_check(case: MultistageCase) -> Iterator[CaseError]:
     """What no entry shows alone."""
+    found = list(_entry_problems(case))
+    yield from found
+    if not found:
+        train = multistage_of(case)
+        _named(check_turns, "coupling", train)
+        if case.operation is not None:
+            _named(lambda one: train_torques(one, case.operation.torque), "coupling", train)
+
+
+def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
     for n, stage in enumerate(case.stage):
         yield from _sizes(stage, f"stage[{n}]")
         for name in ("sun", "planet", "ring", "carrier"):
@@ -246,18 +252,6 @@ def _disc_problems(body: DiscSection, key: str) -> Iterator[CaseError]:
         )  # fmt: skip
 
 
-def check_train(case: MultistageCase) -> None:
-    """Refuse stages that are no sets, and trains that cannot turn, with the keys of the file."""
-    train = multistage_of(case)
-    try:
-        check_turns(train)
-        if case.operation is not None:
-            train_torques(train, case.operation.torque)
-    except CaseError as error:
-        error.key = error.key or "coupling"
-        raise
-
-
 def multistage_of(case: MultistageCase) -> MultistageSet:
     """The train of a case.
 
@@ -265,7 +259,7 @@ def multistage_of(case: MultistageCase) -> MultistageSet:
 
     Raises
     ------
-    CaseError, GeometryError
+    CaseError
         With the keys of the file.
     """
     stages = [_named(_stage, f"stage[{n}]", one) for n, one in enumerate(case.stage)]
@@ -288,8 +282,10 @@ def _named(make, key: str, section):
         return make(section)
     except FemgearError as error:
         entry = (error.key or "").replace("torsional_support", "torsional_stiffness")
-        error.key = f"{key}.{entry}" if entry else key
-        raise
+        raise CaseError(
+            error.message, code=error.code, key=f"{key}.{entry}" if entry else key, value=error.value,
+            limit=error.limit, remedy=error.remedy,
+        ) from None  # fmt: skip
 
 
 def _member_of(text: str) -> Member:

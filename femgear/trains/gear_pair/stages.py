@@ -1,0 +1,393 @@
+"""The pipeline of a gear pair: response by harmonic balance, sweep and chaos by integration in time.
+
+The stages know nothing of one another. Lengths count in half backlashes and times in 1 / omega_n, as in
+`femgear.trains.gear_pair.model`; every file tells the units. `GEAR_PAIR` at the end is the train: the table of
+its stages, with what the report says and draws of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.report.tables import Block
+from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
+from femgear.threads import one_blas_thread
+from femgear.trains.gear_pair.model import (
+    BACK,
+    DRIVE,
+    STATE_NAMES,
+    ContactStates,
+    impact_borders,
+    range_states,
+    separation_ratios,
+    solution_states,
+    state_regions,
+)
+from femgear.trains.gear_pair.section import MODEL, GearPairCase, build_gear_pair, pair_of, scales_of
+from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.solvers.chaos.lyapunov import LyapunovExponents
+    from femgear.solvers.continuation.branches import Branch
+    from femgear.solvers.continuation.sweep import SweepResponse
+
+# instants of a period at which extremes and contact are looked for
+_INSTANTS = 512
+# points of a motion that the bifurcation diagram shows, periods of a section over those of an exponent
+_SHOWN, _LONGER = 80, 8
+_CHAOTIC = {True: "yes", False: "no", None: "not told"}
+_LENGTH, _RATE = "in half backlashes", "in natural angular frequencies"
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseResult:
+    """Periodic motions along the branch, their extremes (p,), and the ratios where flanks begin to part or hit."""
+
+    case: GearPairCase
+    branch: Branch
+    lowest: np.ndarray
+    highest: np.ndarray
+    contact: ContactStates
+    borders: dict[float, np.ndarray]
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of response.nc."""
+        branch, along, contact = self.branch, ("point",), self.contact
+        entries = _extremes(along, self.lowest, self.highest, branch.lines[:, 0, 0].real)
+        variables = entries | {
+            "stable": (along, branch.stable, "1", "whether the motion is known to be stable"),
+            "multiplier": (along, branch.largest_multiplier, "1", "largest Floquet multiplier"),
+            "state": (along, _names(contact.state[:, 0]), "1", "contact state"),
+            "drive_share": (along, contact.drive[:, 0], "1", "share of the time on the drive flank"),
+            "free_share": (along, contact.free[:, 0], "1", "share of the time between the flanks"),
+            "back_share": (along, contact.back[:, 0], "1", "share of the time on the back flank"),
+            "fold": (("limit_point",), branch.folds, "1", "number of the point, from 0"),
+            "drive_border": (
+                ("drive_crossing",), self.borders[DRIVE], "1", "ratio where drive flanks begin to part",
+            ),
+            "back_border": (
+                ("back_crossing",), self.borders[BACK], "1", "ratio where back flanks begin to touch",
+            ),
+        }  # fmt: skip
+        lines = [("deflection", ("point", "line"), branch.lines[:, 0], "1", f"relative deflection {_LENGTH}")]
+        coords = _ratios(self.case, "point", branch.parameter) | {
+            "line": (("line",), branch.orders[:, 0], "1", "harmonic of the tooth frequency")
+        }
+        attrs = {"title": "periodic motions by harmonic balance", "message": branch.message}
+        return dataset(variables | complex_entries(lines), coords, _units(self.case, attrs))
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """Motions to which integration settles, over ascending ratios and back."""
+
+    case: GearPairCase
+    up: SweepResponse
+    down: SweepResponse
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of sweep.nc; both directions over the ascending ratio."""
+        both, dims = (self.up, self.down), ("direction", "ratio")
+        order = [slice(None), slice(None, None, -1)]
+
+        def ascending(value):
+            return np.array([value(one)[turn] for one, turn in zip(both, order)])
+
+        low, high = ascending(lambda one: one.lowest[:, 0]), ascending(lambda one: one.highest[:, 0])
+        variables = _extremes(dims, low, high, ascending(lambda one: one.lines[:, 0, 0].real)) | {
+            "state": (dims, _names(range_states(low, high, drive=DRIVE, back=BACK)), "1", "contact state"),
+            "settled": (dims, ascending(lambda one: one.settled), "1", "whether the motion repeats"),
+            "periods": (dims, ascending(lambda one: one.periods), "1", "periods until then"),
+        }
+        coords = _ratios(self.case, "ratio", self.up.frequency)
+        coords["direction"] = ("direction",), ["up", "down"], "1", "direction of the sweep"
+        attrs = {"title": "settled motions by integration in time, ratio up and down"}
+        return dataset(variables, coords, _units(self.case, attrs))
+
+
+@dataclass(frozen=True, eq=False)
+class ChaosResult:
+    """Exponents and sections over the ratio, and long sections at some of the ratios."""
+
+    case: GearPairCase
+    ratio: np.ndarray
+    found: list[LyapunovExponents]
+    sections: list[tuple[float, LyapunovExponents]]
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of chaos.nc."""
+        ratio, found, along = self.ratio, self.found, ("ratio",)
+        # exponents per theta; times the ratio per 1 / omega_n
+        exponent, error = (
+            ratio * [getattr(one, name)[0] for one in found] for name in ("exponents", "error")
+        )
+        points = np.array([one.section.deflection[-_SHOWN:, 0] for one in found])
+        variables = {
+            "exponent": (along, exponent, "1", f"largest Lyapunov exponent {_RATE}"),
+            "error": (along, error, "1", f"its error {_RATE}"),
+            "lowest": (along, [one.lowest[0] for one in found], "1", f"smallest deflection {_LENGTH}"),
+            "highest": (along, [one.highest[0] for one in found], "1", f"largest deflection {_LENGTH}"),
+            "repeats": (
+                along, [one.section.repeats_after(1e-3) for one in found], "1",
+                "periods after which the motion repeats, 0 where it does not",
+            ),
+            "chaotic": (along, [_CHAOTIC[one.chaotic] for one in found], "1", "whether the motion is chaotic"),
+            "point": (("ratio", "period"), points, "1", f"deflection once a period {_LENGTH}"),
+        }  # fmt: skip
+        if self.sections:
+            at, long = np.array([r for r, _ in self.sections]), [one for _, one in self.sections]
+            some = ("section",)
+            of = np.array([(one.largest, one.error[0]) for one in long]).T * at
+            points = np.array([one.section.deflection[:, 0] for one in long])
+            speed = np.array([one.section.velocity[:, -1] for one in long]) * at[:, None]
+            variables |= {
+                "section_ratio": (some, at, "1", "frequency ratio of the section"),
+                "section_exponent": (some, of[0], "1", f"largest exponent of its run {_RATE}"),
+                "section_error": (some, of[1], "1", f"its error {_RATE}"),
+                "section_deflection": (("section", "run"), points, "1", f"deflection {_LENGTH}"),
+                "section_velocity": (("section", "run"), speed, "1", f"velocity {_LENGTH}, {_RATE}"),
+            }
+        coords = _ratios(self.case, "ratio", ratio)
+        return dataset(
+            variables, coords, _units(self.case, {"title": "Lyapunov exponents and sections once a period"})
+        )
+
+
+def _extremes(dims, lowest, highest, mean) -> dict[str, tuple]:
+    return {
+        "amplitude": (dims, 0.5 * (highest - lowest), "1", f"half of largest less smallest, {_LENGTH}"),
+        "mean": (dims, mean, "1", f"mean deflection {_LENGTH}"),
+        "lowest": (dims, lowest, "1", f"smallest deflection {_LENGTH}"),
+        "highest": (dims, highest, "1", f"largest deflection {_LENGTH}"),
+    }
+
+
+def _names(state) -> np.ndarray:
+    return np.array(STATE_NAMES)[state]
+
+
+def _ratios(case: GearPairCase, dimension: str, ratio) -> dict[str, tuple]:
+    """Frequency ratio and speed of the driving gear along a dimension."""
+    speed = ratio * scales_of(case).frequency / case.gears.teeth[0]
+    return {
+        "ratio": ((dimension,), ratio, "1", "tooth frequency over natural frequency"),
+        "speed": ((dimension,), speed / RPM, "rpm", "speed of the driving gear"),
+    }
+
+
+def _units(case: GearPairCase, attrs: dict) -> dict:
+    scales = scales_of(case)
+    units = {"half_backlash": scales.length, "natural_frequency": scales.frequency / (2.0 * np.pi)}
+    return attrs | units | {"unit_force": scales.force, "fourier_convention": FOURIER}
+
+
+@one_blas_thread()
+def solve_response(case: GearPairCase) -> ResponseResult:
+    """Periodic motions over the frequency ratio past limit points, with stability and contact."""
+    from femgear.solvers.continuation.arclength import StepOptions
+    from femgear.solvers.continuation.branches import parameter_curve
+
+    pair, given = pair_of(case), case.response
+    branch = parameter_curve(
+        pair.problem, (given.start, given.to), 1.0, harmonics=given.harmonics, samples=1024, radius=False,
+        options=StepOptions(largest=given.largest_step),
+    )  # fmt: skip
+    phase = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
+    x = np.array([solution.at(phase)[:, 0] for solution in branch.solutions])
+    mesh = pair.problem(1.0).elements[0]
+    states = [solution_states(mesh, solution, samples=_INSTANTS) for solution in branch.solutions]
+    fields = ContactStates.__dataclass_fields__
+    contact = ContactStates(*(np.array([getattr(one, name) for one in states]) for name in fields))
+    borders = {level: np.sort(impact_borders(pair, branch, level)) for level in (DRIVE, BACK)}
+    return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), contact, borders)
+
+
+@one_blas_thread()
+def solve_sweep(case: GearPairCase) -> SweepResult:
+    """Integrate at every ratio until the motion repeats, upwards and from there back."""
+    from femgear.solvers.continuation.sweep import sweep_up_and_down
+
+    pair, given = pair_of(case), case.sweep
+    ratios = np.concatenate([np.linspace(one.start, one.to, one.count) for one in given.ranges])
+    up, down = sweep_up_and_down(
+        lambda ratio: (pair.problem(ratio), pair.frequency),
+        ratios,
+        steps=given.steps * pair.periods,
+        periods=pair.periods,
+        most=given.most_periods,
+    )
+    return SweepResult(case, up, down)
+
+
+@one_blas_thread()
+def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> ChaosResult:
+    """Lyapunov exponents over the ratio, each from the last point of the one before, and long sections."""
+    from femgear.solvers.chaos.lyapunov import lyapunov_exponents
+
+    pair, given, found = pair_of(case), case.chaos, []
+    ratios, start = np.linspace(given.start, given.to, given.count), None
+    options: dict[str, Any] = {"steps": given.steps * pair.periods, "periods": pair.periods}
+    for number, ratio in enumerate(ratios):
+        if progress is not None:
+            progress("chaos", number, len(ratios))
+        found.append(
+            lyapunov_exponents(
+                pair.problem(ratio), pair.frequency, points=given.points, skip=given.skip, start=start,
+                **options,
+            )
+        )  # fmt: skip
+        start = found[-1].section.displacement[-1], found[-1].section.velocity[-1]
+    sections = []
+    for wanted in given.sections:
+        place = int(np.argmin(np.abs(ratios - wanted)))
+        end = found[place].section
+        once = lyapunov_exponents(
+            pair.problem(ratios[place]), pair.frequency, points=_LONGER * given.points, skip=100,
+            start=(end.displacement[-1], end.velocity[-1]), **options,
+        )  # fmt: skip
+        sections.append((float(ratios[place]), once))
+    return ChaosResult(case, ratios, found, sections)
+
+
+def describe_gear_pair(case: GearPairCase) -> tuple[Block, ...]:
+    """Title, units, numbers of the pair, and warnings of a case."""
+    scales, pair = scales_of(case), pair_of(case)
+    hertz = scales.frequency / (2.0 * np.pi)
+    rows = [
+        ("natural frequency [Hz]", f"{hertz:.6g}"),
+        ("its speed of the driving gear [rpm]", f"{scales.frequency / case.gears.teeth[0] / RPM:.6g}"),
+        ("half backlash b [um]", f"{1e6 * scales.length:.6g}"),
+        ("force k b [N]", f"{scales.force:.6g}"),
+        ("load over k b", f"{pair.load:.6g}"),
+        ("damping ratio", f"{pair.damping_ratio:.6g}"),
+        ("tooth error over b", ", ".join(f"{abs(one):.6g}" for one in pair.tooth_error) or "none"),
+        (
+            "mesh stiffness wave over its mean",
+            ", ".join(f"{abs(one):.4g}" for one in pair.stiffness) or "none",
+        ),
+    ]
+    notes: tuple[str, ...] = ()
+    if pair.load and len(pair.tooth_error) == 1 and pair.bearings is None:
+        parting = separation_ratios(
+            damping_ratio=pair.damping_ratio, load=abs(pair.load), error=abs(pair.tooth_error[0])
+        )
+        ends = " and ".join(f"{ratio:.4f}" for ratio in parting) or "no ratio"
+        notes = (f"with constant stiffness drive flanks begin to part at {ends} of the natural frequency",)
+    warnings = tuple(gear_pair_warnings(case)) or ("none",)
+    return Block(case.title), Block("Gear pair", (), tuple(rows), notes), Block("Warnings", notes=warnings)
+
+
+def gear_pair_warnings(case: GearPairCase) -> Iterator[str]:
+    """What is allowed but deserves a look."""
+    if case.operation.torque == 0.0:
+        yield "[W-LOAD] operation.torque: without load nothing keeps the flanks on one side"
+    if not (case.mesh.error or case.mesh.stiffness_waves or any(case.gears.eccentricity)):
+        yield "[W-EXCITATION] mesh: neither error nor stiffness waves nor eccentricity excite the pair"
+
+
+def result_warnings(results) -> Iterator[str]:
+    """What the solvers say against their own results."""
+    if "response" in results.stages and not results.response.attrs["message"].startswith("reached"):
+        yield f"[W-BRANCH] response: {results.response.attrs['message']}"
+    if "sweep" in results.stages and (lost := int((~results.sweep["settled"].values.astype(bool)).sum())):
+        yield f"[W-SETTLED] sweep: {lost} motions do not repeat within sweep.most_periods"
+
+
+def _describe_response(data: xr.Dataset) -> Block:
+    rows = [
+        ("largest amplitude [half backlashes]", f"{float(data['amplitude'].max()):.4f}"),
+        ("limit points at ratio", _listed(data["ratio"].values[data["fold"].values])),
+        ("drive flanks begin to part at", _listed(data["drive_border"].values)),
+        ("back flanks begin to touch at", _listed(data["back_border"].values)),
+    ]
+    points = f"{data.sizes['point']} points, {int(data['stable'].sum())} stable; {data.attrs['message']}"
+    return Block("Response", ("", "ratio"), tuple(rows), (points,))
+
+
+def _listed(values) -> str:
+    return ", ".join(f"{value:.4f}" for value in np.sort(values)) or "none"
+
+
+def _describe_sweep(data: xr.Dataset) -> Block:
+    rows = [
+        (str(direction), STATE_NAMES[number], f"{min(ends):.3f}", f"{max(ends):.3f}")
+        for direction, states in zip(data["direction"].values, data["state"].values)
+        for number, *ends in state_regions(data["ratio"].values, [STATE_NAMES.index(one) for one in states])
+    ]
+    return Block("Sweep", ("sweep", "contact state", "from ratio", "to ratio"), tuple(rows))
+
+
+def _describe_chaos(data: xr.Dataset) -> Block:
+    words = [str(one) for one in data["chaotic"].values]
+    chaotic = data["ratio"].values[[one == "yes" for one in words]]
+    ends = [f"{ratio:.4g}" for ratio in chaotic[[0, -1]]] if len(chaotic) else ["none", "none"]
+    row = (
+        str(len(words)),
+        str(len(chaotic)),
+        *ends,
+        str(words.count("not told")),
+        f"{float(data['lowest'].min()):.3f}",
+    )
+    header = ("ratios", "chaotic", "from", "to", "not told", "smallest deflection [half backlashes]")
+    notes = ("chaotic: exponent clearly positive, bounded, no repetition",)
+    return Block("Chaos", header, (row,), notes)
+
+
+def _no_response(case: GearPairCase) -> str:
+    return (
+        "the shafts of eccentric gears add base frequencies; take sweep"
+        if any(case.gears.eccentricity)
+        else ""
+    )
+
+
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.gear_pair.figures import FIGURES
+
+    return FIGURES
+
+
+GEAR_PAIR = Train(
+    name=MODEL,
+    words="a gear pair",
+    model=GearPairCase,
+    own_file=OwnFile(
+        lambda data: data.get("model") == MODEL, build_gear_pair, GearPairCase.model_json_schema
+    ),
+    stages=(
+        Stage(
+            name="response",
+            title="Response",
+            solve=lambda case, *_: solve_response(case),
+            verdict=lambda result: {"points": len(result.lowest), "message": result.branch.message},
+            describe=lambda results: _describe_response(results.response),
+            unavailable=_no_response,
+        ),
+        Stage(
+            name="sweep",
+            title="Sweep",
+            solve=lambda case, *_: solve_sweep(case),
+            verdict=lambda result: {"settled": int(result.up.settled.sum() + result.down.settled.sum())},
+            describe=lambda results: _describe_sweep(results.sweep),
+            unavailable=lambda case: "" if case.sweep else "the case has no section sweep",
+        ),
+        Stage(
+            name="chaos",
+            title="Chaos",
+            solve=lambda case, _, context: solve_chaos(case, progress=context.progress),
+            verdict=lambda result: {"ratios": len(result.ratio)},
+            describe=lambda results: _describe_chaos(results.chaos),
+            unavailable=lambda case: "" if case.chaos else "the case has no section chaos",
+        ),
+    ),
+    describe=describe_gear_pair,
+    warnings=gear_pair_warnings,
+    result_warnings=result_warnings,
+    figures=_figures,
+)
