@@ -20,7 +20,7 @@ from femgear.report.style import (
     legend_below,
     new_figure,
 )
-from femgear.trains.gear_pair.model import STATE_NAMES
+from femgear.system.contact_states import STATE_NAMES
 from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
@@ -117,60 +117,33 @@ def state_bands(rows: Sequence[tuple], names: Sequence[str], *, x: str = "freque
     return figure
 
 
-def bifurcation_and_exponent(
-    parameter, points, exponent, error, *, lowest=None, highest=None, x: str = "frequency ratio [1]",
-    quantity: str = "x once a period [half backlash]",
-):  # fmt: skip
-    """Stroboscopic points over a parameter, and the largest Lyapunov exponent with its error below.
+def bifurcation_and_exponent(chaos: xr.Dataset) -> Figure:
+    """Deflections once a period of chaos.nc over the ratio, and the largest exponent with its error below.
 
-    Parameters
-    ----------
-    parameter : (p,) array
-    points : (p, n) array
-    exponent, error : (p,) arrays
-        Per unit of time 1 / omega_n.
-    lowest, highest : (p,) arrays, optional
-        Extremes of the motion, drawn as thin lines.
-    x, quantity : str
-
-    Returns
-    -------
-    Figure
+    Thin lines are the extremes of the motion.
     """
-    parameter, points = np.asarray(parameter, float), np.asarray(points, float)
+    ratio, points = chaos["ratio"].values, chaos["point"].values
     figure, (top, bottom) = new_figure(rows=2, width=8.5, height=7.0, sharex=True)
-    top.plot(np.repeat(parameter, points.shape[1]), points.ravel(), ".", color=BLUE, markersize=1.6)
-    for value, text in ((lowest, "smallest and largest x"), (highest, None)):
-        if value is not None:
-            top.plot(parameter, value, color=GREY, linewidth=0.9, label=text)
+    top.plot(np.repeat(ratio, points.shape[1]), points.ravel(), ".", color=BLUE, markersize=1.6)
+    for name, text in (("lowest", "smallest and largest x"), ("highest", None)):
+        top.plot(ratio, chaos[name].values, color=GREY, linewidth=0.9, label=text)
     for level, text in ((1.0, "flanks close"), (-1.0, None)):
         top.axhline(level, color=ORANGE, linestyle="--", linewidth=1.1, label=text)
-    exponent = np.asarray(exponent, float)
     bottom.axhline(0.0, color=BLACK, linewidth=0.9)
-    bottom.errorbar(
-        parameter, exponent, yerr=error, color=VERMILION, linewidth=1.1, elinewidth=0.8, marker="o",
-        markersize=3.0,
-    )  # fmt: skip
-    label(top, y=quantity)
-    label(bottom, x, "largest exponent [$\\omega_n$]")
+    style = {"color": VERMILION, "linewidth": 1.1, "elinewidth": 0.8, "marker": "o", "markersize": 3.0}
+    bottom.errorbar(ratio, chaos["exponent"].values, yerr=chaos["error"].values, **style)
+    label(top, y="x once a period [half backlash]")
+    label(bottom, "frequency ratio [1]", "largest exponent [$\\omega_n$]")
     legend_below(figure)
     return figure
 
 
-def phase_sections(panels: Sequence[tuple], *, x: str = "x [half backlash]", y: str = "velocity"):
-    """Stroboscopic sections side by side.
-
-    Parameters
-    ----------
-    panels : sequence of (title, displacement (n,), velocity (n,))
-    x, y : str
-
-    Returns
-    -------
-    Figure
-    """
+def phase_sections(chaos: xr.Dataset) -> Figure:
+    """Stroboscopic sections of chaos.nc side by side, with the exponent of each."""
+    names = ("ratio", "exponent", "error", "deflection", "velocity")
+    panels = list(zip(*(chaos[f"section_{name}"].values for name in names)))
     figure, axes = new_figure(columns=len(panels), width=4.0 * len(panels), height=4.2)
-    for ax, (title, displacement, velocity) in zip(axes, panels):
+    for ax, (ratio, exponent, error, displacement, velocity) in zip(axes, panels):
         # points that repeat lie on one another: draw each place large enough to be seen
         spread = max(np.ptp(displacement), np.ptp(velocity))
         size = 2.0 if spread > 1e-2 and len(np.unique(np.round(displacement, 3))) > 8 else 8.0
@@ -178,8 +151,8 @@ def phase_sections(panels: Sequence[tuple], *, x: str = "x [half backlash]", y: 
         if spread <= 1e-2:
             ax.set_xlim(np.mean(displacement) + np.array([-1.0, 1.0]))
             ax.set_ylim(np.mean(velocity) + np.array([-1.0, 1.0]))
-        label(ax, x, title=title)
-    label(axes[0], y=y)
+        label(ax, "x [half backlash]", title=f"Ω = {ratio:.2f}, λ = {exponent:.3f} ± {error:.3f}")
+    label(axes[0], y="velocity [b $\\omega_n$]")
     return figure
 
 
@@ -233,18 +206,9 @@ def draw_states(drawn: Drawn) -> dict[str, Figure]:
 def draw_chaos(drawn: Drawn) -> dict[str, Figure]:
     """Bifurcation diagram with the exponents, and the long sections."""
     data = drawn.data["chaos"]
-    columns = [data[name].values for name in ("ratio", "point", "exponent", "error", "lowest", "highest")]
-    figures = {"chaos": bifurcation_and_exponent(*columns[:4], lowest=columns[4], highest=columns[5])}
+    figures = {"chaos": bifurcation_and_exponent(data)}
     if "section_ratio" in data:
-        titles = [
-            f"Ω = {ratio:.2f}, λ = {exponent:.3f} ± {error:.3f}"
-            for ratio, exponent, error in zip(
-                *(data[f"section_{name}"].values for name in ("ratio", "exponent", "error"))
-            )
-        ]
-        motion = (data[f"section_{name}"].values for name in ("deflection", "velocity"))
-        panels = list(zip(titles, *motion))
-        figures["sections"] = phase_sections(panels, y="velocity [b $\\omega_n$]")
+        figures["sections"] = phase_sections(data)
     return figures
 
 
@@ -252,8 +216,8 @@ FIGURES = {
     "response": Figures(
         {
             "amplitude_and_mean": "Amplitude and mean of the relative deflection over the frequency ratio: "
-            "harmonic balance, dashed where the motion is not known to be stable; triangles: settled motions of the "
-            "sweeps in time."
+            "harmonic balance, dashed where the motion is not known to be stable; triangles: settled motions "
+            "of the sweeps in time."
         },
         draw_response,
     ),
@@ -266,8 +230,8 @@ FIGURES = {
     ),
     "chaos": Figures(
         {
-            "chaos": "Deflection once a tooth period over the frequency ratio, and the largest Lyapunov exponent "
-            "with its error: above zero neighbouring motions part.",
+            "chaos": "Deflection once a tooth period over the frequency ratio, and the largest Lyapunov "
+            "exponent with its error: above zero neighbouring motions part.",
             "sections": "Deflection and velocity once a tooth period at some ratios Ω, with the largest "
             "exponent λ.",
         },

@@ -38,7 +38,7 @@ class GearsSection(Section):
 
 
 class MeshSection(Section):
-    """Mesh stiffness, backlash, damping and tooth error; waves are harmonics 1, 2, ... of the tooth frequency."""
+    """Mesh stiffness, backlash, damping, tooth error; waves are harmonics of the tooth frequency, from 1."""
 
     stiffness: Quantity(STIFFNESS, 1e3, 1e13)
     stiffness_waves: Annotated[tuple[Number(-1.0, 1.0), ...], Field(max_length=_MOST_WAVES)] = ()

@@ -1,8 +1,7 @@
 """The pipeline of a gear pair: response by harmonic balance, sweep and chaos by integration in time.
 
 The stages know nothing of one another. Lengths count in half backlashes and times in 1 / omega_n, as in
-`femgear.trains.gear_pair.model`; every file tells the units. `GEAR_PAIR` at the end is the train: the table of
-its stages, with what the report says and draws of each.
+`femgear.trains.gear_pair.model`; every file tells these units. `GEAR_PAIR` at the end is the train.
 """
 
 from __future__ import annotations
@@ -15,18 +14,15 @@ import numpy as np
 
 from femgear.report.tables import Block
 from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
-from femgear.threads import one_blas_thread
-from femgear.trains.gear_pair.model import (
-    BACK,
-    DRIVE,
+from femgear.system.contact_states import (
     STATE_NAMES,
     ContactStates,
-    impact_borders,
     range_states,
-    separation_ratios,
     solution_states,
     state_regions,
 )
+from femgear.threads import one_blas_thread
+from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
 from femgear.trains.gear_pair.section import MODEL, GearPairCase, build_gear_pair, pair_of, scales_of
 from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
 
@@ -47,7 +43,7 @@ _LENGTH, _RATE = "in half backlashes", "in natural angular frequencies"
 
 @dataclass(frozen=True, eq=False)
 class ResponseResult:
-    """Periodic motions along the branch, their extremes (p,), and the ratios where flanks begin to part or hit."""
+    """Periodic motions along the branch, their extremes (p,), and the ratios where flanks part or hit."""
 
     case: GearPairCase
     branch: Branch
@@ -58,29 +54,29 @@ class ResponseResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of response.nc."""
-        branch, along, contact = self.branch, ("point",), self.contact
-        entries = _extremes(along, self.lowest, self.highest, branch.lines[:, 0, 0].real)
-        variables = entries | {
-            "stable": (along, branch.stable, "1", "whether the motion is known to be stable"),
-            "multiplier": (along, branch.largest_multiplier, "1", "largest Floquet multiplier"),
-            "state": (along, _names(contact.state[:, 0]), "1", "contact state"),
-            "drive_share": (along, contact.drive[:, 0], "1", "share of the time on the drive flank"),
-            "free_share": (along, contact.free[:, 0], "1", "share of the time between the flanks"),
-            "back_share": (along, contact.back[:, 0], "1", "share of the time on the back flank"),
-            "fold": (("limit_point",), branch.folds, "1", "number of the point, from 0"),
-            "drive_border": (
-                ("drive_crossing",), self.borders[DRIVE], "1", "ratio where drive flanks begin to part",
-            ),
-            "back_border": (
-                ("back_crossing",), self.borders[BACK], "1", "ratio where back flanks begin to touch",
-            ),
-        }  # fmt: skip
+        branch, contact = self.branch, self.contact
+        variables = _motions(("point",), self.lowest, self.highest, branch.lines[:, 0, 0].real)
+        variables |= _numbers(
+            ("point",),
+            stable=(branch.stable, "whether the motion is known to be stable"),
+            multiplier=(branch.largest_multiplier, "largest Floquet multiplier"),
+            drive_share=(contact.drive[:, 0], "share of the time on the drive flank"),
+            free_share=(contact.free[:, 0], "share of the time between the flanks"),
+            back_share=(contact.back[:, 0], "share of the time on the back flank"),
+        )
+        variables |= _numbers(("limit_point",), fold=(branch.folds, "number of the point, from 0"))
+        for name, level, words in (
+            ("drive", DRIVE, "drive flanks part"),
+            ("back", BACK, "back flanks touch"),
+        ):
+            border = {f"{name}_border": (self.borders[level], f"frequency ratio from which {words}")}
+            variables |= _numbers((f"{name}_crossing",), **border)
         lines = [("deflection", ("point", "line"), branch.lines[:, 0], "1", f"relative deflection {_LENGTH}")]
-        coords = _ratios(self.case, "point", branch.parameter) | {
-            "line": (("line",), branch.orders[:, 0], "1", "harmonic of the tooth frequency")
-        }
-        attrs = {"title": "periodic motions by harmonic balance", "message": branch.message}
-        return dataset(variables | complex_entries(lines), coords, _units(self.case, attrs))
+        coords = _ratios(self.case, "point", branch.parameter)
+        coords |= _numbers(("line",), line=(branch.orders[:, 0], "harmonic of the tooth frequency"))
+        attrs = {"message": branch.message, "complete": int(branch.complete), "fourier_convention": FOURIER}
+        title = "periodic motions by harmonic balance"
+        return dataset(variables | complex_entries(lines), coords, _units(self.case, title) | attrs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,22 +89,20 @@ class SweepResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of sweep.nc; both directions over the ascending ratio."""
-        both, dims = (self.up, self.down), ("direction", "ratio")
-        order = [slice(None), slice(None, None, -1)]
 
-        def ascending(value):
-            return np.array([value(one)[turn] for one, turn in zip(both, order)])
+        def both(name: str) -> np.ndarray:
+            return np.array([getattr(self.up, name), getattr(self.down, name)[::-1]])
 
-        low, high = ascending(lambda one: one.lowest[:, 0]), ascending(lambda one: one.highest[:, 0])
-        variables = _extremes(dims, low, high, ascending(lambda one: one.lines[:, 0, 0].real)) | {
-            "state": (dims, _names(range_states(low, high, drive=DRIVE, back=BACK)), "1", "contact state"),
-            "settled": (dims, ascending(lambda one: one.settled), "1", "whether the motion repeats"),
-            "periods": (dims, ascending(lambda one: one.periods), "1", "periods until then"),
-        }
+        dims = ("direction", "ratio")
+        extremes = both("lowest")[..., 0], both("highest")[..., 0], both("lines")[..., 0, 0].real
+        variables = _motions(dims, *extremes) | _numbers(
+            dims,
+            settled=(both("settled"), "whether the motion repeats"),
+            periods=(both("periods"), "periods until then"),
+        )
         coords = _ratios(self.case, "ratio", self.up.frequency)
-        coords["direction"] = ("direction",), ["up", "down"], "1", "direction of the sweep"
-        attrs = {"title": "settled motions by integration in time, ratio up and down"}
-        return dataset(variables, coords, _units(self.case, attrs))
+        coords |= _numbers(("direction",), direction=(["up", "down"], "direction of the sweep"))
+        return dataset(variables, coords, _units(self.case, "settled motions, ratio up and down"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,70 +115,72 @@ class ChaosResult:
     sections: list[tuple[float, LyapunovExponents]]
 
     def dataset(self) -> xr.Dataset:
-        """Contents of chaos.nc."""
-        ratio, found, along = self.ratio, self.found, ("ratio",)
-        # exponents per theta; times the ratio per 1 / omega_n
-        exponent, error = (
-            ratio * [getattr(one, name)[0] for one in found] for name in ("exponents", "error")
+        """Contents of chaos.nc; exponents are per unit of time 1 / omega_n."""
+        ratio, found = self.ratio, self.found
+        variables = _numbers(
+            ("ratio",),
+            exponent=(ratio * [one.largest for one in found], f"largest Lyapunov exponent {_RATE}"),
+            error=(ratio * [one.error[0] for one in found], f"its error {_RATE}"),
+            lowest=([one.lowest[0] for one in found], f"smallest deflection {_LENGTH}"),
+            highest=([one.highest[0] for one in found], f"largest deflection {_LENGTH}"),
+            repeats=([one.section.repeats_after(1e-3) for one in found], "periods until it repeats, or 0"),
+            chaotic=([_CHAOTIC[one.chaotic] for one in found], "yes, no or not told"),
         )
-        points = np.array([one.section.deflection[-_SHOWN:, 0] for one in found])
-        variables = {
-            "exponent": (along, exponent, "1", f"largest Lyapunov exponent {_RATE}"),
-            "error": (along, error, "1", f"its error {_RATE}"),
-            "lowest": (along, [one.lowest[0] for one in found], "1", f"smallest deflection {_LENGTH}"),
-            "highest": (along, [one.highest[0] for one in found], "1", f"largest deflection {_LENGTH}"),
-            "repeats": (
-                along, [one.section.repeats_after(1e-3) for one in found], "1",
-                "periods after which the motion repeats, 0 where it does not",
-            ),
-            "chaotic": (along, [_CHAOTIC[one.chaotic] for one in found], "1", "whether the motion is chaotic"),
-            "point": (("ratio", "period"), points, "1", f"deflection once a period {_LENGTH}"),
-        }  # fmt: skip
+        points = [one.section.deflection[-_SHOWN:, 0] for one in found]
+        variables |= _numbers(("ratio", "period"), point=(points, f"deflection once a period {_LENGTH}"))
         if self.sections:
             at, long = np.array([r for r, _ in self.sections]), [one for _, one in self.sections]
-            some = ("section",)
-            of = np.array([(one.largest, one.error[0]) for one in long]).T * at
-            points = np.array([one.section.deflection[:, 0] for one in long])
-            speed = np.array([one.section.velocity[:, -1] for one in long]) * at[:, None]
-            variables |= {
-                "section_ratio": (some, at, "1", "frequency ratio of the section"),
-                "section_exponent": (some, of[0], "1", f"largest exponent of its run {_RATE}"),
-                "section_error": (some, of[1], "1", f"its error {_RATE}"),
-                "section_deflection": (("section", "run"), points, "1", f"deflection {_LENGTH}"),
-                "section_velocity": (("section", "run"), speed, "1", f"velocity {_LENGTH}, {_RATE}"),
-            }
-        coords = _ratios(self.case, "ratio", ratio)
-        return dataset(
-            variables, coords, _units(self.case, {"title": "Lyapunov exponents and sections once a period"})
-        )
+            velocity = at[:, None] * [one.section.velocity[:, -1] for one in long]
+            variables |= _numbers(
+                ("section",),
+                section_ratio=(at, "frequency ratio of the section"),
+                section_exponent=(at * [one.largest for one in long], f"largest exponent {_RATE}"),
+                section_error=(at * [one.error[0] for one in long], f"its error {_RATE}"),
+            )
+            variables |= _numbers(
+                ("section", "run"),
+                section_deflection=([one.section.deflection[:, 0] for one in long], f"deflection {_LENGTH}"),
+                section_velocity=(velocity, f"velocity {_LENGTH}, {_RATE}"),
+            )
+        title = "Lyapunov exponents and sections once a period"
+        return dataset(variables, _ratios(self.case, "ratio", ratio), _units(self.case, title))
 
 
-def _extremes(dims, lowest, highest, mean) -> dict[str, tuple]:
-    return {
-        "amplitude": (dims, 0.5 * (highest - lowest), "1", f"half of largest less smallest, {_LENGTH}"),
-        "mean": (dims, mean, "1", f"mean deflection {_LENGTH}"),
-        "lowest": (dims, lowest, "1", f"smallest deflection {_LENGTH}"),
-        "highest": (dims, highest, "1", f"largest deflection {_LENGTH}"),
-    }
+def _numbers(dims: tuple[str, ...], **entries: tuple) -> dict[str, tuple]:
+    """Entries ``(values, words)`` without a unit."""
+    return {name: (dims, values, "1", words) for name, (values, words) in entries.items()}
 
 
-def _names(state) -> np.ndarray:
-    return np.array(STATE_NAMES)[state]
+def _motions(dims: tuple[str, ...], lowest, highest, mean) -> dict[str, tuple]:
+    return _numbers(
+        dims,
+        amplitude=(0.5 * (highest - lowest), f"half of largest less smallest, {_LENGTH}"),
+        mean=(mean, f"mean deflection {_LENGTH}"),
+        lowest=(lowest, f"smallest deflection {_LENGTH}"),
+        highest=(highest, f"largest deflection {_LENGTH}"),
+        state=(
+            np.array(STATE_NAMES)[range_states(lowest, highest, drive=DRIVE, back=BACK)],
+            "contact state",
+        ),
+    )
 
 
 def _ratios(case: GearPairCase, dimension: str, ratio) -> dict[str, tuple]:
     """Frequency ratio and speed of the driving gear along a dimension."""
     speed = ratio * scales_of(case).frequency / case.gears.teeth[0]
+    words = "tooth frequency over natural frequency"
     return {
-        "ratio": ((dimension,), ratio, "1", "tooth frequency over natural frequency"),
+        "ratio": ((dimension,), ratio, "1", words),
         "speed": ((dimension,), speed / RPM, "rpm", "speed of the driving gear"),
     }
 
 
-def _units(case: GearPairCase, attrs: dict) -> dict:
+def _units(case: GearPairCase, title: str) -> dict[str, Any]:
+    """Attributes: title, half backlash [m], natural frequency [Hz], and force that counts as one [N]."""
     scales = scales_of(case)
-    units = {"half_backlash": scales.length, "natural_frequency": scales.frequency / (2.0 * np.pi)}
-    return attrs | units | {"unit_force": scales.force, "fourier_convention": FOURIER}
+    natural = scales.frequency / (2.0 * np.pi)
+    lengths = {"half_backlash": scales.length, "natural_frequency": natural, "unit_force": scales.force}
+    return {"title": title} | lengths
 
 
 @one_blas_thread()
@@ -293,7 +289,7 @@ def gear_pair_warnings(case: GearPairCase) -> Iterator[str]:
 
 def result_warnings(results) -> Iterator[str]:
     """What the solvers say against their own results."""
-    if "response" in results.stages and not results.response.attrs["message"].startswith("reached"):
+    if "response" in results.stages and not results.response.attrs["complete"]:
         yield f"[W-BRANCH] response: {results.response.attrs['message']}"
     if "sweep" in results.stages and (lost := int((~results.sweep["settled"].values.astype(bool)).sum())):
         yield f"[W-SETTLED] sweep: {lost} motions do not repeat within sweep.most_periods"

@@ -5,8 +5,8 @@ between members are springs or rigid. One rotation is the same in all frames, so
 exact at any speed. The centres of two members meet in the fixed frame: with ``z = x + i y`` in frames at the
 angles psi the lateral spring sees ``z_1 exp(i psi_1) - z_2 exp(i psi_2)``. It is a constant spring where both
 frames turn at one speed, or stand; otherwise its columns stay in ``W`` for the periodic element
-`TurningSprings`. D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16) couple stages with the
-same springs.
+`femgear.system.elements.TurningSprings`. D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16)
+couple stages with the same springs.
 
 Speeds and torques follow from Willis' equation of every stage in one linear system: with the speeds ``w`` of
 all central members, every stage, coupling, and fixed member is one row of ``A w = 0``. Ideal torques follow
@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.system.assembler import free_motions, mesh_directions, planar_dofs, planar_springs, planar_system
+from femgear.system.assembler import free_motions, mesh_directions, planar_dofs, planar_system
 from femgear.system.entries import checked_count, checked_numbers
 from femgear.system.lumped import (
     CENTRAL,
@@ -36,7 +36,6 @@ from femgear.system.lumped import (
     planar_from_set,
     torque_shares,
 )
-from femgear.system.series import FourierSeries
 from femgear.system.system import MechanicalSystem
 
 if TYPE_CHECKING:
@@ -284,45 +283,6 @@ def stage_of_set(planetary_set: PlanetarySet, *, fixed: str | None = "ring", ang
         phases=s.mesh_phases,
         angle=angle,
     )
-
-
-def shaft_stiffness(
-    diameter: float, length: float, *, young: float = 206e9, poisson: float = 0.3
-) -> dict[str, float]:
-    """Torsional and lateral stiffness of a solid round shaft whose ends do not tilt.
-
-    ``k_t = G pi d^4 / (32 L)`` and, for Timoshenko's beam, ``k = 12 E I / (L^3 (1 + phi))`` with ``phi = 12 E
-    I / (kappa G A L^2)`` (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 5.6) and
-    ``kappa = 6 (1 + nu) / (7 + 6 nu)`` (G. R. Cowper, J. Appl. Mech. 33, 1966, 335-340).
-
-    Parameters
-    ----------
-    diameter, length : float
-        [m]
-    young : float
-        [Pa]
-    poisson : float
-
-    Returns
-    -------
-    dict
-        ``torsional`` [N m/rad] and ``lateral`` [N/m], as `StageCoupling` takes them.
-
-    Raises
-    ------
-    CaseError
-        Lengths or moduli that no shaft has (E-COUPLING).
-    """
-    if not all(math.isfinite(one) and one > 0.0 for one in (diameter, length, young)):
-        _refuse(f"a shaft of {diameter} m by {length} m and {young} Pa", "finite and above 0")
-    if not -1.0 < poisson <= 0.5:
-        _refuse(f"Poisson's ratio of {poisson}", "above -1, 0.5 or less")
-    shear = young / (2.0 * (1.0 + poisson))
-    polar = math.pi * diameter**4 / 32.0
-    bending = 12.0 * young * 0.5 * polar
-    kappa = 6.0 * (1.0 + poisson) / (7.0 + 6.0 * poisson)
-    phi = bending / (kappa * shear * 0.25 * math.pi * diameter**2 * length**2)
-    return {"torsional": shear * polar / length, "lateral": bending / (length**3 * (1.0 + phi))}
 
 
 def _checked_teeth(data: PlanarSet, teeth) -> tuple[int, int, int]:
@@ -677,7 +637,7 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
             raise CaseError(
                 f"the centres of {one.first} and {one.second} are one, in frames of different speeds",
                 code="E-COUPLING", key=f"couplings[{number}].lateral", limit="a finite stiffness",
-                remedy="give the stiffness of the shaft, see shaft_stiffness",
+                remedy="give the stiffness of the shaft",
             )  # fmt: skip
         found[number] = float(relative)
     return found
@@ -707,25 +667,6 @@ def stage_slices(data: MultistageSet) -> tuple[slice, ...]:
     """Rows of `joined_motions` that belong to every stage."""
     ends = np.cumsum([0] + [free_motions(stage.data).shape[1] for stage in data.stages])
     return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-
-
-def multistage_springs(data: MultistageSet) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the train at rest by name, for `femgear.solvers.linear.tracking.strain_shares`.
-
-    Returns
-    -------
-    dict of str to (columns (n, g), stiffness (g,))
-        Those of `planar_springs` of every stage, and the elastic couplings.
-    """
-    Z, springs = joined_motions(data), {}
-    for number, (stage, rows) in enumerate(zip(data.stages, stage_slices(data)), 1):
-        for name, (columns, stiffness) in planar_springs(stage.data).items():
-            springs[f"stage {number} {name}"] = (Z[rows].T @ columns, stiffness)
-    for coupling in data.couplings:
-        columns, stiffness = _springs(data, coupling, lateral=True)
-        if len(stiffness):
-            springs[f"{coupling.first} to {coupling.second}"] = (Z.T @ columns, stiffness)
-    return springs
 
 
 def _centrifugal_stiffness(data: MultistageSet, carrier: np.ndarray) -> np.ndarray:
@@ -829,84 +770,3 @@ def _names(data: MultistageSet, Z: np.ndarray) -> tuple[str, ...]:
         all_names = planar_dofs(stage.data.n_planets)
         names += [f"stage {number} {all_names[row]}" for row in own]
     return tuple(names[row] for row in np.argmax(Z == 1.0, axis=0))
-
-
-@dataclass(frozen=True)
-class TurningSprings:
-    """Isotropic springs between centres whose coordinates turn against one another.
-
-    With ``z = x + i y``, ``d = z_1 - z_2 exp(i phi)`` in the first frame and phi the angle of the second
-    frame seen from the first; the forces are ``k d`` on the first and ``-k d exp(-i phi)`` on the second
-    centre, of the energy ``k |d|^2 / 2``.
-
-    Parameters
-    ----------
-    columns : (g, 4) int array
-        x and y of the first, x and y of the second centre.
-    stiffness : (g,) array
-        [N/m]
-    wave : FourierSeries
-        ``cos phi`` and ``sin phi``, from `turning_wave`.
-
-    Raises
-    ------
-    CaseError
-        Columns that do not fit (E-SHAPE), stiffnesses out of range (E-COUPLING).
-    """
-
-    columns: np.ndarray
-    stiffness: np.ndarray
-    wave: FourierSeries
-
-    # the law is linear in the deflections: a grid of few samples is exact
-    degree = 1
-
-    def __post_init__(self):
-        columns = np.atleast_2d(np.array(self.columns))
-        stiffness = np.atleast_1d(np.array(self.stiffness, float))
-        if columns.shape != (len(stiffness), 4) or not np.issubdtype(columns.dtype, np.integer):
-            raise CaseError(
-                f"columns {columns.tolist()} for {len(stiffness)} springs", code="E-SHAPE",
-                limit="four column numbers of W a spring",
-            )  # fmt: skip
-        if not np.all(np.isfinite(stiffness)) or np.any(stiffness < 0.0):
-            raise CaseError(
-                f"lateral stiffnesses {stiffness.tolist()} N/m", code="E-COUPLING", limit="finite, 0 or more"
-            )
-        for name, value in (("columns", columns), ("stiffness", stiffness)):
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
-
-    @property
-    def reference(self) -> np.ndarray:
-        """Every centre held by its spring, (g, 4) [N/m]."""
-        return np.repeat(self.stiffness[:, None], 4, axis=1)
-
-    def evaluate(self, x, theta):
-        """Forces (..., g, 4) and tangents (..., g, 4, 4)."""
-        c, s = np.moveaxis(self.wave.at(theta), -1, 0)
-        # d = D x with x = (x_1, y_1, x_2, y_2)
-        D = np.zeros((*c.shape, 2, 4))
-        D[..., 0, 0] = D[..., 1, 1] = 1.0
-        D[..., 0, 2], D[..., 0, 3] = -c, s
-        D[..., 1, 2], D[..., 1, 3] = -s, -c
-        square = np.swapaxes(D, -1, -2) @ D
-        tangent = self.stiffness[:, None, None] * square[..., None, :, :]
-        force = (tangent @ x[..., None])[..., 0]
-        return force, np.broadcast_to(tangent, (*force.shape, 4))
-
-
-def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSeries:
-    """Cosine and sine of ``phi = phase + orders . theta``.
-
-    Parameters
-    ----------
-    orders : tuple of int
-        Multiples of the base frequencies; negative ones for a frame that turns clockwise.
-    phase : float
-        phi at time zero [rad].
-    """
-    if not math.isfinite(phase):
-        raise CaseError(f"a phase of {phase} rad", code="E-VALUE", key="phase", limit="finite")
-    turned = np.exp(1j * phase)
-    return FourierSeries(np.array([[0.0, turned], [0.0, -1j * turned]]), orders)

@@ -27,13 +27,14 @@ from femgear.case.fields import (
 from femgear.case.problems import checked_case
 from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
 from femgear.case.text import ReadCase
-from femgear.case.units import ANGLE, DENSITY, INERTIA, LENGTH, SPEED, STIFFNESS, TORQUE, TORSION
+from femgear.case.units import ANGLE, LENGTH, SPEED, STIFFNESS, TORQUE, TORSION
 from femgear.errors import CaseError, FemgearError
 from femgear.gears.fillet import BasicRack
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.system.lumped import PlanarBody, PlanarSet
+from femgear.system.shaft import ShaftSection, joint_springs
 from femgear.trains.multistage.model import (
     STIFFEST,
     Member,
@@ -42,7 +43,6 @@ from femgear.trains.multistage.model import (
     StageCoupling,
     check_turns,
     in_series,
-    shaft_stiffness,
     stage_of_set,
     train_torques,
 )
@@ -65,31 +65,22 @@ MemberName = Annotated[str, BeforeValidator(_member)]
 Length = Quantity(LENGTH, 1e-4, 20.0)
 Speed = Quantity(SPEED, 1e-3 * _RPM, 1e6 * _RPM)
 Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
-Support = StiffnessOrRigid(STIFFNESS, 0.0, 1e15)
 
 
-class DiscSection(Section):
-    """Mass and inertia of a body, or those of a disc with a hole; ``added_inertia`` comes on top."""
-
-    mass: Mass | None = None
-    inertia: Inertia | None = None
-    outer_diameter: Length | None = None
-    inner_diameter: Quantity(LENGTH, 0.0, 20.0) = 0.0
-    width: Length | None = None
-    density: Quantity(DENSITY, 100.0, 25000.0) = 7850.0
-    added_inertia: Quantity(INERTIA, 0.0, 1e8) = 0.0
-
-
-class BodySection(DiscSection):
+class BodySection(Section):
     """Sun, ring or carrier, and the stiffnesses that hold it in the housing."""
 
-    support_stiffness: Support = 0.0
+    mass: Mass
+    inertia: Inertia
+    support_stiffness: StiffnessOrRigid(STIFFNESS, 0.0, 1e15) = 0.0
     torsional_stiffness: StiffnessOrRigid(TORSION, 0.0, 1e15) = 0.0
 
 
-class PlanetSection(DiscSection):
+class PlanetSection(Section):
     """One of the equal planets on its bearing."""
 
+    mass: Mass
+    inertia: Inertia
     bearing_stiffness: StiffnessOrRigid(STIFFNESS, 1.0, 1e15)
 
 
@@ -192,8 +183,6 @@ def cross_check(case: MultistageCase) -> Iterator[CaseError]:
 def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
     for n, stage in enumerate(case.stage):
         yield from _sizes(stage, f"stage[{n}]")
-        for name in ("sun", "planet", "ring", "carrier"):
-            yield from _disc_problems(getattr(stage, name), f"stage[{n}].{name}")
     named = [(f"coupling[{n}].between", one) for n, c in enumerate(case.coupling) for one in c.between]
     if case.operation is not None:
         named += [(f"operation.{key}", getattr(case.operation, key)) for key in ("input", "output")]
@@ -232,24 +221,6 @@ def _sizes(stage: StageSection, key: str) -> Iterator[CaseError]:
             yield CaseError(
                 f"a stage with {size} needs it", code="E-KEY-MISSING", key=f"{key}.{name}", remedy="add it"
             )
-
-
-def _disc_problems(body: DiscSection, key: str) -> Iterator[CaseError]:
-    given = [body.mass is not None, body.inertia is not None]
-    disc = [body.outer_diameter is not None, body.width is not None]
-    if (all(given), any(given), all(disc), any(disc)) not in (
-        (True, True, False, False),
-        (False, False, True, True),
-    ):
-        yield CaseError(
-            "the mass of the body is needed once", code="E-CHOICE", key=key,
-            limit="mass and inertia, or outer_diameter and width",
-        )  # fmt: skip
-    elif all(disc) and not body.inner_diameter < body.outer_diameter:
-        yield CaseError(
-            "the hole is as large as the disc", code="E-RANGE", key=f"{key}.inner_diameter",
-            value=LENGTH.show(body.inner_diameter), limit=f"below {LENGTH.show(body.outer_diameter)}",
-        )  # fmt: skip
 
 
 def multistage_of(case: MultistageCase) -> MultistageSet:
@@ -296,7 +267,12 @@ def _member_of(text: str) -> Member:
 
 def _coupling(one: CouplingSection) -> StageCoupling:
     given = {name: getattr(one, name) for name in ("torsional", "lateral") if getattr(one, name) is not None}
-    springs = {} if one.diameter is None else shaft_stiffness(one.diameter, one.length)
+    springs = {}
+    if one.diameter is not None and one.length is not None:
+        # ends that do not tilt: Timoshenko's beam (Przemieniecki, Theory of Matrix Structural Analysis, 5.6)
+        shaft, length = ShaftSection(one.diameter), one.length
+        bending = 12.0 * shaft.young * shaft.second_moment / (length**3 * (1.0 + shaft.shear_ratio(length)))
+        springs = {"torsional": joint_springs(shaft, length).torsion, "lateral": bending}
     return StageCoupling(*map(_member_of, one.between), **springs | given)
 
 
@@ -328,10 +304,10 @@ def _planet_angles(stage: StageSection) -> tuple[float, ...]:
 
 def _stage(stage: StageSection) -> Stage:
     bodies = {
-        name: PlanarBody(*_inertia(one), one.support_stiffness, one.torsional_stiffness)
+        name: PlanarBody(one.mass, one.inertia, one.support_stiffness, one.torsional_stiffness)
         for name, one in (("sun", stage.sun), ("ring", stage.ring), ("carrier", stage.carrier))
     }
-    bodies["planet"] = PlanarBody(*_inertia(stage.planet))
+    bodies["planet"] = PlanarBody(stage.planet.mass, stage.planet.inertia)
     fixed = None if stage.fixed == "none" else stage.fixed
     given = stage.mesh_stiffness
     if stage.module is not None:
@@ -363,12 +339,3 @@ def _iso_stiffness(stage: StageSection, gears: PlanetarySet) -> list[float]:
         stage.face_width * mesh_stiffness_method_b(*pair, ratio, pressure_angle=stage.pressure_angle)[1]
         for pair, ratio in zip(pairs, ratios)
     ]
-
-
-def _inertia(body: DiscSection) -> tuple[float, float]:
-    """Mass [kg] and polar inertia [kg m^2]."""
-    if body.mass is not None:
-        return body.mass, body.inertia + body.added_inertia
-    outer, inner = 0.5 * body.outer_diameter, 0.5 * body.inner_diameter
-    mass = body.density * math.pi * (outer**2 - inner**2) * body.width
-    return mass, 0.5 * mass * (outer**2 + inner**2) + body.added_inertia

@@ -17,7 +17,7 @@ from femgear.errors import CaseError
 from femgear.solvers.linear.frequency_response import MeshErrorResponse, modal_response
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
 from femgear.system.assembler import planar_meshes, planar_system
-from femgear.system.elements import GearMeshes
+from femgear.system.elements import GearMeshes, TurningSprings, turning_wave
 from femgear.system.entries import checked_numbers
 from femgear.system.mode_kinds import class_energies, named_kinds, planar_motions
 from femgear.system.nonlinear import NonlinearSystem
@@ -27,7 +27,6 @@ from femgear.threads import one_blas_thread
 from femgear.trains.multistage.model import (
     MultistageSet,
     Stage,
-    TurningSprings,
     joined_motions,
     mean_mesh_stiffness,
     mesh_columns,
@@ -36,7 +35,6 @@ from femgear.trains.multistage.model import (
     train_speeds,
     train_torques,
     turning_couplings,
-    turning_wave,
 )
 from femgear.trains.multistage.results import (
     BalanceResult,
