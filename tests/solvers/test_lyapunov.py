@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from trains import example_pair, lightly_loaded_pair
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.chaos.lyapunov import lyapunov_exponents
@@ -11,7 +12,6 @@ from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.nonlinear import HarmonicForce, NonlinearSystem
 from femgear.system.series import FourierSeries, constant
 from femgear.system.system import MechanicalSystem
-from femgear.trains.gear_pair.model import example_pair, lightly_loaded_pair
 
 
 def oscillator(element, damping, force=0.0):

@@ -28,7 +28,8 @@ from pydantic import (
 )
 
 from femgear.case import text
-from femgear.case.fields import Count, Number, Quantity, StiffnessOrRigid, Title, described, refuse
+from femgear.case.fields import Count, Number, Quantity, Title, described, refuse
+from femgear.case.fields import StiffnessOrRigid as Stiffness
 from femgear.case.problems import combine, translate
 from femgear.case.tables import Columns, embedded, read_columns
 from femgear.case.text import ReadCase, text_with_points
@@ -105,7 +106,7 @@ Offset = Quantity(LENGTH, -100.0, 100.0)
 Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
 PressureAngle = Quantity(ANGLE, math.radians(5), math.radians(45))
 Teeth = Count(4, 5000)
-Joint = StiffnessOrRigid(TORSION, 1e-3, 1e15)
+Joint = Stiffness(TORSION, 1e-3, 1e15)
 Torque = Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)
 Time = Quantity(TIME, 0.0, LATEST)
 Frequency = Quantity(FREQUENCY, 1e-3, 1e7)
@@ -158,7 +159,7 @@ class ShaftSection(_Section):
     length: Length
     bending: Joint | None = None
     torsion: Joint | None = None
-    shear: StiffnessOrRigid(STIFFNESS, 1.0, 1e15) | None = None
+    shear: Stiffness(STIFFNESS, 1.0, 1e15) | None = None
     shear_ratio: Number(0.0, 100.0) = 0.0
     outer_diameter: Radius | None = None
     inner_diameter: Quantity(LENGTH, 0.0, 100.0) = 0.0
@@ -217,7 +218,7 @@ class PlanetarySection(_Section):
     planet_mass: Mass
     planet_inertia: Inertia
     planet_transverse_inertia: Quantity(INERTIA, 0.0, 1e11) = 0.0
-    planet_bearing: StiffnessOrRigid(STIFFNESS, 1.0, 1e15) = math.inf
+    planet_bearing: Stiffness(STIFFNESS, 1.0, 1e15) = math.inf
     sun_mesh: MeshSection
     ring_mesh: MeshSection
     pressure_angle: PressureAngle = math.radians(20.0)
@@ -235,8 +236,8 @@ class BearingSection(_Section):
     body: Reference | None = None
     shaft: Pair(Reference) | None = None
     station: Count(1, 99) | None = None
-    radial: StiffnessOrRigid(STIFFNESS, 0.0, 1e15) = 0.0
-    tilt: StiffnessOrRigid(TORSION, 0.0, 1e15) = 0.0
+    radial: Stiffness(STIFFNESS, 0.0, 1e15) = 0.0
+    tilt: Stiffness(TORSION, 0.0, 1e15) = 0.0
     offset: Offset = 0.0
 
 
@@ -323,8 +324,12 @@ def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True)
         Everything that is wrong, at once.
     """
     lines = text if numbered else ""
-    if data.get("model") != MODEL:
-        raise combine([_unknown_model(data.get("model"))], lines, name)
+    if "model" not in data:
+        remedy = f'write model = "{MODEL}" before the first table'
+        missing = CaseError(
+            "a file with bodies needs its model", code="E-KEY-MISSING", key="model", remedy=remedy
+        )
+        raise combine([missing], lines, name)
     files = embed_torques(data, name)
     if files:
         text = text_with_points(data, name, points="torque series", remedy="give them at fewer points")
@@ -339,27 +344,8 @@ def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True)
 
 
 def is_drivetrain(data: dict) -> bool:
-    """Whether tables name a model, or have bodies, of which planetary sets have none."""
-    return "model" in data or isinstance(data.get("body"), list)
-
-
-def _unknown_model(value: object) -> CaseError:
-    if value is None:
-        remedy = f'write model = "{MODEL}" before the first table'
-        return CaseError(
-            "a file with bodies needs its model", code="E-KEY-MISSING", key="model", remedy=remedy
-        )
-    if not isinstance(value, str):
-        return CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", key="model", value=value)
-    near = difflib.get_close_matches(value.lower(), [MODEL], n=1, cutoff=0.6)
-    return CaseError(
-        "there is no such model",
-        code="E-CHOICE",
-        key="model",
-        value=value,
-        limit=f'"{MODEL}"; planetary sets have no entry model',
-        remedy=f"did you mean {near[0]}?" if near else "leave it out",
-    )
+    """Whether tables name this model, or have bodies, of which planetary sets have none."""
+    return data.get("model", MODEL) == MODEL and ("model" in data or isinstance(data.get("body"), list))
 
 
 def need_drivetrain(case: object) -> DrivetrainCase:

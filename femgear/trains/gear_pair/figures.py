@@ -1,4 +1,4 @@
-"""Figures of impacts: amplitude and mean over frequency, contact states, sections and exponents, spectra."""
+"""Figures of impacts: amplitude and mean over frequency, contact states, sections and exponents."""
 
 from __future__ import annotations
 
@@ -78,20 +78,15 @@ def amplitude_and_mean(
     return figure
 
 
-def state_bands(rows: Sequence[tuple], names: Sequence[str], *, x: str = "frequency ratio [1]"):
-    """Contact state over frequency, one band a row.
+def state_bands(rows: Sequence[tuple]) -> Figure:
+    """Contact state over the frequency ratio, one band a row.
+
+    A border is drawn halfway between two ratios; sparse rows show these as dots.
 
     Parameters
     ----------
-    rows : sequence of (text, parameter (p,), state (p,) int)
-        Sweeps, or pieces of a curve between limit points.
-    names : sequence of str
-        Of states 0, 1 and 2, and of 3 where one is not known. A border is drawn halfway between two
-        parameters; sparse rows show these as dots.
-
-    Returns
-    -------
-    Figure
+    rows : sequence of (text, ratio (p,), state (p,) int)
+        Sweeps, or pieces of a curve between limit points; numbers of states in `STATE_NAMES`.
     """
     figure, (ax,) = new_figure(width=8.5, height=1.6 + 0.5 * len(rows))
     marked = False
@@ -106,13 +101,13 @@ def state_bands(rows: Sequence[tuple], names: Sequence[str], *, x: str = "freque
             ax.plot(at, np.full(len(at), place), **mark, label=None if marked else "computed ratios")
             marked = True
     present = {int(one) for _, _, state in rows for one in np.unique(state)}
-    for number, (colour, name) in enumerate(zip(STATE_COLOURS, names)):
+    for number, (colour, name) in enumerate(zip(STATE_COLOURS, STATE_NAMES)):
         if number < 3 or number in present:
             ax.barh([0], [0.0], color=colour, label=name)
     ax.set_yticks(range(len(rows)), [text for text, _, _ in rows])
     ax.invert_yaxis()
     ax.grid(False, axis="y")
-    label(ax, x)
+    label(ax, "frequency ratio [1]")
     legend_below(figure, columns=3)
     return figure
 
@@ -200,7 +195,7 @@ def draw_response(drawn: Drawn) -> dict[str, Figure]:
 def draw_states(drawn: Drawn) -> dict[str, Figure]:
     """Contact states along the branch and in the sweeps."""
     rows = contact_rows(drawn.data.get("response"), drawn.data["sweep"])
-    return {"contact_states": state_bands(rows, STATE_NAMES)}
+    return {"contact_states": state_bands(rows)}
 
 
 def draw_chaos(drawn: Drawn) -> dict[str, Figure]:

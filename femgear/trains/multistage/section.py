@@ -29,6 +29,7 @@ from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, R
 from femgear.case.text import ReadCase
 from femgear.case.units import ANGLE, LENGTH, SPEED, STIFFNESS, TORQUE, TORSION
 from femgear.errors import CaseError, FemgearError
+from femgear.gears.checks import check_set
 from femgear.gears.fillet import BasicRack
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import mesh_stiffness_method_b
@@ -50,6 +51,16 @@ from femgear.trains.multistage.model import (
 MODEL = "multistage"
 _MEMBER = re.compile(r"stage ([1-9]\d?) (carrier|ring|sun)")
 _RPM = SPEED.scale
+# entries of the file for those that refusals of gears and of lumped sets name
+_ENTRIES = {
+    "profile_shift": "profile_shifts", "centre_distance": "profile_shifts", "teeth": "teeth",
+    "root_radius": "addendum", "tip_diameter": "addendum", "rim_radius": "module",
+}  # fmt: skip
+_REMEDIES = {
+    "E-COAXIAL": "choose teeth with sun + 2 planet = ring, or profile shifts that close the set",
+    "E-FILLET": "reduce the addendum of that gear",
+    "E-POINTED": "change the profile shift of that gear, or reduce its addendum",
+}
 
 
 def _member(value: object) -> str:
@@ -252,10 +263,12 @@ def _named(make, key: str, section):
     try:
         return make(section)
     except FemgearError as error:
-        entry = (error.key or "").replace("torsional_support", "torsional_stiffness")
+        entry = (error.key or "").removeprefix("set.").replace("torsional_support", "torsional_stiffness")
+        entry = _ENTRIES.get(entry.rpartition(".")[2], entry)
+        remedy, value = _REMEDIES.get(error.code, error.remedy), error.value
         raise CaseError(
-            error.message, code=error.code, key=f"{key}.{entry}" if entry else key, value=error.value,
-            limit=error.limit, remedy=error.remedy,
+            error.message, code=error.code, key=f"{key}.{entry}" if entry else key,
+            value=None if error.code in _REMEDIES else value, limit=error.limit, remedy=remedy,
         ) from None  # fmt: skip
 
 
@@ -288,14 +301,17 @@ def stage_gears(stage: StageSection) -> PlanetarySet:
             profile_shift=shift,
             face_width=stage.face_width,
             rim_radius=rim,
-            internal=number == 2,
+            internal=name == "ring",
             rack=BasicRack(addendum=addendum),
+            name=name,
         )
-        for number, (z, shift, rim, addendum) in enumerate(
-            zip(stage.teeth, stage.profile_shifts, rims, stage.addendum)
+        for name, z, shift, rim, addendum in zip(
+            ("sun", "planet", "ring"), stage.teeth, stage.profile_shifts, rims, stage.addendum
         )
     ]
-    return close_set(*gears, planet_angles=_planet_angles(stage))
+    closed = close_set(*gears, planet_angles=_planet_angles(stage))
+    check_set(closed)
+    return closed
 
 
 def _planet_angles(stage: StageSection) -> tuple[float, ...]:
