@@ -31,10 +31,12 @@ def test_gears_phases_and_stiffness_follow_from_the_module(case):
     assert registry.train_of(case) is MULTISTAGE and case.geared
     for stage, section in zip(train.stages, case.stage):
         gears = stage_gears(section)
-        assert stage.teeth == section.teeth and stage.fixed == "ring"
+        assert stage.teeth == section.gears.teeth and stage.fixed == "ring"
         assert stage.data.sun_radius == gears.sun.base_radius
         assert stage.phases == pytest.approx(gears.mesh_phases)
-    given = with_value(case, "stage[0].mesh_stiffness", {"sun_planet": "3e8 N/m", "planet_ring": "5e8 N/m"})
+    given = with_value(
+        case, "stage[0].gears.mesh_stiffness", {"sun_planet": "3e8 N/m", "planet_ring": "5e8 N/m"}
+    )
     assert multistage_of(given).stages[0].data.mesh_stiffness.tolist() == [3e8] * 3 + [5e8] * 3
 
 
@@ -79,15 +81,21 @@ def test_text_of_a_case_gives_it_again(case, printed):
     [
         ("stage", [], "E-RANGE", "stage"),
         ("stage[0].planets", 0, "E-RANGE", "stage[0].planets"),
-        ("stage[1].teeth", [21, 33], "E-RANGE", "stage[1].teeth"),
-        ("stage[1].teeth", None, "E-KEY-MISSING", "stage[1].teeth"),
-        ("stage[1].face_width", None, "E-KEY-MISSING", "stage[1].face_width"),
-        ("stage[1].module", 5, "E-UNIT", "stage[1].module"),
-        ("stage[1].base_radii", ["20 mm", "30 mm"], "E-CHOICE", "stage[1].module"),
-        ("stage[1].teeth", [21, 33, 86], "E-COAXIAL", "stage[1].profile_shifts"),
+        ("stage[1].gears.teeth", [21, 33], "E-RANGE", "stage[1].gears.teeth"),
+        ("stage[1].gears.teeth", None, "E-KEY-MISSING", "stage[1].gears.teeth"),
+        ("stage[1].gears.face_width", None, "E-KEY-MISSING", "stage[1].gears.face_width"),
+        ("stage[1].gears.module", 5, "E-UNIT", "stage[1].gears.module"),
+        ("stage[1].gears", None, "E-CHOICE", "stage[1].gears"),
+        (
+            "stage[1].radii",
+            {"sun": "20 mm", "planet": "30 mm"},
+            "E-KEY-MISSING",
+            "stage[1].radii.mesh_stiffness",
+        ),
+        ("stage[1].gears.teeth", [21, 33, 86], "E-COAXIAL", "stage[1].gears.profile_shifts"),
         ("stage[1].planets", 7, "E-NEIGHBOURS", "stage[1].planets"),
-        ("stage[1].addendum", [1.0, 1.0, 1.0], "E-FILLET", "stage[1].addendum"),
-        ("stage[1].profile_shifts", [3.0, 0.0, 0.0], "E-POINTED", "stage[1].profile_shifts"),
+        ("stage[1].gears.addendum", [1.0, 1.0, 1.0], "E-FILLET", "stage[1].gears.addendum"),
+        ("stage[1].gears.profile_shifts", [3.0, 0.0, 0.0], "E-POINTED", "stage[1].gears.profile_shifts"),
         ("stage[1].fixed", "planet", "E-CHOICE", "stage[1].fixed"),
         ("stage[1].fixed", "carrier", "E-MECHANISM", "stage[1].carrier.torsional_stiffness"),
         ("stage[1].planet_angles", ["0 deg", "0 deg"], "E-ANGLES", "stage[1].planet_angles"),
@@ -140,7 +148,7 @@ def test_mistakes_name_file_line_and_key(tmp_path, capsys):
     path.write_text(text.replace('module = "5 mm"', 'modul = "5 mm"'), encoding="utf-8")
     assert cli.main(["check", str(path)]) == 2
     said, line = capsys.readouterr().err, text[: text.index('module = "5 mm"')].count("\n") + 1
-    assert f"wrong.toml:{line}: stage[1].modul" in said and "did you mean module?" in said
+    assert f"wrong.toml:{line}: stage[1].gears.modul" in said and "did you mean module?" in said
     path.write_text(text.replace('model = "multistage"', 'model = "multistages"'), encoding="utf-8")
     assert cli.main(["check", str(path)]) == 2
     said = capsys.readouterr().err

@@ -60,8 +60,10 @@ def published_table():
     for one in tomllib.loads((CASES / "published_four_stages.toml").read_text(encoding="utf-8"))["stage"]:
         texts = {f"{name} {entry}": one[name][entry] for name in ("sun", "planet", "carrier")
                  for entry in ("mass", "inertia")}  # fmt: skip
-        texts |= dict(zip(("sun base radius", "planet base radius"), one["base_radii"]))
-        stiffness = one["mesh_stiffness"]
+        texts |= dict(
+            zip(("sun base radius", "planet base radius"), (one["radii"]["sun"], one["radii"]["planet"]))
+        )
+        stiffness = one["radii"]["mesh_stiffness"]
         texts["external mesh stiffness"] = stiffness["sun_planet"]
         texts["internal mesh stiffness"] = stiffness["planet_ring"]
         rows.append({name: float(text.split()[0]) for name, text in texts.items()})

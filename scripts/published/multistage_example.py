@@ -57,8 +57,8 @@ def published_case(*, planets: int, stiffness_unit: float = 1e3, held: bool = Fa
     case, values = read_case(CASES / "published_four_stages.toml"), {}
     for n, stage in enumerate(case.stage):
         values[f"stage[{n}].planets"] = planets
-        for name, printed in stage.mesh_stiffness:
-            values[f"stage[{n}].mesh_stiffness.{name}"] = f"{printed / 1e3 * stiffness_unit!r} N/m"
+        for name, printed in stage.radii.mesh_stiffness:
+            values[f"stage[{n}].radii.mesh_stiffness.{name}"] = f"{printed / 1e3 * stiffness_unit!r} N/m"
     if held:
         values["stage[3].carrier.torsional_stiffness"] = "rigid"
     return with_values(case, values)

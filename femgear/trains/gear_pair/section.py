@@ -17,7 +17,6 @@ from femgear.case.units import ANGLE, LENGTH, STIFFNESS, TORQUE
 from femgear.errors import CaseError
 from femgear.trains.gear_pair.model import ImpactPair, PairBearings, PairScales, pair_scales
 
-MODEL = "gear_pair"
 Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
 Ratio = Number(1e-3, 100.0)
 Steps = Count(20, 10_000)
@@ -96,7 +95,7 @@ class GearPairCase(Section, ReadCase):
     """
 
     format: Count(1, 2**31) = FORMAT
-    model: Literal[MODEL]
+    model: Literal["gear_pair"]
     title: Title
     gears: GearsSection
     mesh: MeshSection

@@ -23,7 +23,7 @@ from femgear.system.contact_states import (
 )
 from femgear.threads import one_blas_thread
 from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
-from femgear.trains.gear_pair.section import MODEL, GearPairCase, build_gear_pair, pair_of, scales_of
+from femgear.trains.gear_pair.section import GearPairCase, build_gear_pair, pair_of, scales_of
 from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
 
 if TYPE_CHECKING:
@@ -350,11 +350,11 @@ def _figures() -> Mapping[str, Figures]:
 
 
 GEAR_PAIR = Train(
-    name=MODEL,
+    name="gear_pair",
     words="a gear pair",
     model=GearPairCase,
     own_file=OwnFile(
-        lambda data: data.get("model") == MODEL, build_gear_pair, GearPairCase.model_json_schema
+        lambda data: data.get("model") == "gear_pair", build_gear_pair, GearPairCase.model_json_schema
     ),
     stages=(
         Stage(

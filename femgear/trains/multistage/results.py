@@ -73,30 +73,24 @@ class MultistageModes:
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc."""
-        modes, stages = self.modes, np.arange(1, len(self.share) + 1)
-        parts = [*(f"meshes of stage {n}" for n in stages), "supports, bearings and couplings"]
+        modes, along = self.modes, ("mode",)
+        parts = [*(f"meshes of stage {n}" for n in _stages(self.data)), "supports, bearings and couplings"]
+        deflection, numbers = modes.mesh_deflection, np.arange(1, len(modes.frequency) + 1)
         variables = {
-            "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
-            "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
-            "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
-            "main_stage": (("mode",), self.stage, "1", "stage with most of the kinetic energy"),
+            "frequency": (along, modes.frequency, "Hz", "undamped natural frequency"),
+            "damping_ratio": (along, modes.damping_ratio, "1", "fraction of critical damping"),
+            "kind": (along, list(modes.kind), "1", "kind of mode"),
+            "main_stage": (along, self.stage, "1", "stage with most of the kinetic energy"),
             "energy": (("stage", "mode"), self.share, "1", "share of the stage in the kinetic energy"),
             "strain": (("part", "mode"), self.strain, "1", "share in the strain energy"),
             "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
-            "mesh_deflection": (
-                ("mesh", "mode"),
-                modes.mesh_deflection,
-                "kg^-1/2",
-                "mesh deflection of the mode",
-            ),
+            "mesh_deflection": (("mesh", "mode"), deflection, "kg^-1/2", "mesh deflection of the mode"),
             "mesh_stiffness": (("mesh",), mean_mesh_stiffness(self.data), "N/m", "mean mesh stiffness"),
         }
-        coords = {
-            "mode": (("mode",), np.arange(1, len(modes.frequency) + 1), "1", "mode"),
-            "stage": (("stage",), stages, "1", "stage"),
+        coords = _coordinates(self.data) | {
+            "mode": (along, numbers, "1", "mode"),
             "part": (("part",), parts, "1", "part of the train"),
             "dof": (("dof",), list(multistage_system(self.data).dofs), "1", "degree of freedom"),
-            "mesh": _meshes(self.data),
         }
         attrs = {"title": "modes of the train at rest, mean mesh stiffness", "unknowns": len(modes.shape)}
         return dataset(variables, coords, attrs)
@@ -113,41 +107,32 @@ class ResponseResult:
     @property
     def forces(self) -> dict[str, np.ndarray]:
         """Root mean squares (F, S) of the force in sun-planet 1 of every stage, by the stage that excites."""
-        first = [columns[0] for columns in mesh_columns(self.data)]
-        squares = {
-            n: 0.5 * (np.abs(one.force[..., first]) ** 2).sum(axis=1) for n, one in self.answers.items()
-        }
-        forces = {"all stages": np.sqrt(sum(squares.values()))}
-        return forces | {f"meshes of stage {n}": np.sqrt(square) for n, square in squares.items()}
+        first, squares = _first_meshes(self.data), {}
+        for n, one in self.answers.items():
+            squares[f"meshes of stage {n}"] = 0.5 * (np.abs(one.force[..., first]) ** 2).sum(axis=1)
+        total = {"all stages": np.sqrt(sum(squares.values()))}
+        return total | {text: np.sqrt(square) for text, square in squares.items()}
 
     def dataset(self) -> xr.Dataset:
         """Contents of response.nc."""
-        force = np.array([one.force for one in self.answers.values()])
-        forces = self.forces
-        dims = ("excited_by", "speed", "harmonic", "mesh")
-        mesh = np.array([one.mesh_frequency for one in self.answers.values()])
-        rms = ("excited_by", "speed", "stage")
+        answers, along = list(self.answers.values()), ("excited_by", "speed")
+        total, *single = self.forces.values()
+        words = "r.m.s. of the force in sun-planet 1 of every stage"
+        hertz = [one.mesh_frequency for one in answers]
         variables = {
-            "mesh_frequency": (("excited_by", "speed"), mesh, "Hz", "mesh frequency of the stage"),
-            "first_force": (
-                rms, list(forces.values())[1:], "N", "r.m.s. of the force in sun-planet 1 of every stage",
-            ),
-            "total_force": (
-                rms[1:], forces["all stages"], "N", "the same where the meshes of all stages excite",
-            ),
-        }  # fmt: skip
-        coords = {
+            "mesh_frequency": (along, hertz, "Hz", "mesh frequency of the stage that excites"),
+            "first_force": ((*along, "stage"), single, "N", words),
+            "total_force": (("speed", "stage"), total, "N", f"{words}, meshes of all stages"),
+        }
+        force = np.array([one.force for one in answers])
+        lines = [("mesh_force", (*along, "harmonic", "mesh"), force, "N", "dynamic mesh force")]
+        coords = _coordinates(self.data, self.speed) | {
             "excited_by": (("excited_by",), list(self.answers), "1", "stage whose meshes excite"),
-            "speed": (("speed",), self.speed / RPM, "rpm", "speed of the input"),
-            "harmonic": (
-                ("harmonic",), next(iter(self.answers.values())).harmonics, "1", "of the mesh frequency",
-            ),
-            "stage": (("stage",), np.arange(1, len(self.data.stages) + 1), "1", "stage"),
-            "mesh": _meshes(self.data),
-        }  # fmt: skip
-        entries = [("mesh_force", dims, force, "N", "dynamic mesh force")]
+            "harmonic": (("harmonic",), answers[0].harmonics, "1", "of the mesh frequency"),
+        }
         attrs = {"title": "response to the transmission errors by modal summation"}
-        return dataset(variables | complex_entries(entries), coords, attrs | {"fourier_convention": FOURIER})
+        attrs["fourier_convention"] = FOURIER
+        return dataset(variables | complex_entries(lines), coords, attrs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,74 +151,74 @@ class BalanceResult:
     @property
     def forces(self) -> np.ndarray:
         """Root mean squares (F, S) of the force in sun-planet 1 of every stage; NaN where not converged."""
-        first = [columns[0] for columns in mesh_columns(self.data)]
-        rms = np.sqrt(0.5 * (np.abs(self.force[:, first, 1:]) ** 2).sum(axis=2))
-        return np.where(self.converged[:, None], rms, np.nan)
+        squares = np.abs(self.force[:, _first_meshes(self.data), 1:]) ** 2
+        return np.where(self.converged[:, None], np.sqrt(0.5 * squares.sum(axis=2)), np.nan)
 
     def dataset(self) -> xr.Dataset:
         """Contents of balance.nc."""
+        words = "r.m.s. of the force in sun-planet 1 of every stage"
         variables = {
             "orders": (("line", "stage"), self.orders, "1", "multiples of the mesh frequency of the stage"),
             "converged": (("speed",), self.converged, "1", "whether harmonic balance found a solution"),
-            "total_force": (
-                ("speed", "stage"), self.forces, "N", "r.m.s. of the force in sun-planet 1 of every stage",
-            ),
-        }  # fmt: skip
-        coords = {
-            "speed": (("speed",), self.speed / RPM, "rpm", "speed of the input"),
-            "stage": (("stage",), np.arange(1, len(self.data.stages) + 1), "1", "stage"),
-            "mesh": _meshes(self.data),
+            "total_force": (("speed", "stage"), self.forces, "N", words),
         }
-        entries = [("mesh_force", ("speed", "mesh", "line"), self.force, "N", "mesh force")]
+        lines = [("mesh_force", ("speed", "mesh", "line"), self.force, "N", "mesh force")]
         attrs = {"title": "response with the mesh stiffnesses k(t) by harmonic balance"}
-        return dataset(variables | complex_entries(entries), coords, attrs)
+        return dataset(variables | complex_entries(lines), _coordinates(self.data, self.speed), attrs)
 
 
-def _meshes(data: MultistageSet) -> tuple:
+def _stages(data: MultistageSet) -> range:
+    return range(1, len(data.stages) + 1)
+
+
+def _first_meshes(data: MultistageSet) -> list[int]:
+    """Columns of sun-planet 1 of every stage."""
+    return [int(columns[0]) for columns in mesh_columns(data)]
+
+
+def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
+    """Stages, meshes, and speeds of the input where there are some."""
     names = []
     for number, stage in enumerate(data.stages, 1):
         planets = range(1, stage.data.n_planets + 1)
         names += [f"stage {number} sun-planet {n}" for n in planets]
         names += [f"stage {number} planet {n}-ring" for n in planets]
-    return ("mesh",), names, "1", "gear mesh"
+    found = {"mesh": (("mesh",), names, "1", "gear mesh"), "stage": (("stage",), _stages(data), "1", "stage")}
+    if speed is not None:
+        found["speed"] = ("speed",), speed / RPM, "rpm", "speed of the input"
+    return found
 
 
 def describe_multistage(case: MultistageCase, train: MultistageSet) -> tuple[Block, ...]:
     """Title, stages with speeds and torques, couplings, and warnings of a case."""
     header = ["stage", "teeth", "planets", "fixed", "sun-planet [N/m]", "planet-ring [N/m]"]
-    columns = [
-        [str(n) for n in range(1, len(train.stages) + 1)],
-        ["/".join(map(str, one.teeth)) if one.teeth else "-" for one in train.stages],
-        [str(one.data.n_planets) for one in train.stages],
-        [one.fixed or "none" for one in train.stages],
-        [f"{one.data.stiffness_sun_planet[0]:.4g}" for one in train.stages],
-        [f"{one.data.stiffness_planet_ring[0]:.4g}" for one in train.stages],
-    ]
+    rows = []
+    for n, one in enumerate(train.stages, 1):
+        teeth, k = "/".join(map(str, one.teeth or ())), one.data.mesh_stiffness[[0, -1]]
+        fixed = one.fixed or "none"
+        rows.append([str(n), teeth or "-", str(one.data.n_planets), fixed, f"{k[0]:.4g}", f"{k[1]:.4g}"])
     notes: tuple[str, ...] = ()
     if case.operation is not None:
         speeds = train_speeds(train, case.operation.speed)
         torques = train_torques(train, case.operation.torque)
         header += ["sun [rpm]", "carrier [rpm]", "mesh [Hz]", "sun [N m]", "carrier [N m]"]
-        for values, text in (
-            (speeds.sun / RPM, ".3f"), (speeds.carrier / RPM, ".3f"), (speeds.mesh_frequency, ".3f"),
-            (torques.sun, ".1f"), (torques.carrier, ".1f"),
-        ):  # fmt: skip
-            columns.append([f"{value:{text}}" for value in values])
-        power = case.operation.torque * case.operation.speed
+        numbers = speeds.sun / RPM, speeds.carrier / RPM, speeds.mesh_frequency, torques.sun, torques.carrier
+        for row, values in zip(rows, zip(*numbers)):
+            row += [f"{value:.3f}" for value in values[:3]] + [f"{value:.1f}" for value in values[3:]]
+        power = 1e-3 * case.operation.torque * case.operation.speed
         notes = (
-            f"from {train.input} to {train.output}: ratio {speed_ratio(train):.6g}, {1e-3 * power:.4g} kW, "
-            f"output torque {torques.output:.6g} N m",
+            f"from {train.input} to {train.output}: ratio {speed_ratio(train):.6g}, {power:.4g} kW, output "
+            f"torque {torques.output:.6g} N m",
         )
     couplings = [
         (str(one.first), str(one.second), f"{one.torsional:.4g}", f"{one.lateral:.4g}")
         for one in train.couplings
     ]
-    warnings = tuple(multistage_warnings(case))
     return (
         Block(case.title),
-        Block("Stages", tuple(header), tuple(zip(*columns)), notes),
+        Block("Stages", tuple(header), tuple(map(tuple, rows)), notes),
         Block("Couplings", ("from", "to", "torsional [N m/rad]", "lateral [N/m]"), tuple(couplings)),
-        Block("Warnings", notes=warnings or ("none",)),
+        Block("Warnings", notes=tuple(multistage_warnings(case)) or ("none",)),
     )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -48,13 +48,12 @@ from femgear.trains.multistage.model import (
     train_torques,
 )
 
-MODEL = "multistage"
 _MEMBER = re.compile(r"stage ([1-9]\d?) (carrier|ring|sun)")
 _RPM = SPEED.scale
 # entries of the file for those that refusals of gears and of lumped sets name
 _ENTRIES = {
-    "profile_shift": "profile_shifts", "centre_distance": "profile_shifts", "teeth": "teeth",
-    "root_radius": "addendum", "tip_diameter": "addendum", "rim_radius": "module",
+    "profile_shift": "gears.profile_shifts", "centre_distance": "gears.profile_shifts",
+    "teeth": "gears.teeth", "root_radius": "gears.addendum", "tip_diameter": "gears.addendum",
 }  # fmt: skip
 _REMEDIES = {
     "E-COAXIAL": "choose teeth with sun + 2 planet = ring, or profile shifts that close the set",
@@ -76,6 +75,8 @@ MemberName = Annotated[str, BeforeValidator(_member)]
 Length = Quantity(LENGTH, 1e-4, 20.0)
 Speed = Quantity(SPEED, 1e-3 * _RPM, 1e6 * _RPM)
 Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
+PressureAngle = Quantity(ANGLE, math.radians(5), math.radians(45))
+Teeth = Count(4, 5000)
 
 
 class BodySection(Section):
@@ -95,25 +96,46 @@ class PlanetSection(Section):
     bearing_stiffness: StiffnessOrRigid(STIFFNESS, 1.0, 1e15)
 
 
+class GearsSection(Section):
+    """Gears of a stage: sun, planet, ring; mesh phases, contact ratios and stiffness follow from them."""
+
+    teeth: Several(Teeth, 3)
+    module: Quantity(LENGTH, 5e-5, 0.5)
+    face_width: Quantity(LENGTH, 1e-4, 5.0)
+    pressure_angle: PressureAngle = math.radians(20.0)
+    profile_shifts: Several(Number(-5.0, 5.0), 3) = (0.0, 0.0, 0.0)
+    addendum: Several(Number(0.1, 3.0), 3) = (1.0, 1.0, 1.0)
+    mesh_stiffness: MeshStiffnessSection | None = None
+
+
+class RadiiSection(Section):
+    """Base radii of sun and planet in place of gears; the ring's is that of the sun and two planets."""
+
+    sun: Radius
+    planet: Radius
+    pressure_angle: PressureAngle = math.radians(20.0)
+    teeth: Several(Teeth, 3) | None = None
+    mesh_stiffness: MeshStiffnessSection
+
+
 class StageSection(Section):
-    """A planetary set; its size by module and teeth, or by the base radii of sun and planet."""
+    """A planetary set."""
 
     planets: Count(1, 24) = 3
     planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
-    teeth: Several(Count(4, 5000), 3) | None = None
-    module: Quantity(LENGTH, 5e-5, 0.5) | None = None
-    base_radii: Several(Radius, 2) | None = None
-    pressure_angle: Quantity(ANGLE, math.radians(5), math.radians(45)) = math.radians(20.0)
-    profile_shifts: Several(Number(-5.0, 5.0), 3) = (0.0, 0.0, 0.0)
-    addendum: Several(Number(0.1, 3.0), 3) = (1.0, 1.0, 1.0)
-    face_width: Quantity(LENGTH, 1e-4, 5.0) | None = None
-    mesh_stiffness: MeshStiffnessSection | None = None
+    gears: GearsSection | None = None
+    radii: RadiiSection | None = None
     fixed: Literal["carrier", "ring", "sun", "none"] = "ring"
     angle: Angle = 0.0
     sun: BodySection
     planet: PlanetSection
     ring: BodySection
     carrier: BodySection
+
+    @property
+    def angles(self) -> tuple[float, ...]:
+        """Of the planets [rad]: as given, or equally spaced."""
+        return self.planet_angles or equal_planet_angles(self.planets)
 
 
 class CouplingSection(Section):
@@ -153,7 +175,7 @@ class MultistageCase(Section, ReadCase):
     """
 
     format: Count(1, 2**31) = FORMAT
-    model: Literal[MODEL]
+    model: Literal["multistage"]
     title: Title
     stage: Annotated[tuple[StageSection, ...], Field(min_length=1, max_length=20)]
     coupling: Annotated[tuple[CouplingSection, ...], Field(max_length=60)] = ()
@@ -163,7 +185,7 @@ class MultistageCase(Section, ReadCase):
     @property
     def geared(self) -> bool:
         """Whether every stage has gears, and with them mesh phases and tooth pairs in contact."""
-        return all(one.module is not None for one in self.stage)
+        return all(one.gears is not None for one in self.stage)
 
 
 def build_multistage(data: dict, text: str, name: str, *, numbered: bool = True) -> MultistageCase:
@@ -185,15 +207,17 @@ def cross_check(case: MultistageCase) -> Iterator[CaseError]:
     found = list(_entry_problems(case))
     yield from found
     if not found:
-        train = multistage_of(case)
+        train, operation = multistage_of(case), case.operation
         _named(check_turns, "coupling", train)
-        if case.operation is not None:
-            _named(lambda one: train_torques(one, case.operation.torque), "coupling", train)
+        if operation is not None:
+            _named(lambda one: train_torques(one, operation.torque), "coupling", train)
 
 
 def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
     for n, stage in enumerate(case.stage):
-        yield from _sizes(stage, f"stage[{n}]")
+        if (stage.gears is None) == (stage.radii is None):
+            key, limit = f"stage[{n}].gears", "one of the tables gears and radii"
+            yield CaseError("the sizes of the gears are needed once", code="E-CHOICE", key=key, limit=limit)
     named = [(f"coupling[{n}].between", one) for n, c in enumerate(case.coupling) for one in c.between]
     if case.operation is not None:
         named += [(f"operation.{key}", getattr(case.operation, key)) for key in ("input", "output")]
@@ -218,22 +242,6 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
         )  # fmt: skip
 
 
-def _sizes(stage: StageSection, key: str) -> Iterator[CaseError]:
-    if (stage.module is None) == (stage.base_radii is None):
-        yield CaseError(
-            "the size of the gears is needed once", code="E-CHOICE", key=f"{key}.module",
-            limit="module with teeth and face_width, or base_radii with mesh_stiffness",
-        )  # fmt: skip
-        return
-    needed = ("teeth", "face_width") if stage.base_radii is None else ("mesh_stiffness",)
-    for name in needed:
-        if getattr(stage, name) is None:
-            size = "module" if stage.base_radii is None else "base_radii"
-            yield CaseError(
-                f"a stage with {size} needs it", code="E-KEY-MISSING", key=f"{key}.{name}", remedy="add it"
-            )
-
-
 def multistage_of(case: MultistageCase) -> MultistageSet:
     """The train of a case.
 
@@ -252,7 +260,7 @@ def multistage_of(case: MultistageCase) -> MultistageSet:
         ends = _member_of(operation.input), _member_of(operation.output or str(ends[1]))
     made = couplings or in_series(stages).couplings
     return _named(
-        lambda _: MultistageSet(stages=stages, couplings=made, input=ends[0], output=ends[1]),
+        lambda _: MultistageSet(stages=tuple(stages), couplings=tuple(made), input=ends[0], output=ends[1]),
         "operation",
         operation,
     )
@@ -286,72 +294,64 @@ def _coupling(one: CouplingSection) -> StageCoupling:
         shaft, length = ShaftSection(one.diameter), one.length
         bending = 12.0 * shaft.young * shaft.second_moment / (length**3 * (1.0 + shaft.shear_ratio(length)))
         springs = {"torsional": joint_springs(shaft, length).torsion, "lateral": bending}
-    return StageCoupling(*map(_member_of, one.between), **springs | given)
+    first, second = (_member_of(text) for text in one.between)
+    return StageCoupling(first, second, **springs | given)
 
 
 def stage_gears(stage: StageSection) -> PlanetarySet:
-    """Geared set of a stage that has a module; the rims have no effect on anything computed here."""
-    sun, planet, ring = (0.5 * stage.module * z for z in stage.teeth)
-    rims = (0.3 * sun, 0.5 * planet, ring + 4.0 * stage.module)
+    """Geared set of a stage that has gears; the rims have no effect on anything computed here."""
+    given = stage.gears
+    assert given is not None
+    sun, planet, ring = (0.5 * given.module * z for z in given.teeth)
+    rims = (0.3 * sun, 0.5 * planet, ring + 4.0 * given.module)
     gears = [
         Gear(
-            teeth=z,
-            module=stage.module,
-            pressure_angle=stage.pressure_angle,
-            profile_shift=shift,
-            face_width=stage.face_width,
-            rim_radius=rim,
-            internal=name == "ring",
-            rack=BasicRack(addendum=addendum),
-            name=name,
+            z, given.module, given.pressure_angle, shift, given.face_width, rim, internal=name == "ring",
+            rack=BasicRack(addendum=addendum), name=name,
         )
         for name, z, shift, rim, addendum in zip(
-            ("sun", "planet", "ring"), stage.teeth, stage.profile_shifts, rims, stage.addendum
+            ("sun", "planet", "ring"), given.teeth, given.profile_shifts, rims, given.addendum
         )
-    ]
-    closed = close_set(*gears, planet_angles=_planet_angles(stage))
+    ]  # fmt: skip
+    closed = close_set(*gears, planet_angles=stage.angles)
     check_set(closed)
     return closed
 
 
-def _planet_angles(stage: StageSection) -> tuple[float, ...]:
-    return stage.planet_angles or equal_planet_angles(stage.planets)
-
-
 def _stage(stage: StageSection) -> Stage:
-    bodies = {
+    members = (("sun", stage.sun), ("ring", stage.ring), ("carrier", stage.carrier))
+    lumped: dict[str, Any] = {
         name: PlanarBody(one.mass, one.inertia, one.support_stiffness, one.torsional_stiffness)
-        for name, one in (("sun", stage.sun), ("ring", stage.ring), ("carrier", stage.carrier))
+        for name, one in members
     }
-    bodies["planet"] = PlanarBody(stage.planet.mass, stage.planet.inertia)
-    fixed = None if stage.fixed == "none" else stage.fixed
-    given = stage.mesh_stiffness
-    if stage.module is not None:
+    lumped["planet"] = PlanarBody(stage.planet.mass, stage.planet.inertia)
+    lumped["planet_bearing"] = stage.planet.bearing_stiffness
+    fixed, size = None if stage.fixed == "none" else stage.fixed, stage.gears or stage.radii
+    assert size is not None
+    if size.mesh_stiffness is not None:
+        lumped["stiffness_sun_planet"] = size.mesh_stiffness.sun_planet
+        lumped["stiffness_planet_ring"] = size.mesh_stiffness.planet_ring
+    if isinstance(size, GearsSection):
         gears = stage_gears(stage)
-        stiffness = _iso_stiffness(stage, gears) if given is None else (given.sun_planet, given.planet_ring)
-        return stage_of_set(
-            gears, fixed=fixed, angle=stage.angle, **bodies, planet_bearing=stage.planet.bearing_stiffness,
-            stiffness_sun_planet=stiffness[0], stiffness_planet_ring=stiffness[1],
-        )  # fmt: skip
-    sun, planet = stage.base_radii
+        return stage_of_set(gears, fixed=fixed, angle=stage.angle, **_iso_stiffness(size, gears) | lumped)
+    alpha = size.pressure_angle
     data = PlanarSet(
-        **bodies, planet_bearing=stage.planet.bearing_stiffness,
-        stiffness_sun_planet=given.sun_planet, stiffness_planet_ring=given.planet_ring,
-        sun_radius=sun, planet_radius=planet, ring_radius=sun + 2.0 * planet,
-        centre_distance=(sun + planet) / math.cos(stage.pressure_angle),
-        planet_angles=_planet_angles(stage),
-        pressure_angle_sun_planet=stage.pressure_angle, pressure_angle_planet_ring=stage.pressure_angle,
+        **lumped, sun_radius=size.sun, planet_radius=size.planet, ring_radius=size.sun + 2.0 * size.planet,
+        centre_distance=(size.sun + size.planet) / math.cos(alpha), planet_angles=stage.angles,
+        pressure_angle_sun_planet=alpha, pressure_angle_planet_ring=alpha,
     )  # fmt: skip
-    return Stage(data=data, teeth=stage.teeth, fixed=fixed, angle=stage.angle)
+    return Stage(data=data, teeth=size.teeth, fixed=fixed, angle=stage.angle)
 
 
-def _iso_stiffness(stage: StageSection, gears: PlanetarySet) -> list[float]:
+def _iso_stiffness(given: GearsSection, gears: PlanetarySet) -> dict[str, float]:
     """Mean stiffness of both meshes after ISO 6336-1, method B."""
-    (sun, planet, _), (x_sun, x_planet, x_ring) = stage.teeth, stage.profile_shifts
+    (sun, planet, _), (x_sun, x_planet, x_ring) = given.teeth, given.profile_shifts
     # the standard's sign of the ring's shift
-    pairs = (sun, planet, x_sun, x_planet), (planet, math.inf, x_planet, -x_ring)
-    ratios = gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring
-    return [
-        stage.face_width * mesh_stiffness_method_b(*pair, ratio, pressure_angle=stage.pressure_angle)[1]
-        for pair, ratio in zip(pairs, ratios)
-    ]
+    meshes = {
+        "stiffness_sun_planet": (sun, planet, x_sun, x_planet, gears.contact_ratio_sun_planet),
+        "stiffness_planet_ring": (planet, math.inf, x_planet, -x_ring, gears.contact_ratio_planet_ring),
+    }
+    return {
+        name: given.face_width * mesh_stiffness_method_b(*mesh, pressure_angle=given.pressure_angle)[1]
+        for name, mesh in meshes.items()
+    }

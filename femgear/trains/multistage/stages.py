@@ -504,7 +504,7 @@ def wave_meshes(case: MultistageCase, train: MultistageSet) -> dict[int, GearMes
 def _no_response(case: MultistageCase) -> str:
     if case.operation is None or case.response is None:
         return "it needs the sections operation and response"
-    return "" if case.geared else "every stage needs gears, with module, teeth and face_width"
+    return "" if case.geared else "every stage needs its table gears"
 
 
 def _no_balance(case: MultistageCase) -> str:
