@@ -103,6 +103,14 @@ def test_two_eccentric_gears_of_one_speed_are_refused(case):
         with_values(case, {"gears.teeth": [20, 20], "gears.eccentricity": ["1 um", "1 um"]})
 
 
+def test_an_eccentric_gear_needs_a_stage_in_time():
+    light = read_case(CASES / "gear_pair_light.toml")
+    eccentric = with_value(light, "gears.eccentricity", ["1 um", "0 um"])
+    with pytest.raises(CaseError, match="E-KEY-MISSING") as info:
+        with_value(eccentric, "chaos", None)
+    assert info.value.key == "sweep"
+
+
 def test_mistakes_name_file_line_and_key(tmp_path, capsys):
     text = (CASES / "gear_pair.toml").read_text(encoding="utf-8")
     path = tmp_path / "wrong.toml"

@@ -338,8 +338,7 @@ def test_turning_stages_are_planar_sets_at_their_own_speeds():
         (lambda: StageCoupling(Member(1, "planet"), Member(2, "sun")), "E-COUPLING"),
         (lambda: StageCoupling(Member(1, "sun"), Member(2, "sun"), torsional=0.0), "E-COUPLING"),
         (lambda: StageCoupling(Member(1, "sun"), Member(2, "sun"), lateral=-1.0), "E-COUPLING"),
-        (lambda: in_series([stage((20, 20, 60))] * 3, torsional=[1.0, 2.0, 3.0]), "E-COUPLING"),
-        (lambda: in_series([stage((20, 20, 60))] * 2, output="ring"), "E-MECHANISM"),
+        (lambda: replace(two_stages(), output=Member(2, "ring")), "E-MECHANISM"),
         (lambda: replace(two_stages(), input=Member(3, "sun")), "E-COUPLING"),
         (lambda: train_speeds(replace(two_stages(), couplings=()), 1.0), "E-MECHANISM"),
         (lambda: train_speeds(in_series([Stage(data=lin_parker_set())] * 2), 1.0), "E-TEETH"),
@@ -377,7 +376,6 @@ def test_a_locked_loop_has_neither_ratio_nor_modes():
         lambda: Member("one", "sun"),
         lambda: StageCoupling(Member(1, "sun"), Member(2, "sun"), 1e30),
         lambda: StageCoupling(Member(1, "sun"), Member(2, "sun"), "stiff"),
-        lambda: multistage_modes(two_stages(), mesh_stiffness=[1e8]),
     ],
 )
 def test_trains_that_are_none_are_refused(make):

@@ -150,10 +150,14 @@ class ImpactPair:
             M=ratio**2 * M, C=ratio * C, K=K, W=np.eye(len(M))[:, -1:], load=self.load * along,
             dofs=("y 1", "y 2", "x") if self.bearings else ("x",),
         )  # fmt: skip
-        count = len(self.frequency)
-        k = FourierSeries([[1.0, *self.stiffness]], _orders(0, divided, count))
-        mesh = GearMeshes([0], k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
-        return NonlinearSystem(system, (mesh,), tuple(self._forces(ratio, along, divided)))
+        forces = tuple(self._forces(ratio, along, divided))
+        return NonlinearSystem(system, (self.mesh(divided),), forces)
+
+    def mesh(self, divided: int = 1) -> GearMeshes:
+        """The mesh with its play on the one column, see `problem`."""
+        orders = _orders(0, divided, len(self.frequency))
+        k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders)
+        return GearMeshes(np.array([0]), k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
 
     def _matrices(self):
         """M, C, K with unit time 1 / omega_n, and the direction of u in the coordinates."""

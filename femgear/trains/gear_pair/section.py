@@ -57,7 +57,7 @@ class OperationSection(Section):
 class ResponseSection(Section):
     """Periodic motions over the frequency ratio by harmonic balance, from one end to the other."""
 
-    start: Ratio = Field(3.5, alias="from")
+    start: Ratio = Field(default=3.5, alias="from")
     to: Ratio = 0.1
     harmonics: Count(1, 100) = 12
     largest_step: Number(1e-4, 1.0) = 0.02
@@ -147,6 +147,11 @@ def cross_check(case: GearPairCase) -> Iterator[CaseError]:
             value=", ".join(LENGTH.show(one) for one in gears.eccentricity),
             limit="one of them, or other teeth", remedy="give the sum of both to one gear",
         )  # fmt: skip
+    if any(gears.eccentricity) and case.sweep is None and case.chaos is None:
+        yield CaseError(
+            "an eccentric gear leaves the stage response out, and nothing is computed", code="E-KEY-MISSING",
+            key="sweep", remedy="add the section sweep, or chaos",
+        )  # fmt: skip
     for key in ("response", "chaos"):
         one = getattr(case, key)
         if one is not None and one.start == one.to:
@@ -176,14 +181,15 @@ def pair_of(case: GearPairCase) -> ImpactPair:
             stiffness=tuple(one / mesh.stiffness for one in gears.bearing_stiffness),
             damping_ratio=gears.bearing_damping_ratio,
         )
-    error = tuple(one / scales.length for one in mesh.error)
-    eccentricity = tuple(one / scales.length for one in gears.eccentricity)
+    error = [one / scales.length for one in mesh.error]
+    eccentricity = [one / scales.length for one in gears.eccentricity]
+    first, second = _waves(eccentricity, gears.eccentricity_angles)
     return ImpactPair(
         damping_ratio=mesh.damping_ratio,
         load=case.operation.torque / gears.base_radii[0] / scales.force,
         stiffness=_waves(mesh.stiffness_waves, mesh.stiffness_angles),
         tooth_error=_waves(error, mesh.error_angles),
-        eccentricity=_waves(eccentricity, gears.eccentricity_angles),
+        eccentricity=(first, second),
         teeth=gears.teeth,
         bearings=bearings,
     )

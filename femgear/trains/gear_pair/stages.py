@@ -16,7 +16,6 @@ from femgear.report.tables import Block
 from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
 from femgear.system.contact_states import (
     STATE_NAMES,
-    ContactStates,
     range_states,
     solution_states,
     state_regions,
@@ -37,39 +36,40 @@ if TYPE_CHECKING:
 _INSTANTS = 512
 # points of a motion that the bifurcation diagram shows, periods of a section over those of an exponent
 _SHOWN, _LONGER = 80, 8
+_SHARES = {
+    "drive": "share of the time on the drive flank",
+    "free": "share of the time between the flanks",
+    "back": "share of the time on the back flank",
+}
 _CHAOTIC = {True: "yes", False: "no", None: "not told"}
 _LENGTH, _RATE = "in half backlashes", "in natural angular frequencies"
 
 
 @dataclass(frozen=True, eq=False)
 class ResponseResult:
-    """Periodic motions along the branch, their extremes (p,), and the ratios where flanks part or hit."""
+    """Periodic motions along the branch, extremes and shares (p,), and ratios where flanks part or hit."""
 
     case: GearPairCase
     branch: Branch
     lowest: np.ndarray
     highest: np.ndarray
-    contact: ContactStates
+    shares: dict[str, np.ndarray]
     borders: dict[float, np.ndarray]
 
     def dataset(self) -> xr.Dataset:
         """Contents of response.nc."""
-        branch, contact = self.branch, self.contact
-        variables = _motions(("point",), self.lowest, self.highest, branch.lines[:, 0, 0].real)
+        branch = self.branch
+        variables = _motions(("point",), self.lowest, self.highest, np.real(branch.lines[:, 0, 0]))
         variables |= _numbers(
             ("point",),
             stable=(branch.stable, "whether the motion is known to be stable"),
             multiplier=(branch.largest_multiplier, "largest Floquet multiplier"),
-            drive_share=(contact.drive[:, 0], "share of the time on the drive flank"),
-            free_share=(contact.free[:, 0], "share of the time between the flanks"),
-            back_share=(contact.back[:, 0], "share of the time on the back flank"),
+            **{name: (share, _SHARES[name.partition("_")[0]]) for name, share in self.shares.items()},
         )
         variables |= _numbers(("limit_point",), fold=(branch.folds, "number of the point, from 0"))
-        for name, level, words in (
-            ("drive", DRIVE, "drive flanks part"),
-            ("back", BACK, "back flanks touch"),
-        ):
-            border = {f"{name}_border": (self.borders[level], f"frequency ratio from which {words}")}
+        words = "frequency ratio from which {} flanks {}"
+        for name, level, verb in (("drive", DRIVE, "part"), ("back", BACK, "touch")):
+            border = {f"{name}_border": (self.borders[level], words.format(name, verb))}
             variables |= _numbers((f"{name}_crossing",), **border)
         lines = [("deflection", ("point", "line"), branch.lines[:, 0], "1", f"relative deflection {_LENGTH}")]
         coords = _ratios(self.case, "point", branch.parameter)
@@ -94,7 +94,7 @@ class SweepResult:
             return np.array([getattr(self.up, name), getattr(self.down, name)[::-1]])
 
         dims = ("direction", "ratio")
-        extremes = both("lowest")[..., 0], both("highest")[..., 0], both("lines")[..., 0, 0].real
+        extremes = both("lowest")[..., 0], both("highest")[..., 0], np.real(both("lines")[..., 0, 0])
         variables = _motions(dims, *extremes) | _numbers(
             dims,
             settled=(both("settled"), "whether the motion repeats"),
@@ -196,12 +196,10 @@ def solve_response(case: GearPairCase) -> ResponseResult:
     )  # fmt: skip
     phase = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
     x = np.array([solution.at(phase)[:, 0] for solution in branch.solutions])
-    mesh = pair.problem(1.0).elements[0]
-    states = [solution_states(mesh, solution, samples=_INSTANTS) for solution in branch.solutions]
-    fields = ContactStates.__dataclass_fields__
-    contact = ContactStates(*(np.array([getattr(one, name) for one in states]) for name in fields))
+    states = [solution_states(pair.mesh(), one, samples=_INSTANTS) for one in branch.solutions]
+    shares = {f"{name}_share": np.array([getattr(one, name)[0] for one in states]) for name in _SHARES}
     borders = {level: np.sort(impact_borders(pair, branch, level)) for level in (DRIVE, BACK)}
-    return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), contact, borders)
+    return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), shares, borders)
 
 
 @one_blas_thread()
@@ -210,14 +208,12 @@ def solve_sweep(case: GearPairCase) -> SweepResult:
     from femgear.solvers.continuation.sweep import sweep_up_and_down
 
     pair, given = pair_of(case), case.sweep
+    assert given is not None
     ratios = np.concatenate([np.linspace(one.start, one.to, one.count) for one in given.ranges])
     up, down = sweep_up_and_down(
         lambda ratio: (pair.problem(ratio), pair.frequency),
-        ratios,
-        steps=given.steps * pair.periods,
-        periods=pair.periods,
-        most=given.most_periods,
-    )
+        ratios, steps=given.steps * pair.periods, periods=pair.periods, most=given.most_periods,
+    )  # fmt: skip
     return SweepResult(case, up, down)
 
 
@@ -227,6 +223,7 @@ def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> Chao
     from femgear.solvers.chaos.lyapunov import lyapunov_exponents
 
     pair, given, found = pair_of(case), case.chaos, []
+    assert given is not None
     ratios, start = np.linspace(given.start, given.to, given.count), None
     options: dict[str, Any] = {"steps": given.steps * pair.periods, "periods": pair.periods}
     for number, ratio in enumerate(ratios):
@@ -254,20 +251,18 @@ def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> Chao
 def describe_gear_pair(case: GearPairCase) -> tuple[Block, ...]:
     """Title, units, numbers of the pair, and warnings of a case."""
     scales, pair = scales_of(case), pair_of(case)
-    hertz = scales.frequency / (2.0 * np.pi)
-    rows = [
-        ("natural frequency [Hz]", f"{hertz:.6g}"),
-        ("its speed of the driving gear [rpm]", f"{scales.frequency / case.gears.teeth[0] / RPM:.6g}"),
-        ("half backlash b [um]", f"{1e6 * scales.length:.6g}"),
-        ("force k b [N]", f"{scales.force:.6g}"),
-        ("load over k b", f"{pair.load:.6g}"),
-        ("damping ratio", f"{pair.damping_ratio:.6g}"),
-        ("tooth error over b", ", ".join(f"{abs(one):.6g}" for one in pair.tooth_error) or "none"),
-        (
-            "mesh stiffness wave over its mean",
-            ", ".join(f"{abs(one):.4g}" for one in pair.stiffness) or "none",
-        ),
-    ]
+    numbers = {
+        "natural frequency [Hz]": scales.frequency / (2.0 * np.pi),
+        "its speed of the driving gear [rpm]": scales.frequency / case.gears.teeth[0] / RPM,
+        "half backlash b [um]": 1e6 * scales.length,
+        "force k b [N]": scales.force,
+        "load over k b": pair.load,
+        "damping ratio": pair.damping_ratio,
+    }
+    rows = [(text, f"{value:.6g}") for text, value in numbers.items()]
+    waves = {"tooth error over b": pair.tooth_error, "mesh stiffness wave over its mean": pair.stiffness}
+    for text, wave in waves.items():
+        rows.append((text, ", ".join(f"{abs(one):.6g}" for one in wave) or "none"))
     notes: tuple[str, ...] = ()
     if pair.load and len(pair.tooth_error) == 1 and pair.bearings is None:
         parting = separation_ratios(
@@ -323,24 +318,16 @@ def _describe_chaos(data: xr.Dataset) -> Block:
     words = [str(one) for one in data["chaotic"].values]
     chaotic = data["ratio"].values[[one == "yes" for one in words]]
     ends = [f"{ratio:.4g}" for ratio in chaotic[[0, -1]]] if len(chaotic) else ["none", "none"]
-    row = (
-        str(len(words)),
-        str(len(chaotic)),
-        *ends,
-        str(words.count("not told")),
-        f"{float(data['lowest'].min()):.3f}",
-    )
+    counts, lowest = [len(words), len(chaotic), words.count("not told")], float(data["lowest"].min())
+    row = str(counts[0]), str(counts[1]), *ends, str(counts[2]), f"{lowest:.3f}"
     header = ("ratios", "chaotic", "from", "to", "not told", "smallest deflection [half backlashes]")
     notes = ("chaotic: exponent clearly positive, bounded, no repetition",)
     return Block("Chaos", header, (row,), notes)
 
 
 def _no_response(case: GearPairCase) -> str:
-    return (
-        "the shafts of eccentric gears add base frequencies; take sweep"
-        if any(case.gears.eccentricity)
-        else ""
-    )
+    eccentric = any(case.gears.eccentricity)
+    return "the shafts of eccentric gears add base frequencies; take sweep" if eccentric else ""
 
 
 def _figures() -> Mapping[str, Figures]:

@@ -20,7 +20,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,13 +32,9 @@ from femgear.system.lumped import (
     PlanarTorque,
     flank_sign,
     member_radius,
-    planar_from_set,
     torque_shares,
 )
 from femgear.system.system import MechanicalSystem
-
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
 
 # radii of base circles may be rounded; tooth numbers that differ by more are another set
 _RADII = 1e-3
@@ -115,9 +110,8 @@ class Stage:
                 f"the {self.fixed} is fixed but has no torsional support", code="E-MECHANISM",
                 key=f"{self.fixed}.torsional_support", limit="above 0, or infinite",
             )  # fmt: skip
-        if checked_numbers(self.angle, "angle", code="E-VALUE", unit="rad").ndim or not np.isfinite(
-            self.angle
-        ):
+        angle = checked_numbers(self.angle, "angle", code="E-VALUE", unit="rad")
+        if angle.ndim or not np.isfinite(angle):
             raise CaseError(f"a stage angle of {self.angle} rad", code="E-VALUE", key="angle", limit="finite")
         if self.teeth is not None:
             object.__setattr__(self, "teeth", _checked_teeth(self.data, self.teeth))
@@ -225,64 +219,21 @@ class MultistageSet:
         return sum(2 * stage.data.n_planets for stage in self.stages)
 
 
-def in_series(
-    stages: Sequence[Stage],
-    *,
-    driving: str = "carrier",
-    driven: str = "sun",
-    torsional: float | Sequence[float] = math.inf,
-    lateral: float | Sequence[float] = 0.0,
-    input: str = "sun",
-    output: str = "carrier",
-) -> MultistageSet:
-    """Stages one after the other: `driving` of each turns `driven` of the next.
+def in_series(stages: Sequence[Stage], *, torsional: float = math.inf, lateral: float = 0.0) -> MultistageSet:
+    """Join stages one after the other: each carrier turns the next sun.
 
     Parameters
     ----------
     stages : sequence of Stage
-    driving, driven : {"carrier", "ring", "sun"}
-    torsional, lateral : float or one a coupling
-        See `StageCoupling`.
-    input, output : {"carrier", "ring", "sun"}
-        Of the first and the last stage.
+    torsional, lateral : float
+        Of every coupling, see `StageCoupling`.
     """
-    if len(stages) < 1:
-        _refuse("a train of no stages", "one stage or more")
-    count = len(stages) - 1
-    stiffness = []
-    for name, values in (("torsional", torsional), ("lateral", lateral)):
-        values = np.atleast_1d(checked_numbers(values, name, code="E-COUPLING", unit=""))
-        if values.ndim != 1 or len(values) not in (1, count):
-            _refuse(f"{values.size} {name} stiffnesses", f"one, or {count}")
-        stiffness.append(np.broadcast_to(values, count).tolist())
     couplings = tuple(
-        StageCoupling(Member(n + 1, driving), Member(n + 2, driven), *(values[n] for values in stiffness))
-        for n in range(count)
+        StageCoupling(Member(n, "carrier"), Member(n + 1, "sun"), torsional, lateral)
+        for n in range(1, len(stages))
     )
-    return MultistageSet(
-        stages=tuple(stages), couplings=couplings, input=Member(1, input), output=Member(count + 1, output)
-    )
-
-
-def stage_of_set(planetary_set: PlanetarySet, *, fixed: str | None = "ring", angle=0.0, **lumped) -> Stage:
-    """Stage with the teeth, mesh phases, radii and angles of a geared set.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    fixed, angle
-        See `Stage`.
-    lumped
-        Bodies and stiffnesses, see `femgear.system.lumped.planar_from_set`.
-    """
-    s = planetary_set
-    return Stage(
-        data=planar_from_set(s, **lumped),
-        teeth=(s.sun.teeth, s.planet.teeth, s.ring.teeth),
-        fixed=fixed,
-        phases=s.mesh_phases,
-        angle=angle,
-    )
+    ends = {"input": Member(1, "sun"), "output": Member(len(stages), "carrier")}
+    return MultistageSet(stages=tuple(stages), couplings=couplings, **ends)
 
 
 def _checked_teeth(data: PlanarSet, teeth) -> tuple[int, int, int]:

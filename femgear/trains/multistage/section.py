@@ -34,7 +34,7 @@ from femgear.gears.fillet import BasicRack
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
-from femgear.system.lumped import PlanarBody, PlanarSet
+from femgear.system.lumped import PlanarBody, PlanarSet, planar_from_set
 from femgear.system.shaft import ShaftSection, joint_springs
 from femgear.trains.multistage.model import (
     STIFFEST,
@@ -44,7 +44,6 @@ from femgear.trains.multistage.model import (
     StageCoupling,
     check_turns,
     in_series,
-    stage_of_set,
     train_torques,
 )
 
@@ -333,7 +332,8 @@ def _stage(stage: StageSection) -> Stage:
         lumped["stiffness_planet_ring"] = size.mesh_stiffness.planet_ring
     if isinstance(size, GearsSection):
         gears = stage_gears(stage)
-        return stage_of_set(gears, fixed=fixed, angle=stage.angle, **_iso_stiffness(size, gears) | lumped)
+        data = planar_from_set(gears, **_iso_stiffness(size, gears) | lumped)
+        return Stage(data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle)
     alpha = size.pressure_angle
     data = PlanarSet(
         **lumped, sun_radius=size.sun, planet_radius=size.planet, ring_radius=size.sun + 2.0 * size.planet,
@@ -343,7 +343,7 @@ def _stage(stage: StageSection) -> Stage:
     return Stage(data=data, teeth=size.teeth, fixed=fixed, angle=stage.angle)
 
 
-def _iso_stiffness(given: GearsSection, gears: PlanetarySet) -> dict[str, float]:
+def _iso_stiffness(given: GearsSection, gears: PlanetarySet) -> dict[str, Any]:
     """Mean stiffness of both meshes after ISO 6336-1, method B."""
     (sun, planet, _), (x_sun, x_planet, x_ring) = given.teeth, given.profile_shifts
     # the standard's sign of the ring's shift

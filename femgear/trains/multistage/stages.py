@@ -18,7 +18,6 @@ from femgear.solvers.linear.frequency_response import MeshErrorResponse, modal_r
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
 from femgear.system.assembler import planar_meshes, planar_system
 from femgear.system.elements import GearMeshes, TurningSprings, turning_wave
-from femgear.system.entries import checked_numbers
 from femgear.system.mode_kinds import class_energies, named_kinds, planar_motions
 from femgear.system.nonlinear import NonlinearSystem
 from femgear.system.series import FourierSeries, distinct_lines, harmonics_of, sample
@@ -46,7 +45,14 @@ from femgear.trains.multistage.results import (
     describe_multistage,
     multistage_warnings,
 )
-from femgear.trains.multistage.section import MultistageCase, build_multistage, multistage_of, stage_gears
+from femgear.trains.multistage.section import (
+    MultistageCase,
+    OperationSection,
+    ResponseSection,
+    build_multistage,
+    multistage_of,
+    stage_gears,
+)
 from femgear.trains.protocol import Figures, OwnFile, Progress, Train
 from femgear.trains.protocol import Stage as RunStage
 
@@ -54,28 +60,10 @@ from femgear.trains.protocol import Stage as RunStage
 _MULTIPLE = 1e-7
 
 
-def multistage_modes(
-    data: MultistageSet, *, mesh_stiffness=None, damping_ratio: float | Sequence[float] = 0.0
-) -> MultistageModes:
-    """Modes of the train at rest, with their kinds and stages.
-
-    Parameters
-    ----------
-    data : MultistageSet
-    mesh_stiffness : (n_meshes,) array, optional
-        Of all stages [N/m]; that of the sets when not given.
-    damping_ratio : float or (m,) array
-    """
-    k = mean_mesh_stiffness(data)
-    if mesh_stiffness is not None:
-        k = checked_numbers(mesh_stiffness, "mesh_stiffness", code="E-SHAPE", unit="N/m")
-    if k.shape != (data.n_meshes,) or not np.all(np.isfinite(k)):
-        raise CaseError(
-            f"mesh stiffnesses of shape {k.shape}", code="E-SHAPE", key="mesh_stiffness",
-            limit=f"{data.n_meshes} finite numbers, one a mesh",
-        )  # fmt: skip
+def multistage_modes(data: MultistageSet, *, damping_ratio: float | Sequence[float] = 0.0) -> MultistageModes:
+    """Modes of the train at rest with mean mesh stiffnesses, with their kinds and stages."""
     system = multistage_system(data)
-    modes = solve_modes(system, k, damping_ratio=damping_ratio)
+    modes = solve_modes(system, mean_mesh_stiffness(data), damping_ratio=damping_ratio)
     masses = stage_masses(data)
     modes = _by_stage(modes, masses)
     share = stage_shares(masses, modes.shape)
@@ -84,7 +72,7 @@ def multistage_modes(
 
 
 def stage_masses(data: MultistageSet) -> np.ndarray:
-    """Mass matrix of every stage in the coordinates of the train, (S, n, n)."""
+    """Assemble the mass matrix of every stage in the coordinates of the train, (S, n, n)."""
     Z = joined_motions(data)
     return np.array(
         [
@@ -175,7 +163,7 @@ def stage_error(stage: Stage, sun_planet, planet_ring) -> np.ndarray:
     if stage.phases is None:
         raise CaseError(
             "the stage has no mesh phases", code="E-PHASES", key="phases",
-            remedy="give phases, or make the stage with stage_of_set",
+            remedy="give phases, such as those of the gears",
         )  # fmt: skip
     waves = np.array([np.atleast_1d(one) for one in (sun_planet, planet_ring)], complex)
     h = np.arange(1, waves.shape[1] + 1)
@@ -190,7 +178,6 @@ def error_response(
     *,
     damping_ratio: float = 0.0,
     modes: Modes | None = None,
-    outputs=None,
 ) -> dict[int, MeshErrorResponse]:
     """Response of the whole train to transmission errors of its stages, by modal summation.
 
@@ -211,7 +198,6 @@ def error_response(
         Of all modes; ignored where modes are given.
     modes : Modes, optional
         Of the train at rest, such as `MultistageModes.modes` with damping; all when not given.
-    outputs : (n_outputs, n) array, optional
 
     Returns
     -------
@@ -228,15 +214,14 @@ def error_response(
     if modes is None:
         modes = multistage_modes(data, damping_ratio=damping_ratio).modes
     frequencies, forward = _mesh_frequencies(data, speed)
-    rows = np.empty((0, len(system.M))) if outputs is None else np.atleast_2d(np.asarray(outputs, float))
-    seen, found = np.vstack([system.W.T, rows]), {}
+    found = {}
     for number, columns in enumerate(mesh_columns(data), 1):
         if number not in errors:
             continue
         error = _checked_error(errors[number], number, len(columns))
         # where the sun turns backwards the mesh runs through its period from the end
         error = error if forward[number - 1] else error.conj()
-        found[number] = _stage_response(system, modes, frequencies[:, number - 1], columns, error, k, seen)
+        found[number] = _stage_response(system, modes, frequencies[:, number - 1], columns, error, k)
     if unknown := set(errors) - set(found):
         raise CaseError(
             f"transmission errors of stage {sorted(unknown)[0]}", code="E-SHAPE", key="errors",
@@ -328,16 +313,16 @@ def _standing(data: MultistageSet, turning) -> np.ndarray:
     return multistage_system(replace(data, couplings=couplings)).K
 
 
-def _stage_response(system, modes, mesh_frequency, columns, error, k, seen) -> MeshErrorResponse:
+def _stage_response(system, modes, mesh_frequency, columns, error, k) -> MeshErrorResponse:
+    """Answer of all meshes to the errors (columns, H) of one stage."""
     harmonics = np.arange(1, error.shape[1] + 1)
     inputs = system.W[:, columns] * k[columns]
-    transfer = modal_response(system, modes, np.outer(mesh_frequency, harmonics).ravel(), inputs, seen)
-    transfer = transfer.reshape(len(mesh_frequency), len(harmonics), len(seen), len(columns))
-    answer = np.einsum("fhoj,jh->fho", transfer, error)
-    deflection, force = answer[..., : len(k)], np.empty((*answer.shape[:2], len(k)), complex)
-    force[:] = k * deflection
+    transfer = modal_response(system, modes, np.outer(mesh_frequency, harmonics).ravel(), inputs, system.W.T)
+    transfer = transfer.reshape(len(mesh_frequency), len(harmonics), len(k), len(columns))
+    deflection = np.einsum("fhoj,jh->fho", transfer, error)
+    force = k * deflection
     force[..., columns] -= k[columns] * error.T
-    return MeshErrorResponse(mesh_frequency, harmonics, deflection, force, answer[..., len(k) :])
+    return MeshErrorResponse(mesh_frequency, harmonics, deflection, force, np.empty((*force.shape[:2], 0)))
 
 
 def _mesh_frequencies(data: MultistageSet, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -396,7 +381,7 @@ def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int
         phase = data.stages[one.second.stage - 1].angle - data.stages[one.first.stage - 1].angle
         first = data.n_meshes + 4 * place
         wave = turning_wave(tuple(orders), phase=phase)
-        elements.append(TurningSprings(np.arange(first, first + 4)[None], [one.lateral], wave))
+        elements.append(TurningSprings(np.arange(first, first + 4)[None], np.array([one.lateral]), wave))
     return tuple(elements)
 
 
@@ -409,7 +394,7 @@ def solve_multistage_modes(case: MultistageCase) -> MultistageModes:
 @one_blas_thread()
 def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResult:
     """Response to the transmission errors that the changing number of tooth pairs makes under the torque."""
-    given = case.response
+    _, given = _asked(case)
     speed = np.linspace(given.lowest, given.highest, given.points)
     errors = loaded_errors(case, modes.data)
     return ResponseResult(modes.data, speed, error_response(modes.data, speed, errors, modes=modes.modes))
@@ -420,12 +405,12 @@ def solve_balance(case: MultistageCase, *, progress: Progress | None = None) -> 
     """Harmonic balance with the stiffnesses k(t) of all meshes, first orders of two stages together."""
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 
-    train, given = multistage_of(case), case.response
+    train, (operation, given) = multistage_of(case), _asked(case)
     stages, unit = len(train.stages), np.eye(len(train.stages), dtype=int)
     orders = [h * unit[n] for n in range(stages) for h in range(1, given.harmonics + 1)]
     orders += [unit[n] + sign * unit[m] for n in range(stages) for m in range(n) for sign in (-1, 1)]
     problem = multistage_problem(
-        train, meshes=wave_meshes(case, train), torque=case.operation.torque, damping=given.damping_ratio
+        train, meshes=wave_meshes(case, train), torque=operation.torque, damping=given.damping_ratio
     )
     speeds = np.linspace(given.lowest, given.highest, given.balance_points + 2)[1:-1]
     found = []
@@ -458,7 +443,7 @@ def stiffness_waves(case: MultistageCase, number: int) -> tuple[np.ndarray, np.n
     -------
     two (H,) complex arrays
     """
-    geared, h = stage_gears(case.stage[number - 1]), np.arange(1, case.response.harmonics + 1)
+    geared, h = stage_gears(case.stage[number - 1]), np.arange(1, _asked(case)[1].harmonics + 1)
     waves = []
     for path in (geared.path_sun_planet, geared.path_planet_ring):
         start, end = (one / geared.base_pitch for one in path)
@@ -474,11 +459,10 @@ def loaded_errors(case: MultistageCase, train: MultistageSet) -> dict[int, np.nd
     forces are small beside F.
     """
     errors = {}
-    on_sun = train_torques(train, case.operation.torque).sun
+    on_sun = train_torques(train, _asked(case)[0].torque).sun
     for number, stage in enumerate(train.stages, 1):
-        data = stage.data
+        data, mean = stage.data, stage.data.mesh_stiffness[[0, -1]]
         force = abs(on_sun[number - 1]) / (data.n_planets * data.sun_radius)
-        mean = data.stiffness_sun_planet[0], data.stiffness_planet_ring[0]
         waves = stiffness_waves(case, number)
         errors[number] = stage_error(stage, *(force / k * _inverse(wave) for k, wave in zip(mean, waves)))
     return errors
@@ -501,6 +485,12 @@ def wave_meshes(case: MultistageCase, train: MultistageSet) -> dict[int, GearMes
     return made
 
 
+def _asked(case: MultistageCase) -> tuple[OperationSection, ResponseSection]:
+    """Operation and response of a case that has both, which `_no_response` sees to."""
+    assert case.operation is not None and case.response is not None
+    return case.operation, case.response
+
+
 def _no_response(case: MultistageCase) -> str:
     if case.operation is None or case.response is None:
         return "it needs the sections operation and response"
@@ -508,8 +498,7 @@ def _no_response(case: MultistageCase) -> str:
 
 
 def _no_balance(case: MultistageCase) -> str:
-    reason = _no_response(case)
-    return reason or ("" if case.response.balance_points else "response.balance_points is 0")
+    return _no_response(case) or ("" if _asked(case)[1].balance_points else "response.balance_points is 0")
 
 
 def _figures() -> Mapping[str, Figures]:
