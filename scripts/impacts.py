@@ -4,13 +4,20 @@
 from __future__ import annotations
 
 import sys
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
-from script_tools import Progress, print_table, ready_folder, run_script, say_files, write_csv
+from script_tools import (
+    REFERENCE_CASE,
+    Progress,
+    print_table,
+    ready_folder,
+    run_script,
+    say_files,
+    write_csv,
+)
 
 from femgear.errors import CaseError
 
@@ -69,55 +76,48 @@ def main(
     say_files(folder, names)
 
 
-def follow(pair, harmonics: int):
-    """Branch of a pair from ratio 3.5 to 0.1, with amplitude, mean, smallest and largest deflection."""
-    from femgear.solvers.continuation.arclength import StepOptions
-    from femgear.solvers.continuation.branches import parameter_curve
+def read(name: str, values: dict):
+    """One of the cases of gear pairs with entries changed."""
+    from femgear.trains.reading import read_case, with_values
 
-    branch = parameter_curve(
-        pair.problem, (3.5, 0.1), 1.0, harmonics=harmonics, samples=1024, radius=False,
-        options=StepOptions(largest=0.02),
-    )  # fmt: skip
-    phase = 2.0 * np.pi * np.arange(512) / 512
-    x = np.array([solution.at(phase)[:, 0] for solution in branch.solutions])
-    low, high = x.min(axis=1), x.max(axis=1)
-    return branch, 0.5 * (high - low), branch.lines[:, 0, 0].real, low, high
+    return with_values(read_case(REFERENCE_CASE.with_name(f"{name}.toml")), values)
 
 
 def damping_study(folder: Path, harmonics: int) -> list[str]:
     """Amplitude and mean for two damping ratios."""
-    from femgear.trains.gear_pair.model import BACK, DRIVE, example_pair, impact_borders
+    from femgear.trains.gear_pair.stages import solve_response
 
     curves, rows = [], []
     for zeta in DAMPING:
-        branch, size, mean, *_ = follow(example_pair(zeta), harmonics)
-        curves.append((f"ζ = {zeta}", branch.parameter, size, mean, branch.stable))
-        folds = ", ".join(f"{r:.4f}" for r in np.sort(branch.parameter[branch.folds]))
-        borders = [
-            ", ".join(f"{r:.3f}" for r in np.sort(impact_borders(example_pair(zeta), branch, level)))
-            for level in (DRIVE, BACK)
-        ]
-        rows.append((f"{zeta}", f"{size.max():.3f}", folds or "none", *(b or "none" for b in borders)))
+        values = {"mesh.damping_ratio": zeta, "response.harmonics": harmonics}
+        data = solve_response(read("gear_pair", values)).dataset()
+        curves.append(curve_of(f"ζ = {zeta}", data))
+        folds = ", ".join(f"{r:.4f}" for r in np.sort(data["ratio"].values[data["fold"].values]))
+        borders = [", ".join(f"{r:.3f}" for r in data[f"{side}_border"].values) for side in ("drive", "back")]
+        largest = f"{float(data['amplitude'].max()):.3f}"
+        rows.append((f"{zeta}", largest, folds or "none", *(b or "none" for b in borders)))
     header = ("damping ratio", "largest amplitude", "limit points", "x = 1 at", "x = -1 at")
     print_table("Load 0.9, tooth error 0.72, k(t) 10 %", header, rows)
-    return _drawn(folder, "damping", curves, "load 0.9, tooth error 0.72, k(t) 10 %")
+    return draw_curves(folder, "damping", curves, "load 0.9, tooth error 0.72, k(t) 10 %")
 
 
 def error_study(folder: Path, harmonics: int) -> list[str]:
     """Amplitude and mean for several tooth-frequency errors."""
-    from dataclasses import replace
-
-    from femgear.trains.gear_pair.model import example_pair
+    from femgear.trains.gear_pair.stages import solve_response
 
     curves = []
     for error in ERRORS:
-        pair = replace(example_pair(0.09), tooth_error=(error,))
-        branch, size, mean, _, _ = follow(pair, harmonics)
-        curves.append((f"error {error}", branch.parameter, size, mean, branch.stable))
-    return _drawn(folder, "tooth_error", curves, "load 0.9, ζ = 0.09, k(t) 10 %")
+        values = {"mesh.error": [f"{30 * error:.4g} um"], "response.harmonics": harmonics}
+        curves.append(curve_of(f"error {error}", solve_response(read("gear_pair", values)).dataset()))
+    return draw_curves(folder, "tooth_error", curves, "load 0.9, ζ = 0.09, k(t) 10 %")
 
 
-def _drawn(folder: Path, name: str, curves, title: str) -> list[str]:
+def curve_of(text: str, data) -> tuple:
+    """A branch as a curve of `amplitude_and_mean`."""
+    return text, *(data[name].values for name in ("ratio", "amplitude", "mean", "stable"))
+
+
+def draw_curves(folder: Path, name: str, curves, title: str) -> list[str]:
     """Picture and table of curves over the frequency ratio."""
     from femgear.report.style import save_figure
     from femgear.trains.gear_pair.figures import amplitude_and_mean
@@ -136,32 +136,14 @@ def _drawn(folder: Path, name: str, curves, title: str) -> list[str]:
 def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
     """Contact states by harmonic balance and by sweeps up and down."""
     from femgear.report.style import save_figure
-    from femgear.solvers.time.stroboscopic import sweep_up_and_down
-    from femgear.trains.gear_pair.figures import state_bands
-    from femgear.trains.gear_pair.model import (
-        BACK,
-        DRIVE,
-        STATE_NAMES,
-        example_pair,
-        range_states,
-        state_regions,
-    )
+    from femgear.system.contact_states import STATE_NAMES, state_regions
+    from femgear.trains.gear_pair.figures import contact_rows, state_bands
+    from femgear.trains.gear_pair.stages import solve_response, solve_sweep
 
-    pair, flanks = example_pair(0.09), {"drive": DRIVE, "back": BACK}
-    branch, _, _, low, high = follow(pair, harmonics)
-    state, cuts = range_states(low, high, **flanks), [0, *branch.folds, len(low) - 1]
-    pieces = [slice(a, b + 1) for a, b in pairwise(cuts)]
-    names = ["upper branch", "between the limit points, unstable", "lower branch"]
-    if len(pieces) != len(names):
-        names = [f"piece {number + 1}" for number in range(len(pieces))]
-    rows = [(f"balance: {name}", branch.parameter[part], state[part]) for name, part in zip(names, pieces)]
-    grid = np.concatenate(
-        [np.linspace(0.6, 1.0, max(3, ratios // 2)), np.linspace(1.05, 3.5, max(3, ratios // 2))]
-    )
-    sweeps = sweep_up_and_down(lambda r: (pair.problem(r), 1.0), grid, steps=100, most=300)
-    for name, sweep in zip(("up", "down"), sweeps):
-        found = range_states(sweep.lowest[:, 0], sweep.highest[:, 0], **flanks)
-        rows.append((f"integration: sweep {name}", sweep.frequency, found))
+    count = max(3, ratios // 2)
+    ranges = [{"from": 0.6, "to": 1.0, "count": count}, {"from": 1.05, "to": 3.5, "count": count}]
+    case = read("gear_pair", {"response.harmonics": harmonics, "sweep.ranges": ranges})
+    rows = contact_rows(solve_response(case).dataset(), solve_sweep(case).dataset())
     table = [
         (text, STATE_NAMES[number], f"{min(ends):.3f}", f"{max(ends):.3f}")
         for text, ratio, states in rows
@@ -169,51 +151,31 @@ def state_study(folder: Path, harmonics: int, ratios: int) -> list[str]:
     ]
     print_table("Contact states, ζ = 0.09", ("", "state", "from ratio", "to ratio"), table)
     write_csv(folder / "contact_states.csv", ("route", "state", "from ratio [1]", "to ratio [1]"), table)
-    save_figure(state_bands(rows, STATE_NAMES), folder / "contact_states.png")
+    save_figure(state_bands(rows), folder / "contact_states.png")
     return ["contact_states.csv", "contact_states.png"]
 
 
 def chaos_study(folder: Path, ratios: int, points: int) -> list[str]:
     """Bifurcation diagram, exponents and sections of the lightly loaded pair."""
     from femgear.report.style import save_figure
-    from femgear.solvers.stability.lyapunov import lyapunov_exponents
     from femgear.trains.gear_pair.figures import bifurcation_and_exponent, phase_sections
-    from femgear.trains.gear_pair.model import lightly_loaded_pair
+    from femgear.trains.gear_pair.stages import solve_chaos
 
-    pair, start, found = lightly_loaded_pair(), None, []
-    grid = np.linspace(1.0, 2.2, ratios)
-    for ratio in grid:
-        options = {"points": points, "skip": 60, "steps": 100, "start": start}
-        found.append(lyapunov_exponents(pair.problem(ratio), 1.0, **options))
-        start = found[-1].section.displacement[-1], found[-1].section.velocity[-1]
-    # exponents per theta; times the ratio per 1 / omega_n
-    exponent, error = (grid * [getattr(one, name)[0] for one in found] for name in ("exponents", "error"))
-    low, high = (np.array([getattr(one, name)[0] for one in found]) for name in ("lowest", "highest"))
-    repeats = [one.section.repeats_after(1e-3) for one in found]
-    words = [{True: "yes", False: "no", None: "not told"}[one.chaotic] for one in found]
+    data = solve_chaos(read("gear_pair_light", {"chaos.count": ratios, "chaos.points": points})).dataset()
+    names = ("ratio", "exponent", "error", "lowest", "highest", "repeats", "chaotic")
+    columns = [data[name].values.tolist() for name in names]
     header = ("frequency ratio [1]", "largest exponent [omega_n]", "error [omega_n]", "smallest x [b]",
               "largest x [b]", "repeats after periods", "chaotic")  # fmt: skip
-    records = zip(*(column.tolist() for column in (grid, exponent, error, low, high)), repeats, words)
-    write_csv(folder / "chaos.csv", header, records)
-    shown = np.array([one.section.deflection[-min(points, 80) :, 0] for one in found])
-    figure = bifurcation_and_exponent(grid, shown, exponent, error, lowest=low, highest=high)
-    save_figure(figure, folder / "chaos.png")
-    panels = []
-    for wanted in (1.0, 1.5, 2.2):
-        ratio, start = float(grid[np.argmin(np.abs(grid - wanted))]), found[np.argmin(np.abs(grid - wanted))]
-        once = lyapunov_exponents(
-            pair.problem(ratio), 1.0, points=8 * points, skip=100, steps=100,
-            start=(start.section.displacement[-1], start.section.velocity[-1]),
-        )  # fmt: skip
-        title = f"Ω = {ratio:.2f}, λ = {ratio * once.largest:.3f} ± {ratio * once.error[0]:.3f}"
-        panels.append((title, once.section.deflection[:, 0], ratio * once.section.velocity[:, 0]))
-    save_figure(phase_sections(panels, y="velocity [b $\\omega_n$]"), folder / "sections.png")
-    chaotic = grid[[one.chaotic is True for one in found]]
-    ends = [f"{r:.2f}" for r in chaotic[[0, -1]]] if len(chaotic) else ["none", "none"]
+    write_csv(folder / "chaos.csv", header, zip(*columns))
+    save_figure(bifurcation_and_exponent(data), folder / "chaos.png")
+    save_figure(phase_sections(data), folder / "sections.png")
+    words = columns[-1]
+    chaotic = [ratio for ratio, word in zip(columns[0], words) if word == "yes"]
+    ends = [f"{chaotic[0]:.2f}", f"{chaotic[-1]:.2f}"] if chaotic else ["none", "none"]
     print_table(
         "Lightly loaded pair", ("ratios", "chaotic: exponent clearly positive, no repetition", "from", "to",
                                 "not told", "smallest x"),
-        [(str(len(grid)), str(len(chaotic)), *ends, str(words.count("not told")), f"{low.min():.3f}")],
+        [(str(ratios), str(len(chaotic)), *ends, str(words.count("not told")), f"{min(columns[3]):.3f}")],
     )  # fmt: skip
     return ["chaos.csv", "chaos.png", "sections.png"]
 
@@ -254,7 +216,7 @@ def eccentric_set(eccentricity: float, floating: bool):
 def eccentricity_study(folder: Path, frequencies: int) -> list[str]:
     """Sun eccentricity of a planetary set: mesh force over frequency, path of the sun, spectrum."""
     from femgear.report.style import save_figure
-    from femgear.trains.gear_pair.figures import amplitude_and_mean, line_spectrum
+    from femgear.trains.gear_pair.figures import amplitude_and_mean
     from femgear.trains.planar.figures import orbits
 
     hertz = np.linspace(400.0, 3600.0, frequencies)
@@ -310,6 +272,24 @@ def eccentric_response(eccentricity: float, floating: bool, hertz):
             spectrum = np.abs(orders @ errors.frequency(1.0)), np.abs(found.force[0])
         start = found if found.converged else None
     return np.array(rows).T, path, spectrum
+
+
+def line_spectrum(curves, *, y: str, x: str = "frequency / mesh frequency [1]", floor: float = 1e-4):
+    """Figure of lines (text, frequency (L,), amplitude (L,)) as stems, down to a share of the largest."""
+    from femgear.report.style import COLOURS, label, legend_below, new_figure
+
+    figure, (ax,) = new_figure(width=8.5, height=4.4)
+    top = max(np.max(amplitude) for _, _, amplitude in curves)
+    for number, (text, frequency, amplitude) in enumerate(curves):
+        shown = np.asarray(amplitude) > floor * top
+        colour, at = COLOURS[number % len(COLOURS)], np.asarray(frequency)[shown]
+        ax.vlines(at, floor * top, np.asarray(amplitude)[shown], color=colour, linewidth=1.4)
+        ax.plot(at, np.asarray(amplitude)[shown], "osD^"[number % 4], color=colour, markersize=5, label=text)
+    ax.set_yscale("log")
+    ax.set_ylim(floor * top, 2.0 * top)
+    label(ax, x, y)
+    legend_below(figure)
+    return figure
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 """Figures of impacts: what is dashed, coloured and marked."""
 
 import numpy as np
+import xarray as xr
+from impacts import line_spectrum
 from matplotlib.colors import to_hex
 
 from femgear.report.style import png_bytes
@@ -8,7 +10,6 @@ from femgear.trains.gear_pair.figures import (
     STATE_COLOURS,
     amplitude_and_mean,
     bifurcation_and_exponent,
-    line_spectrum,
     phase_sections,
     state_bands,
 )
@@ -32,7 +33,7 @@ def test_unstable_segments_are_dashed_in_both_panels():
 
 
 def test_bands_have_the_colours_of_their_states():
-    figure = state_bands([("down", RATIO[::-1], [2, 2, 1, 1, 0, 0, 0])], ("a", "b", "c"))
+    figure = state_bands([("down", RATIO[::-1], [2, 2, 1, 1, 0, 0, 0])])
     bars = [patch for patch in figure.axes[0].patches if patch.get_width() > 0]
     assert sum(bar.get_width() for bar in bars) == 6.0
     colours = [to_hex(bar.get_facecolor()).lower() for bar in sorted(bars, key=lambda b: b.get_x())]
@@ -41,7 +42,11 @@ def test_bands_have_the_colours_of_their_states():
 
 def test_bifurcation_diagram_shows_every_point_and_error():
     points = np.random.default_rng(0).standard_normal((7, 5))
-    figure = bifurcation_and_exponent(RATIO, points, RATIO, 0.1 * RATIO, lowest=-RATIO, highest=RATIO)
+    columns = {"exponent": RATIO, "error": 0.1 * RATIO, "lowest": -RATIO, "highest": RATIO}
+    data = {name: ("ratio", column) for name, column in columns.items()} | {
+        "point": (("ratio", "period"), points)
+    }
+    figure = bifurcation_and_exponent(xr.Dataset(data, coords={"ratio": RATIO}))
     top, bottom = figure.axes
     np.testing.assert_array_equal(top.get_lines()[0].get_ydata(), points.ravel())
     segments = bottom.collections[0].get_segments()
@@ -51,7 +56,10 @@ def test_bifurcation_diagram_shows_every_point_and_error():
 def test_sections_that_repeat_are_large_dots():
     rng = np.random.default_rng(1)
     cloud, dot = rng.standard_normal((2, 300)), np.full((2, 300), 0.4)
-    figure = phase_sections([("chaos", *cloud), ("period 1", *dot)])
+    data = {f"section_{name}": ("section", [1.0, 2.0]) for name in ("ratio", "exponent", "error")}
+    for name, motion in zip(("deflection", "velocity"), zip(cloud, dot)):
+        data[f"section_{name}"] = ("section", "run"), np.array(motion)
+    figure = phase_sections(xr.Dataset(data))
     small, large = (ax.get_lines()[0].get_markersize() for ax in figure.axes)
     assert small < large and np.ptp(figure.axes[1].get_xlim()) == 2.0
 

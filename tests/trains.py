@@ -1,11 +1,15 @@
-"""Trains that the tests of stages in series share."""
+"""Trains that tests share: stages in series, gear pairs."""
 
 import math
+import tomllib
 from dataclasses import replace
 
 import numpy as np
+from published.multistage_example import CASES
 
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
+from femgear.system.system import MechanicalSystem
+from femgear.trains.gear_pair.model import ImpactPair
 from femgear.trains.multistage.model import Stage, in_series
 
 EVEN = 2.0 * np.pi * np.arange(3) / 3
@@ -48,3 +52,52 @@ def two_stages(*, torsional=3e5, lateral=1e8, **options):
     one = stage((20, 20, 60), 3e-3, phases=np.arange(6) / 3.0 % 1.0, **options)
     other = stage((20, 20, 60), 5e-3, phases=(0.0, 2 / 3, 1 / 3, 0.5, 1 / 6, 5 / 6), angle=0.4)
     return in_series([one, other], torsional=torsional, lateral=lateral)
+
+
+def published_table():
+    """Rows of the published four-stage table by stage, in its units: kg, mm, kg mm^2, N/mm."""
+    rows = []
+    for one in tomllib.loads((CASES / "published_four_stages.toml").read_text(encoding="utf-8"))["stage"]:
+        texts = {f"{name} {entry}": one[name][entry] for name in ("sun", "planet", "carrier")
+                 for entry in ("mass", "inertia")}  # fmt: skip
+        texts |= dict(
+            zip(("sun base radius", "planet base radius"), (one["radii"]["sun"], one["radii"]["planet"]))
+        )
+        stiffness = one["radii"]["mesh_stiffness"]
+        texts["external mesh stiffness"] = stiffness["sun_planet"]
+        texts["internal mesh stiffness"] = stiffness["planet_ring"]
+        rows.append({name: float(text.split()[0]) for name, text in texts.items()})
+    return rows
+
+
+def equivalent_mass(inertia, base_radius):
+    """Mass [kg] of two gears that moves along their line of action."""
+    (one, other), (first, second) = inertia, base_radius
+    return one * other / (first**2 * other + second**2 * one)
+
+
+def gear_pair(inertia, base_radius, *, torque=0.0, mesh_damping=0.0):
+    """Two gears on rigid shafts (Kahraman and Singh 1990); the rotation in their ratio is free."""
+    column = np.array([[base_radius[0]], [-base_radius[1]]])
+    return MechanicalSystem(
+        M=np.diag(inertia), C=mesh_damping * (column @ column.T), K=np.zeros((2, 2)), W=column,
+        load=torque / base_radius[0] * column[:, 0], dofs=("theta_1", "theta_2"),
+    )  # fmt: skip
+
+
+def example_pair(damping_ratio):
+    """The pair of cases/gear_pair.toml without dimensions."""
+    return ImpactPair(damping_ratio=damping_ratio, load=0.9, tooth_error=(0.72,), stiffness=(-0.1,))
+
+
+def lightly_loaded_pair(damping_ratio=0.05):
+    """The pair of cases/gear_pair_light.toml without dimensions."""
+    return ImpactPair(damping_ratio=damping_ratio, load=0.1, tooth_error=(0.2,))
+
+
+def level_crossings(parameter, value, level):
+    """Parameters at which a quantity along a curve passes a level, by linear interpolation."""
+    parameter, away = np.asarray(parameter, float), np.asarray(value, float) - level
+    i = np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:]))
+    share = away[i] / (away[i] - away[i + 1])
+    return parameter[i] + share * (parameter[i + 1] - parameter[i])

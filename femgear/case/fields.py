@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from femgear.case.text import found, shown
@@ -124,6 +124,20 @@ def Number(
     return Annotated[float, BeforeValidator(convert), WithJsonSchema(schema)]
 
 
+RIGID = "rigid"
+
+
+def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> Any:
+    """Type of a stiffness that may be the text ``"rigid"``, infinite in the model."""
+    convert = Quantity(dimension, low, high).__metadata__[0].func
+
+    def rigid_too(value: object) -> float:
+        return math.inf if value == RIGID else convert(value)
+
+    schema = Field(json_schema_extra={"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
+    return Annotated[float, BeforeValidator(rigid_too), schema]
+
+
 def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Any:
     """Type of a whole number within a window; 27.0, "27" and true are refused.
 
@@ -155,6 +169,11 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Any:
 
     schema = {"type": "integer", "minimum": -high if signed else low, "maximum": high}
     return Annotated[int, BeforeValidator(convert), WithJsonSchema(schema)]
+
+
+def Several(kind: Any, count: int) -> Any:
+    """Type of a list of so many entries of one kind."""
+    return Annotated[tuple[kind, ...], Field(min_length=count, max_length=count)]
 
 
 def _one_line(value: object) -> str:

@@ -10,14 +10,19 @@ from __future__ import annotations
 import difflib
 import math
 import re
+from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from femgear.case import text as case_text
 from femgear.case.fields import described
 from femgear.case.sections import Case, RackSection
+from femgear.case.text import ReadCase
 from femgear.case.units import ANGLE, LENGTH
 from femgear.errors import CaseError, GeometryError
+
+AnyCase = TypeVar("AnyCase", bound=ReadCase)
 
 _DIMENSIONS = {
     "centre_distance": LENGTH,
@@ -154,6 +159,46 @@ def _dotted(location: tuple, prefix: str) -> str:
         else:
             key += ("." if key else "") + case_text.printable(part)
     return key
+
+
+def checked_case(
+    model: type[AnyCase],
+    data: dict,
+    text: str,
+    name: str,
+    *,
+    check: Callable[[AnyCase], Iterable[CaseError]],
+) -> AnyCase:
+    """Case of the tables of a file, validated and checked as a whole.
+
+    Parameters
+    ----------
+    model : type
+    data : dict
+        Tables of the file.
+    text : str
+        The file, for line numbers; empty where the text is not the user's.
+    name : str
+        Its name.
+    check : callable
+        ``(case) -> errors``: what no entry shows alone; an error that it raises is one of them.
+
+    Raises
+    ------
+    CaseError
+        Everything that is wrong, at once.
+    """
+    try:
+        case = model.model_validate(data)
+    except ValidationError as error:
+        raise combine(translate(error, model), text, name) from None
+    try:
+        problems = list(check(case))
+    except CaseError as error:
+        problems = [error]
+    if problems:
+        raise combine(problems, text, name)
+    return case
 
 
 def combine(problems: list[CaseError], text: str, name: str) -> CaseError:

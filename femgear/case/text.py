@@ -191,7 +191,8 @@ def line_of(text: str, key: str) -> int | None:
 def _entries(text: str):
     """Dotted key and line number of every table header and every key that starts a line.
 
-    Tables of a list are numbered: ``sun.modifications[0].amount``.
+    Tables of a list are numbered, and with them the tables inside: ``sun.modifications[0].amount``,
+    ``stage[1].gears.module``.
     """
     table, quoted, counts = "", None, {}
     for number, line in enumerate(text.splitlines(), start=1):
@@ -204,6 +205,9 @@ def _entries(text: str):
         entry = _ENTRY.match(line)
         if header:
             table = _clean(header[2])
+            for name, count in list(counts.items()):
+                if table.startswith(f"{name}."):
+                    table = f"{name}[{count}]{table[len(name) :]}"
             if header[1] == "[[":
                 counts[table] = counts.get(table, -1) + 1
                 table = f"{table}[{counts[table]}]"

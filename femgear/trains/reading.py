@@ -7,6 +7,7 @@ sets without such a section.
 
 from __future__ import annotations
 
+import difflib
 import os
 import re
 from collections.abc import Mapping
@@ -18,6 +19,7 @@ from pydantic import ValidationError, create_model
 from femgear.case import text as case_text
 from femgear.case.case import with_shafts
 from femgear.case.checks import cross_check
+from femgear.case.fields import described
 from femgear.case.problems import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
 from femgear.case.tables import embed_profiles
@@ -25,7 +27,7 @@ from femgear.case.text import text_with_points
 from femgear.errors import CaseError
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
-from femgear.trains.protocol import Train
+from femgear.trains.protocol import OwnFile, Train
 
 
 def read_case(path: str | os.PathLike) -> Any:
@@ -200,7 +202,7 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
     CaseError
         E-MODEL: no train reads files of this model.
     """
-    own = {train.name: train.own_file for train in registry.TRAINS if train.own_file is not None}
+    own = _own_files()
     if model is None:
         return every_section().model_json_schema()
     if model not in own:
@@ -234,10 +236,12 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
             remedy="update femgear",
             file=name,
         )
-    for train in registry.TRAINS:
-        if train.own_file is not None and train.own_file.claims(data):
-            return train.own_file.build(data, text, name, numbered=numbered)
     lines = text if numbered else ""
+    for own_file in _own_files().values():
+        if own_file.claims(data):
+            return own_file.build(data, text, name, numbered=numbered)
+    if "model" in data:
+        raise combine([_unknown_model(data["model"])], lines, name)
     train = _train_of_set(data, lines, name)
     files = embed_profiles(data, name)
     if files:
@@ -251,6 +255,26 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     said = (*notices(data), *train.notices(data), *added_material(case))
     case.read_from(text, lines, name, notices=said, profile_files=files)
     return with_shafts(case)
+
+
+def _own_files() -> dict[str, OwnFile]:
+    """Trains with a case file of their own, by the model that the file names."""
+    return {train.name: train.own_file for train in registry.TRAINS if train.own_file is not None}
+
+
+def _unknown_model(value: object) -> CaseError:
+    if not isinstance(value, str):
+        return CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", key="model", value=value)
+    known = tuple(_own_files())
+    near = difflib.get_close_matches(value.lower(), known, n=1, cutoff=0.6)
+    return CaseError(
+        "there is no such model",
+        code="E-CHOICE",
+        key="model",
+        value=value,
+        limit=f"{', '.join(known)}; planetary sets have no entry model",
+        remedy=f"did you mean {near[0]}?" if near else "leave it out",
+    )
 
 
 def _train_of_set(data: dict, lines: str, name: str) -> Train:

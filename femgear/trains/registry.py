@@ -5,11 +5,13 @@ from __future__ import annotations
 from femgear.errors import CaseError
 from femgear.trains.drivetrain.stages import DRIVETRAIN
 from femgear.trains.elastic.stages import ELASTIC
+from femgear.trains.gear_pair.stages import GEAR_PAIR
 from femgear.trains.helical.stages import HELICAL
+from femgear.trains.multistage.stages import MULTISTAGE
 from femgear.trains.planar.stages import PLANAR
 from femgear.trains.protocol import Stage, Train
 
-TRAINS: tuple[Train, ...] = (DRIVETRAIN, HELICAL, PLANAR, ELASTIC)
+TRAINS: tuple[Train, ...] = (MULTISTAGE, GEAR_PAIR, DRIVETRAIN, HELICAL, PLANAR, ELASTIC)
 """Special models before more general ones: a case belongs to the first whose model it is one of."""
 
 

@@ -2,21 +2,20 @@
 
 import numpy as np
 import pytest
+from trains import example_pair, level_crossings
 
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.system.elements import GearMeshes
-from femgear.system.fourier import FourierSeries, constant
-from femgear.trains.gear_pair.model import (
+from femgear.system.contact_states import (
     STATE_NAMES,
     UNKNOWN,
     contact_states,
-    example_pair,
-    level_crossings,
     range_states,
     solution_states,
     state_regions,
 )
+from femgear.system.elements import GearMeshes
+from femgear.system.fourier import FourierSeries, constant
 
 MESHES = GearMeshes([2, 0, 1], constant([2.0, 2.0, 2.0]), deflection=constant([1.0, 1.0, 1.0]), backlash=2.0)
 

@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
+from trains import equivalent_mass, gear_pair
 
-from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.system.elements import GearMeshes
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import MechanicalSystem, NonlinearSystem
-from femgear.trains.gear_pair.model import equivalent_mass, gear_pair
 
 INERTIA, RADIUS = (1.2e-3, 4.5e-3), (0.04, 0.07)
 STIFFNESS, TORQUE = 3e8, 120.0
@@ -69,19 +68,3 @@ def test_contact_loss_is_that_of_one_mass_and_shooting_confirms_it():
     np.testing.assert_allclose(shot.solution.deflection, found.deflection, atol=1e-4 * largest)
     assert len(shot.multipliers) == 4 and len(shot.verdict.multipliers) == 2
     np.testing.assert_allclose(np.abs(shot.verdict.multipliers), np.abs(found.verdict.multipliers), atol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("change", "key"),
-    [
-        ({"inertia": (1.0, 0.0)}, "inertia"),
-        ({"inertia": (1.0, 1.0, 1.0)}, "inertia"),
-        ({"base_radius": (0.1, np.inf)}, "base_radius"),
-        ({"torque": np.nan}, "torque"),
-        ({"mesh_damping": -1.0}, "mesh_damping"),
-    ],
-)
-def test_numbers_that_cannot_be_are_refused(change, key):
-    with pytest.raises(CaseError, match="E-GEAR-PAIR") as caught:
-        gear_pair(**{"inertia": INERTIA, "base_radius": RADIUS, **change})
-    assert caught.value.key == key and caught.value.limit

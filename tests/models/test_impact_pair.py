@@ -5,23 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
+from trains import example_pair, level_crossings
 
 from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import parameter_curve
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.stroboscopic import sweep_response
+from femgear.system.contact_states import range_states
 from femgear.system.elements import GearMeshes
 from femgear.system.fourier import FourierSeries, SummedSeries, constant, harmonic_lines
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
-from femgear.trains.gear_pair.model import (
-    ImpactPair,
-    PairBearings,
-    example_pair,
-    level_crossings,
-    pair_scales,
-    range_states,
-    separation_ratios,
-)
+from femgear.trains.gear_pair.model import ImpactPair, PairBearings, pair_scales, separation_ratios
 
 
 def describing_functions(mean, amplitude):

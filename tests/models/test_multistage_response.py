@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from published.multistage_example import DESIGNS, SPEED, TORQUE, example_gears, four_stage_train
+from published.multistage_example import four_stage_case, four_stage_train
 from trains import two_stages
 from validation.reference.frequency_response import mesh_error_response
 
@@ -25,8 +25,11 @@ from femgear.trains.multistage.model import (
     train_torques,
     turning_couplings,
 )
+from femgear.trains.multistage.section import stage_gears
 from femgear.trains.multistage.stages import base_frequencies, error_response, multistage_problem, stage_error
 from femgear.trains.planar.model import phased_series, planar_problem
+
+SPEED, TORQUE = 50.0 * np.pi, 350.0
 
 
 def test_load_bends_the_train_as_the_torques_say():
@@ -67,9 +70,9 @@ def test_modal_summation_is_the_direct_solution_for_every_stage():
 
 
 def test_phases_of_the_example_are_those_of_its_gears():
-    train = four_stage_train()
-    for one, design in zip(train.stages, DESIGNS):
-        assert one.phases == pytest.approx(example_gears(design).mesh_phases)
+    case, train = four_stage_case(), four_stage_train()
+    for one, section in zip(train.stages, case.stage):
+        assert one.phases == pytest.approx(stage_gears(section).mesh_phases)
     error = stage_error(train.stages[2], [1.0], [1.0])
     assert error[:, 0] == pytest.approx(np.exp(2j * np.pi * train.stages[2].phases))
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from trains import gear_pair
 
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
@@ -10,7 +11,6 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
-from femgear.trains.gear_pair.model import gear_pair
 
 OMEGA, PERIOD = 0.7, 2 * np.pi / 0.7
 RELATIVE = np.array([[1.0, -1.0], [-1.0, 1.0]])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from trains import example_pair, lightly_loaded_pair
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -10,7 +11,6 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
-from femgear.trains.gear_pair.model import example_pair, lightly_loaded_pair
 
 
 def oscillator(element, damping, force=0.0):

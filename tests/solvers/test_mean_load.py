@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from trains import gear_pair
 
 from femgear.errors import ConvergenceError
 from femgear.solvers.continuation.branches import frequency_response_curve
@@ -13,7 +14,6 @@ from femgear.solvers.periodic.harmonic_balance import (
 from femgear.system.elements import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
-from femgear.trains.gear_pair.model import gear_pair
 
 NOTE = "nothing carries the mean load of column 1 (mesh 1)"
 

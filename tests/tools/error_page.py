@@ -20,7 +20,7 @@ CODE = re.compile(r"E-[A-Z0-9]+(?:-[A-Z0-9]+)*")
 HEAD = """# Errors
 
 Every refusal names the file and the key where there are any, the value found, what is allowed and what to do.
-Its code is stable: scripts may test `error.code` of a `femgear.errors.FemgearError`. Exit codes of the command
+Its code is stable: scripts may test the `code` of a `femgear.errors.FemgearError`. Exit codes of the command
 line are 2 for input that cannot be used, 3 for computations without trustworthy result, 4 for results that
 cannot be written or read.
 

@@ -10,9 +10,7 @@ from fractions import Fraction
 import numpy as np
 from published.multistage_example import (
     PUBLISHED_FREQUENCIES,
-    SPEED,
-    TORQUE,
-    example_errors,
+    four_stage_case,
     four_stage_train,
     published_train,
 )
@@ -31,11 +29,12 @@ from femgear.trains.multistage.model import (
     train_speeds,
     train_torques,
 )
-from femgear.trains.multistage.stages import error_response, multistage_modes
+from femgear.trains.multistage.stages import error_response, loaded_errors, multistage_modes
 from femgear.trains.planar.model import planar_modes
 from validation.reference.frequency_response import mesh_error_response
 from validation.rows import Row, at_most, counted, information, within
 
+SPEED, TORQUE = 50.0 * math.pi, 350.0
 STRUCTURE = "Kiracofe and Parker, J. Vib. Acoust. 129, 2007: structure of the modes"
 
 
@@ -129,7 +128,7 @@ def _reflected(stage: Stage) -> float:
 def response() -> tuple[Row, ...]:
     """Modal summation to the transmission errors of every stage."""
     train, speeds = four_stage_train(), SPEED * np.linspace(0.3, 1.2, 5)
-    errors = example_errors(train, TORQUE, 3)
+    errors = loaded_errors(four_stage_case(), train)
     found = error_response(train, speeds, errors, damping_ratio=0.03)
     soft = error_response(four_stage_train(lateral=False), speeds, errors, damping_ratio=0.03)
     system, k, rows = multistage_system(train), mean_mesh_stiffness(train), []

@@ -20,6 +20,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, ValidationError, ValidationInfo, field_validator
 
 from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
+from femgear.case.fields import StiffnessOrRigid as Stiffness
 from femgear.case.problems import combine, translate
 from femgear.case.tables import Columns, embed_points, read_columns
 from femgear.case.text import ReadCase, text_with_points
@@ -37,7 +38,6 @@ from femgear.case.units import (
     TIME,
     TORQUE,
     TORSION,
-    Dimension,
 )
 from femgear.errors import CaseError
 from femgear.system import shaft as shafts
@@ -57,7 +57,6 @@ FORMAT = 1
 MOST_PARTS = 200
 MOST_POINTS = 20_000
 LARGEST_TORQUE, LATEST, FASTEST_RATE = 1e9, 1e6, 1e7
-RIGID = "rigid"
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
 
 # Ratios of radii and teeth that differ by more belong to no gears; profile shifts explain the rest.
@@ -96,17 +95,6 @@ def _reference(value: object) -> str:
     if not isinstance(value, str):
         raise refuse(f"the name of a body is needed, not {described(value)}", code="E-TYPE", value=value)
     return value
-
-
-def Stiffness(dimension: Dimension, low: float, high: float) -> Any:
-    """Type of a stiffness that may be the text ``"rigid"``, infinite in the model."""
-    convert = Quantity(dimension, low, high).__metadata__[0].func
-
-    def rigid_too(value: object) -> float:
-        return math.inf if value == RIGID else convert(value)
-
-    schema = Field(json_schema_extra={"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
-    return Annotated[float, BeforeValidator(rigid_too), schema]
 
 
 Name = Annotated[str, BeforeValidator(_name)]
@@ -329,8 +317,12 @@ def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True)
         Everything that is wrong, at once.
     """
     lines = text if numbered else ""
-    if data.get("model") != MODEL:
-        raise combine([_unknown_model(data.get("model"))], lines, name)
+    if "model" not in data:
+        remedy = f'write model = "{MODEL}" before the first table'
+        missing = CaseError(
+            "a file with bodies needs its model", code="E-KEY-MISSING", key="model", remedy=remedy
+        )
+        raise combine([missing], lines, name)
     files = embed_torques(data, name)
     if files:
         text = text_with_points(data, name, points="torque series", remedy="give them at fewer points")
@@ -345,27 +337,8 @@ def build_drivetrain(data: dict, text: str, name: str, *, numbered: bool = True)
 
 
 def is_drivetrain(data: dict) -> bool:
-    """Whether tables name a model, or have bodies, of which planetary sets have none."""
-    return "model" in data or isinstance(data.get("body"), list)
-
-
-def _unknown_model(value: object) -> CaseError:
-    if value is None:
-        remedy = f'write model = "{MODEL}" before the first table'
-        return CaseError(
-            "a file with bodies needs its model", code="E-KEY-MISSING", key="model", remedy=remedy
-        )
-    if not isinstance(value, str):
-        return CaseError(f"a text is needed, not {described(value)}", code="E-TYPE", key="model", value=value)
-    near = difflib.get_close_matches(value.lower(), [MODEL], n=1, cutoff=0.6)
-    return CaseError(
-        "there is no such model",
-        code="E-CHOICE",
-        key="model",
-        value=value,
-        limit=f'"{MODEL}"; planetary sets have no entry model',
-        remedy=f"did you mean {near[0]}?" if near else "leave it out",
-    )
+    """Whether tables name this model, or have bodies, of which planetary sets have none."""
+    return data.get("model", MODEL) == MODEL and ("model" in data or isinstance(data.get("body"), list))
 
 
 def need_drivetrain(case: object) -> DrivetrainCase:

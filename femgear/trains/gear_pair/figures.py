@@ -1,9 +1,10 @@
-"""Figures of impacts: amplitude and mean over frequency, contact states, sections and exponents, spectra."""
+"""Figures of impacts: amplitude and mean over frequency, contact states, sections and exponents."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,12 @@ from femgear.report.style import (
     legend_below,
     new_figure,
 )
+from femgear.system.contact_states import STATE_NAMES
+from femgear.trains.protocol import Drawn, Figures
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
 
 # colours of no impact, one-sided and two-sided impact, and of states that are not known
 STATE_COLOURS = (GREEN, ORANGE, VERMILION, GREY)
@@ -71,20 +78,15 @@ def amplitude_and_mean(
     return figure
 
 
-def state_bands(rows: Sequence[tuple], names: Sequence[str], *, x: str = "frequency ratio [1]"):
-    """Contact state over frequency, one band a row.
+def state_bands(rows: Sequence[tuple]) -> Figure:
+    """Contact state over the frequency ratio, one band a row.
+
+    A border is drawn halfway between two ratios; sparse rows show these as dots.
 
     Parameters
     ----------
-    rows : sequence of (text, parameter (p,), state (p,) int)
-        Sweeps, or pieces of a curve between limit points.
-    names : sequence of str
-        Of states 0, 1 and 2, and of 3 where one is not known. A border is drawn halfway between two
-        parameters; sparse rows show these as dots.
-
-    Returns
-    -------
-    Figure
+    rows : sequence of (text, ratio (p,), state (p,) int)
+        Sweeps, or pieces of a curve between limit points; numbers of states in `STATE_NAMES`.
     """
     figure, (ax,) = new_figure(width=8.5, height=1.6 + 0.5 * len(rows))
     marked = False
@@ -99,71 +101,44 @@ def state_bands(rows: Sequence[tuple], names: Sequence[str], *, x: str = "freque
             ax.plot(at, np.full(len(at), place), **mark, label=None if marked else "computed ratios")
             marked = True
     present = {int(one) for _, _, state in rows for one in np.unique(state)}
-    for number, (colour, name) in enumerate(zip(STATE_COLOURS, names)):
+    for number, (colour, name) in enumerate(zip(STATE_COLOURS, STATE_NAMES)):
         if number < 3 or number in present:
             ax.barh([0], [0.0], color=colour, label=name)
     ax.set_yticks(range(len(rows)), [text for text, _, _ in rows])
     ax.invert_yaxis()
     ax.grid(False, axis="y")
-    label(ax, x)
+    label(ax, "frequency ratio [1]")
     legend_below(figure, columns=3)
     return figure
 
 
-def bifurcation_and_exponent(
-    parameter, points, exponent, error, *, lowest=None, highest=None, x: str = "frequency ratio [1]",
-    quantity: str = "x once a period [half backlash]",
-):  # fmt: skip
-    """Stroboscopic points over a parameter, and the largest Lyapunov exponent with its error below.
+def bifurcation_and_exponent(chaos: xr.Dataset) -> Figure:
+    """Deflections once a period of chaos.nc over the ratio, and the largest exponent with its error below.
 
-    Parameters
-    ----------
-    parameter : (p,) array
-    points : (p, n) array
-    exponent, error : (p,) arrays
-        Per unit of time 1 / omega_n.
-    lowest, highest : (p,) arrays, optional
-        Extremes of the motion, drawn as thin lines.
-    x, quantity : str
-
-    Returns
-    -------
-    Figure
+    Thin lines are the extremes of the motion.
     """
-    parameter, points = np.asarray(parameter, float), np.asarray(points, float)
+    ratio, points = chaos["ratio"].values, chaos["point"].values
     figure, (top, bottom) = new_figure(rows=2, width=8.5, height=7.0, sharex=True)
-    top.plot(np.repeat(parameter, points.shape[1]), points.ravel(), ".", color=BLUE, markersize=1.6)
-    for value, text in ((lowest, "smallest and largest x"), (highest, None)):
-        if value is not None:
-            top.plot(parameter, value, color=GREY, linewidth=0.9, label=text)
+    top.plot(np.repeat(ratio, points.shape[1]), points.ravel(), ".", color=BLUE, markersize=1.6)
+    for name, text in (("lowest", "smallest and largest x"), ("highest", None)):
+        top.plot(ratio, chaos[name].values, color=GREY, linewidth=0.9, label=text)
     for level, text in ((1.0, "flanks close"), (-1.0, None)):
         top.axhline(level, color=ORANGE, linestyle="--", linewidth=1.1, label=text)
-    exponent = np.asarray(exponent, float)
     bottom.axhline(0.0, color=BLACK, linewidth=0.9)
-    bottom.errorbar(
-        parameter, exponent, yerr=error, color=VERMILION, linewidth=1.1, elinewidth=0.8, marker="o",
-        markersize=3.0,
-    )  # fmt: skip
-    label(top, y=quantity)
-    label(bottom, x, "largest exponent [$\\omega_n$]")
+    style = {"color": VERMILION, "linewidth": 1.1, "elinewidth": 0.8, "marker": "o", "markersize": 3.0}
+    bottom.errorbar(ratio, chaos["exponent"].values, yerr=chaos["error"].values, **style)
+    label(top, y="x once a period [half backlash]")
+    label(bottom, "frequency ratio [1]", "largest exponent [$\\omega_n$]")
     legend_below(figure)
     return figure
 
 
-def phase_sections(panels: Sequence[tuple], *, x: str = "x [half backlash]", y: str = "velocity"):
-    """Stroboscopic sections side by side.
-
-    Parameters
-    ----------
-    panels : sequence of (title, displacement (n,), velocity (n,))
-    x, y : str
-
-    Returns
-    -------
-    Figure
-    """
+def phase_sections(chaos: xr.Dataset) -> Figure:
+    """Stroboscopic sections of chaos.nc side by side, with the exponent of each."""
+    names = ("ratio", "exponent", "error", "deflection", "velocity")
+    panels = list(zip(*(chaos[f"section_{name}"].values for name in names)))
     figure, axes = new_figure(columns=len(panels), width=4.0 * len(panels), height=4.2)
-    for ax, (title, displacement, velocity) in zip(axes, panels):
+    for ax, (ratio, exponent, error, displacement, velocity) in zip(axes, panels):
         # points that repeat lie on one another: draw each place large enough to be seen
         spread = max(np.ptp(displacement), np.ptp(velocity))
         size = 2.0 if spread > 1e-2 and len(np.unique(np.round(displacement, 3))) > 8 else 8.0
@@ -171,36 +146,8 @@ def phase_sections(panels: Sequence[tuple], *, x: str = "x [half backlash]", y: 
         if spread <= 1e-2:
             ax.set_xlim(np.mean(displacement) + np.array([-1.0, 1.0]))
             ax.set_ylim(np.mean(velocity) + np.array([-1.0, 1.0]))
-        label(ax, x, title=title)
-    label(axes[0], y=y)
-    return figure
-
-
-def line_spectrum(curves: Sequence[tuple], *, x: str = "frequency / mesh frequency [1]", y: str, floor=1e-4):
-    """Lines of spectra as stems on a logarithmic scale.
-
-    Parameters
-    ----------
-    curves : sequence of (text, frequency (L,), amplitude (L,))
-    x, y : str
-    floor : float
-        Lowest value shown, relative to the largest.
-
-    Returns
-    -------
-    Figure
-    """
-    figure, (ax,) = new_figure(width=8.5, height=4.4)
-    top = max(np.max(amplitude) for _, _, amplitude in curves)
-    for number, (text, frequency, amplitude) in enumerate(curves):
-        shown = np.asarray(amplitude) > floor * top
-        colour, at = COLOURS[number % len(COLOURS)], np.asarray(frequency)[shown]
-        ax.vlines(at, floor * top, np.asarray(amplitude)[shown], color=colour, linewidth=1.4)
-        ax.plot(at, np.asarray(amplitude)[shown], "osD^"[number % 4], color=colour, markersize=5, label=text)
-    ax.set_yscale("log")
-    ax.set_ylim(floor * top, 2.0 * top)
-    label(ax, x, y)
-    legend_below(figure)
+        label(ax, "x [half backlash]", title=f"Ω = {ratio:.2f}, λ = {exponent:.3f} ± {error:.3f}")
+    label(axes[0], y="velocity [b $\\omega_n$]")
     return figure
 
 
@@ -208,3 +155,81 @@ def _runs(chosen: np.ndarray) -> list[slice]:
     """Runs of chosen segments as slices of their points."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
     return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
+
+
+def contact_rows(response: xr.Dataset | None, sweep: xr.Dataset | None) -> list[tuple]:
+    """Rows of `state_bands`: the branch from limit point to limit point, and the sweeps as they ran."""
+    rows = []
+    if response is not None:
+        ratio, state = response["ratio"].values, _state_numbers(response)
+        cuts = [0, *response["fold"].values, len(ratio) - 1]
+        pieces = [slice(a, b + 1) for a, b in pairwise(cuts)]
+        names = ["upper branch", "between the limit points, unstable", "lower branch"]
+        if len(pieces) != len(names):
+            names = [f"piece {number + 1}" for number in range(len(pieces))]
+        rows += [(f"balance: {name}", ratio[part], state[part]) for name, part in zip(names, pieces)]
+    if sweep is not None:
+        ratio, (up, down) = sweep["ratio"].values, _state_numbers(sweep)
+        rows += [("integration: sweep up", ratio, up), ("integration: sweep down", ratio[::-1], down[::-1])]
+    return rows
+
+
+def _state_numbers(data: xr.Dataset) -> np.ndarray:
+    return np.vectorize(STATE_NAMES.index, otypes=[int])(data["state"].values)
+
+
+def draw_response(drawn: Drawn) -> dict[str, Figure]:
+    """Amplitude and mean of the branch, with the sweeps as markers."""
+    data, names = drawn.data["response"], ("ratio", "amplitude", "mean")
+    curve = ("harmonic balance", *(data[name].values for name in names), data["stable"].values)
+    sweeps = []
+    if "sweep" in drawn.data:
+        sweep = drawn.data["sweep"]
+        for n, direction in enumerate(sweep["direction"].values):
+            sweeps.append(
+                (f"sweep {direction}", sweep["ratio"].values, *(sweep[k].values[n] for k in names[1:]))
+            )
+    return {"amplitude_and_mean": amplitude_and_mean([curve], sweeps)}
+
+
+def draw_states(drawn: Drawn) -> dict[str, Figure]:
+    """Contact states along the branch and in the sweeps."""
+    rows = contact_rows(drawn.data.get("response"), drawn.data["sweep"])
+    return {"contact_states": state_bands(rows)}
+
+
+def draw_chaos(drawn: Drawn) -> dict[str, Figure]:
+    """Bifurcation diagram with the exponents, and the long sections."""
+    data = drawn.data["chaos"]
+    figures = {"chaos": bifurcation_and_exponent(data)}
+    if "section_ratio" in data:
+        figures["sections"] = phase_sections(data)
+    return figures
+
+
+FIGURES = {
+    "response": Figures(
+        {
+            "amplitude_and_mean": "Amplitude and mean of the relative deflection over the frequency ratio: "
+            "harmonic balance, dashed where the motion is not known to be stable; triangles: settled motions "
+            "of the sweeps in time."
+        },
+        draw_response,
+    ),
+    "sweep": Figures(
+        {
+            "contact_states": "Contact over the frequency ratio: drive flanks closed, impacts on one side, "
+            "impacts on both; a border is drawn halfway between two computed ratios."
+        },
+        draw_states,
+    ),
+    "chaos": Figures(
+        {
+            "chaos": "Deflection once a tooth period over the frequency ratio, and the largest Lyapunov "
+            "exponent with its error: above zero neighbouring motions part.",
+            "sections": "Deflection and velocity once a tooth period at some ratios Ω, with the largest "
+            "exponent λ.",
+        },
+        draw_chaos,
+    ),
+}

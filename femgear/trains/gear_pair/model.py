@@ -1,4 +1,4 @@
-"""Gear pair with backlash: with inertias and radii, in dimensionless form, and the contact of its flanks.
+"""Dimensionless gear pair with backlash, its units, and the ratios at which its flanks part or hit.
 
 Rotations on rigid shafts after A. Kahraman and R. Singh, Non-linear dynamics of a spur gear pair, J. Sound
 Vib. 142 (1990) 49-75, Eqs. (1) to (4): the deflection along the line of action is
@@ -17,23 +17,18 @@ and drive flanks touch above x = 1, back flanks below x = -1. In the coordinates
 through the inertia of ``u = x + e - y_1 + y_2`` alone: ``x'' + 2 zeta x' + k(t) f(x) = F - e''`` without
 bearings. Time is scaled once more so that the tooth frequency is one for every frequency ratio Omega,
 ``theta = Omega t``: M and C carry Omega^2 and Omega, and branches over Omega are branches over a parameter.
-
-No impact, single-sided and double-sided impact are told apart, as in the paper of 1990, by the range of the
-relative deflection.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from femgear.errors import CaseError, checked_count, checked_numbers
 from femgear.solvers.continuation.branches import Branch
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.system.elements import GearMeshes
 from femgear.system.fourier import FourierSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
@@ -44,76 +39,6 @@ DRIVE, BACK = 1.0, -1.0
 # instants of a period, and a step of the ratio within which interpolation along the branch will do
 _SAMPLES = 2048
 _SHORT = 1e-3
-
-NORMAL, ONE_SIDED, TWO_SIDED, UNKNOWN = 0, 1, 2, 3
-STATE_NAMES = ("normal", "one-sided impact", "two-sided impact", "not known")
-
-
-def gear_pair(
-    inertia: tuple[float, float],
-    base_radius: tuple[float, float],
-    *,
-    torque: float = 0.0,
-    mesh_damping: float = 0.0,
-) -> MechanicalSystem:
-    """Driving gear 1 and driven gear 2; give it one `GearMeshes` on column 0.
-
-    The rotation of both gears in their ratio is free; the torque on gear 2 balances that on gear 1.
-
-    Parameters
-    ----------
-    inertia : (2,) sequence
-        Polar moments of inertia [kg m^2].
-    base_radius : (2,) sequence
-        [m]
-    torque : float
-        On gear 1 [N m]; positive presses the drive flanks together.
-    mesh_damping : float
-        Viscous damping along the line of action [N s/m]. It acts on ``x'``; where the mesh has a deflection
-        (transmission error) the publication lets it act on the motion beyond that.
-
-    Returns
-    -------
-    MechanicalSystem
-        Rotations ``theta_1``, ``theta_2`` [rad], opposite senses positive, and the column of the mesh.
-
-    Raises
-    ------
-    CaseError
-        Inertias or radii that are not positive, a damping that is negative, numbers that are not finite.
-    """
-    inertia, radius = (
-        checked_numbers(pair, name, code="E-GEAR-PAIR", unit=unit).copy()
-        for pair, name, unit in ((inertia, "inertia", "kg m^2"), (base_radius, "base_radius", "m"))
-    )
-    torque = checked_numbers(torque, "torque", code="E-GEAR-PAIR", unit="N m").item()
-    mesh_damping = checked_numbers(mesh_damping, "mesh_damping", code="E-GEAR-PAIR", unit="N s/m").item()
-    for name, pair, unit in (("inertia", inertia, "kg m^2"), ("base_radius", radius, "m")):
-        if pair.shape != (2,) or not np.all(np.isfinite(pair)) or np.any(pair <= 0.0):
-            raise CaseError(
-                f"{name} of a gear pair: {pair.tolist()} {unit}", code="E-GEAR-PAIR", key=name,
-                limit="two positive numbers",
-            )  # fmt: skip
-    if not np.isfinite(torque):
-        raise CaseError(f"a torque of {torque} N m", code="E-GEAR-PAIR", key="torque", limit="finite")
-    if not (np.isfinite(mesh_damping) and mesh_damping >= 0.0):
-        raise CaseError(
-            f"a mesh damping of {mesh_damping} N s/m",
-            code="E-GEAR-PAIR",
-            key="mesh_damping",
-            limit="0 or more",
-        )
-    column = np.array([[radius[0]], [-radius[1]]])
-    return MechanicalSystem(
-        M=np.diag(inertia), C=mesh_damping * (column @ column.T), K=np.zeros((2, 2)), W=column,
-        load=torque / radius[0] * column[:, 0], dofs=("theta_1", "theta_2"),
-    )  # fmt: skip
-
-
-def equivalent_mass(inertia: tuple[float, float], base_radius: tuple[float, float]) -> float:
-    """Mass ``m_e`` [kg] that moves along the line of action; ``sqrt(k / m_e)`` is the natural frequency."""
-    (one, other), (first, second) = inertia, base_radius
-    return one * other / (first**2 * other + second**2 * one)
 
 
 @dataclass(frozen=True)
@@ -223,10 +148,14 @@ class ImpactPair:
             M=ratio**2 * M, C=ratio * C, K=K, W=np.eye(len(M))[:, -1:], load=self.load * along,
             dofs=("y 1", "y 2", "x") if self.bearings else ("x",),
         )  # fmt: skip
-        count = len(self.frequency)
-        k = FourierSeries([[1.0, *self.stiffness]], _orders(0, divided, count))
-        mesh = GearMeshes([0], k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
-        return NonlinearSystem(system, (mesh,), tuple(self._forces(ratio, along, divided)))
+        forces = tuple(self._forces(ratio, along, divided))
+        return NonlinearSystem(system, (self.mesh(divided),), forces)
+
+    def mesh(self, divided: int = 1) -> GearMeshes:
+        """The mesh with its play on the one column, see `problem`."""
+        orders = _orders(0, divided, len(self.frequency))
+        k = FourierSeries(np.array([[1.0, *self.stiffness]]), orders)
+        return GearMeshes(np.array([0]), k, deflection=constant([DRIVE]), backlash=DRIVE - BACK)
 
     def _matrices(self):
         """M, C, K with unit time 1 / omega_n, and the direction of u in the coordinates."""
@@ -248,24 +177,6 @@ class ImpactPair:
             if error:
                 base += 1
                 yield HarmonicForce((ratio / z) ** 2 * error * along, _orders(base, 1, count))
-
-
-def example_pair(damping_ratio: float) -> ImpactPair:
-    """Load 0.9, tooth error 0.72 in half backlashes, k(t) with a first harmonic of 10 % against the error.
-
-    The values are those of docs/impacts.md, chosen so that a damping ratio of 0.15 leaves one answer at every
-    frequency ratio and 0.09 does not.
-    """
-    return ImpactPair(damping_ratio=damping_ratio, load=0.9, tooth_error=(0.72,), stiffness=(-0.1,))
-
-
-def lightly_loaded_pair(damping_ratio: float = 0.05) -> ImpactPair:
-    """Load 0.1, tooth error 0.2, constant stiffness: chaotic at frequency ratios between 1.3 and 1.7.
-
-    Kahraman and Singh (1990) find chaotic motion in lightly loaded, lightly damped pairs; the values are
-    those of docs/impacts.md.
-    """
-    return ImpactPair(damping_ratio=damping_ratio, load=0.1, tooth_error=(0.2,))
 
 
 @dataclass(frozen=True)
@@ -376,130 +287,6 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
     return np.array(borders)
 
 
-@dataclass(frozen=True)
-class ContactStates:
-    """What every mesh of a motion does.
-
-    Parameters
-    ----------
-    state : (..., g) int array
-        Index into `STATE_NAMES`: one flank stays closed; it opens and the other does not close; both close.
-    drive, free, back : (..., g) arrays
-        Shares of the instants with the drive flanks, no flanks and the back flanks in contact.
-    """
-
-    state: np.ndarray
-    drive: np.ndarray
-    free: np.ndarray
-    back: np.ndarray
-
-
-def contact_states(meshes: GearMeshes, x, theta) -> ContactStates:
-    """Contact over the instants of a motion.
-
-    Parameters
-    ----------
-    meshes : GearMeshes
-        Meshes that separate.
-    x : (..., T, n_columns) array
-        Deflections of all columns at T instants, at least one period of them [m].
-    theta : (T, n_bases) array
-        Phases of the instants [rad].
-
-    Raises
-    ------
-    CaseError
-        Meshes that do not separate, no instants, deflections or forces that are not finite (E-CONTACT-STATE).
-    """
-    if not meshes.separates:
-        raise CaseError(
-            "meshes that do not separate have no impacts", code="E-CONTACT-STATE", limit="separates=True"
-        )
-    x = checked_numbers(x, "x", code="E-CONTACT-STATE", unit="m")
-    theta = checked_numbers(theta, "theta", code="E-CONTACT-STATE", unit="rad")
-    columns = meshes.columns[:, 0]
-    if x.ndim < 2 or x.shape[-1] <= columns.max(initial=-1) or theta.ndim != 2 or not len(theta):
-        _refuse(f"deflections of shape {x.shape} at phases of shape {theta.shape}")
-    if x.shape[-2] != len(theta):
-        _refuse(f"{x.shape[-2]} deflections of every column at {len(theta)} instants")
-    k = meshes.stiffness.at(theta)
-    line = meshes.force.at(theta) + k * (x[..., columns] - meshes.deflection.at(theta))
-    if not np.all(np.isfinite(line)):
-        _refuse("deflections or forces that are not finite")
-    # flanks of infinite backlash have no back side
-    play = np.where(np.isfinite(meshes.backlash), meshes.backlash, 0.0)
-    drive, back = line > 0.0, np.isfinite(meshes.backlash) & (line + k * play < 0.0)
-    return _judged(drive, back, axis=-2)
-
-
-def solution_states(meshes: GearMeshes, solution: PeriodicSolution, *, samples: int = 1024) -> ContactStates:
-    """Contact in a periodic solution, at equidistant phases; with several bases on a grid of all phases.
-
-    Parameters
-    ----------
-    meshes : GearMeshes
-    solution : PeriodicSolution
-    samples : int
-        Phases of every base: 1024 for one base, ``samples ** (1 / n_bases)`` but 64 at least for several.
-    """
-    bases = solution.orders.shape[1]
-    each = samples if bases == 1 else max(64, round(samples ** (1.0 / bases)))
-    axes = np.meshgrid(*[2.0 * np.pi * np.arange(each) / each] * bases, indexing="ij")
-    theta = np.stack([axis.ravel() for axis in axes], axis=1)
-    x = (np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T).real
-    return contact_states(meshes, x, theta)
-
-
-def range_states(lowest, highest, *, drive: float, back: float) -> np.ndarray:
-    """States (...) from the smallest and largest deflection, where the flanks close at constant deflections.
-
-    `UNKNOWN` where an extreme is nan or infinite, as of a motion that did not settle.
-
-    Parameters
-    ----------
-    lowest, highest : (...) arrays
-        Of the relative deflection.
-    drive, back : float
-        Deflections above and below which the drive and the back flanks touch.
-    """
-    lowest, highest, drive, back = (
-        checked_numbers(value, name, code="E-CONTACT-STATE", unit="m")
-        for name, value in (("lowest", lowest), ("highest", highest), ("drive", drive), ("back", back))
-    )
-    if not (np.all(np.isfinite([drive, back])) and np.all(back <= drive)):
-        _refuse(f"flanks that close above {drive} and below {back}")
-    if lowest.shape != highest.shape or np.any(lowest > highest):
-        _refuse("smallest deflections above the largest, or of another number")
-    both = (highest > drive) & (lowest < back)
-    closed = (lowest >= drive) | (highest <= back)
-    state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
-    return np.where(np.isfinite(lowest) & np.isfinite(highest), state, UNKNOWN)
-
-
-def state_regions(parameter, state) -> list[tuple[int, float, float]]:
-    """Runs of equal states along a curve or sweep: state, first and last value of the parameter.
-
-    Neighbouring runs share no value; where the state changes the border lies between them.
-    """
-    parameter = checked_numbers(parameter, "parameter", code="E-CONTACT-STATE", unit="")
-    state = checked_numbers(state, "state", code="E-CONTACT-STATE", unit="")
-    if parameter.ndim != 1 or parameter.shape != state.shape:
-        _refuse(f"states of shape {state.shape} over parameters of shape {parameter.shape}")
-    ends = np.flatnonzero(np.diff(state, append=-1, prepend=-1))
-    return [
-        (int(state[first]), float(parameter[first]), float(parameter[last - 1]))
-        for first, last in pairwise(ends)
-    ]
-
-
-def level_crossings(parameter, value, level: float) -> np.ndarray:
-    """Parameters at which a quantity along a curve passes a level, by linear interpolation."""
-    parameter, away = np.asarray(parameter, float), np.asarray(value, float) - level
-    i = np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:]))
-    share = away[i] / (away[i] - away[i + 1])
-    return parameter[i] + share * (parameter[i + 1] - parameter[i])
-
-
 def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
     return tuple(order if place == base else 0 for place in range(count))
 
@@ -515,16 +302,3 @@ def _number(key: str, value, code: str = "E-PAIR") -> float:
 def _not_negative(name: str, value: float) -> None:
     if _number(name, value) < 0.0:
         raise CaseError(f"{name} {value}", code="E-PAIR", limit="0 or more")
-
-
-def _refuse(message: str):
-    raise CaseError(
-        message, code="E-CONTACT-STATE", limit="finite numbers, as many instants as phases, one or more"
-    )
-
-
-def _judged(drive, back, axis: int) -> ContactStates:
-    both = drive.any(axis) & back.any(axis)
-    closed = drive.all(axis) | back.all(axis)
-    state = np.where(both, TWO_SIDED, np.where(closed, NORMAL, ONE_SIDED))
-    return ContactStates(state, drive.mean(axis), (~drive & ~back).mean(axis), back.mean(axis))

@@ -5,8 +5,8 @@ between members are springs or rigid. One rotation is the same in all frames, so
 exact at any speed. The centres of two members meet in the fixed frame: with ``z = x + i y`` in frames at the
 angles psi the lateral spring sees ``z_1 exp(i psi_1) - z_2 exp(i psi_2)``. It is a constant spring where both
 frames turn at one speed, or stand; otherwise its columns stay in ``W`` for the periodic element
-`TurningSprings`. D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16) couple stages with the
-same springs.
+`femgear.system.elements.TurningSprings`. D. R. Kiracofe and R. G. Parker (J. Vib. Acoust. 129, 2007, 1-16)
+couple stages with the same springs.
 
 Speeds and torques follow from Willis' equation of every stage in one linear system: with the speeds ``w`` of
 all central members, every stage, coupling, and fixed member is one row of ``A w = 0``. Ideal torques follow
@@ -20,7 +20,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,24 +27,18 @@ from femgear.errors import CaseError, checked_count, checked_numbers
 from femgear.system.assembler import (
     dof_names,
     free_motions,
-    gear_set_springs,
     gear_set_system,
     mesh_directions,
 )
-from femgear.system.fourier import FourierSeries
 from femgear.system.rigid_bodies import (
     CENTRAL,
     PlanarSet,
     PlanarTorque,
     flank_sign,
     member_radius,
-    planar_from_set,
     torque_shares,
 )
 from femgear.system.system import MechanicalSystem
-
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
 
 # radii of base circles may be rounded; tooth numbers that differ by more are another set
 _RADII = 1e-3
@@ -121,9 +114,8 @@ class Stage:
                 f"the {self.fixed} is fixed but has no torsional support", code="E-MECHANISM",
                 key=f"{self.fixed}.torsional_support", limit="above 0, or infinite",
             )  # fmt: skip
-        if checked_numbers(self.angle, "angle", code="E-VALUE", unit="rad").ndim or not np.isfinite(
-            self.angle
-        ):
+        angle = checked_numbers(self.angle, "angle", code="E-VALUE", unit="rad")
+        if angle.ndim or not np.isfinite(angle):
             raise CaseError(f"a stage angle of {self.angle} rad", code="E-VALUE", key="angle", limit="finite")
         if self.teeth is not None:
             object.__setattr__(self, "teeth", _checked_teeth(self.data, self.teeth))
@@ -231,103 +223,21 @@ class MultistageSet:
         return sum(2 * stage.data.n_planets for stage in self.stages)
 
 
-def in_series(
-    stages: Sequence[Stage],
-    *,
-    driving: str = "carrier",
-    driven: str = "sun",
-    torsional: float | Sequence[float] = math.inf,
-    lateral: float | Sequence[float] = 0.0,
-    input: str = "sun",
-    output: str = "carrier",
-) -> MultistageSet:
-    """Stages one after the other: `driving` of each turns `driven` of the next.
+def in_series(stages: Sequence[Stage], *, torsional: float = math.inf, lateral: float = 0.0) -> MultistageSet:
+    """Join stages one after the other: each carrier turns the next sun.
 
     Parameters
     ----------
     stages : sequence of Stage
-    driving, driven : {"carrier", "ring", "sun"}
-    torsional, lateral : float or one a coupling
-        See `StageCoupling`.
-    input, output : {"carrier", "ring", "sun"}
-        Of the first and the last stage.
+    torsional, lateral : float
+        Of every coupling, see `StageCoupling`.
     """
-    if len(stages) < 1:
-        _refuse("a train of no stages", "one stage or more")
-    count = len(stages) - 1
-    stiffness = []
-    for name, values in (("torsional", torsional), ("lateral", lateral)):
-        values = np.atleast_1d(checked_numbers(values, name, code="E-COUPLING", unit=""))
-        if values.ndim != 1 or len(values) not in (1, count):
-            _refuse(f"{values.size} {name} stiffnesses", f"one, or {count}")
-        stiffness.append(np.broadcast_to(values, count).tolist())
     couplings = tuple(
-        StageCoupling(Member(n + 1, driving), Member(n + 2, driven), *(values[n] for values in stiffness))
-        for n in range(count)
+        StageCoupling(Member(n, "carrier"), Member(n + 1, "sun"), torsional, lateral)
+        for n in range(1, len(stages))
     )
-    return MultistageSet(
-        stages=tuple(stages), couplings=couplings, input=Member(1, input), output=Member(count + 1, output)
-    )
-
-
-def stage_of_set(planetary_set: PlanetarySet, *, fixed: str | None = "ring", angle=0.0, **lumped) -> Stage:
-    """Stage with the teeth, mesh phases, radii and angles of a geared set.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-    fixed, angle
-        See `Stage`.
-    lumped
-        Bodies and stiffnesses, see `femgear.system.rigid_bodies.planar_from_set`.
-    """
-    s = planetary_set
-    return Stage(
-        data=planar_from_set(s, **lumped),
-        teeth=(s.sun.teeth, s.planet.teeth, s.ring.teeth),
-        fixed=fixed,
-        phases=s.mesh_phases,
-        angle=angle,
-    )
-
-
-def shaft_stiffness(
-    diameter: float, length: float, *, young: float = 206e9, poisson: float = 0.3
-) -> dict[str, float]:
-    """Torsional and lateral stiffness of a solid round shaft whose ends do not tilt.
-
-    ``k_t = G pi d^4 / (32 L)`` and, for Timoshenko's beam, ``k = 12 E I / (L^3 (1 + phi))`` with ``phi = 12 E
-    I / (kappa G A L^2)`` (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 5.6) and
-    ``kappa = 6 (1 + nu) / (7 + 6 nu)`` (G. R. Cowper, J. Appl. Mech. 33, 1966, 335-340).
-
-    Parameters
-    ----------
-    diameter, length : float
-        [m]
-    young : float
-        [Pa]
-    poisson : float
-
-    Returns
-    -------
-    dict
-        ``torsional`` [N m/rad] and ``lateral`` [N/m], as `StageCoupling` takes them.
-
-    Raises
-    ------
-    CaseError
-        Lengths or moduli that no shaft has (E-COUPLING).
-    """
-    if not all(math.isfinite(one) and one > 0.0 for one in (diameter, length, young)):
-        _refuse(f"a shaft of {diameter} m by {length} m and {young} Pa", "finite and above 0")
-    if not -1.0 < poisson <= 0.5:
-        _refuse(f"Poisson's ratio of {poisson}", "above -1, 0.5 or less")
-    shear = young / (2.0 * (1.0 + poisson))
-    polar = math.pi * diameter**4 / 32.0
-    bending = 12.0 * young * 0.5 * polar
-    kappa = 6.0 * (1.0 + poisson) / (7.0 + 6.0 * poisson)
-    phi = bending / (kappa * shear * 0.25 * math.pi * diameter**2 * length**2)
-    return {"torsional": shear * polar / length, "lateral": bending / (length**3 * (1.0 + phi))}
+    ends = {"input": Member(1, "sun"), "output": Member(len(stages), "carrier")}
+    return MultistageSet(stages=tuple(stages), couplings=couplings, **ends)
 
 
 def _checked_teeth(data: PlanarSet, teeth) -> tuple[int, int, int]:
@@ -682,7 +592,7 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
             raise CaseError(
                 f"the centres of {one.first} and {one.second} are one, in frames of different speeds",
                 code="E-COUPLING", key=f"couplings[{number}].lateral", limit="a finite stiffness",
-                remedy="give the stiffness of the shaft, see shaft_stiffness",
+                remedy="give the stiffness of the shaft",
             )  # fmt: skip
         found[number] = float(relative)
     return found
@@ -712,25 +622,6 @@ def stage_slices(data: MultistageSet) -> tuple[slice, ...]:
     """Rows of `joined_motions` that belong to every stage."""
     ends = np.cumsum([0] + [free_motions(stage.data).shape[1] for stage in data.stages])
     return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-
-
-def multistage_springs(data: MultistageSet) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Springs of the train at rest by name.
-
-    Returns
-    -------
-    dict of str to (columns (n, g), stiffness (g,))
-        Those of `gear_set_springs` of every stage, and the elastic couplings.
-    """
-    Z, springs = joined_motions(data), {}
-    for number, (stage, rows) in enumerate(zip(data.stages, stage_slices(data)), 1):
-        for name, (columns, stiffness) in gear_set_springs(stage.data).items():
-            springs[f"stage {number} {name}"] = (Z[rows].T @ columns, stiffness)
-    for coupling in data.couplings:
-        columns, stiffness = _springs(data, coupling, lateral=True)
-        if len(stiffness):
-            springs[f"{coupling.first} to {coupling.second}"] = (Z.T @ columns, stiffness)
-    return springs
 
 
 def _centrifugal_stiffness(data: MultistageSet, carrier: np.ndarray) -> np.ndarray:
@@ -834,84 +725,3 @@ def _names(data: MultistageSet, Z: np.ndarray) -> tuple[str, ...]:
         all_names = dof_names(stage.data)
         names += [f"stage {number} {all_names[row]}" for row in own]
     return tuple(names[row] for row in np.argmax(Z == 1.0, axis=0))
-
-
-@dataclass(frozen=True)
-class TurningSprings:
-    """Isotropic springs between centres whose coordinates turn against one another.
-
-    With ``z = x + i y``, ``d = z_1 - z_2 exp(i phi)`` in the first frame and phi the angle of the second
-    frame seen from the first; the forces are ``k d`` on the first and ``-k d exp(-i phi)`` on the second
-    centre, of the energy ``k |d|^2 / 2``.
-
-    Parameters
-    ----------
-    columns : (g, 4) int array
-        x and y of the first, x and y of the second centre.
-    stiffness : (g,) array
-        [N/m]
-    wave : FourierSeries
-        ``cos phi`` and ``sin phi``, from `turning_wave`.
-
-    Raises
-    ------
-    CaseError
-        Columns that do not fit (E-SHAPE), stiffnesses out of range (E-COUPLING).
-    """
-
-    columns: np.ndarray
-    stiffness: np.ndarray
-    wave: FourierSeries
-
-    # the law is linear in the deflections: a grid of few samples is exact
-    degree = 1
-
-    def __post_init__(self):
-        columns = np.atleast_2d(np.array(self.columns))
-        stiffness = np.atleast_1d(np.array(self.stiffness, float))
-        if columns.shape != (len(stiffness), 4) or not np.issubdtype(columns.dtype, np.integer):
-            raise CaseError(
-                f"columns {columns.tolist()} for {len(stiffness)} springs", code="E-SHAPE",
-                limit="four column numbers of W a spring",
-            )  # fmt: skip
-        if not np.all(np.isfinite(stiffness)) or np.any(stiffness < 0.0):
-            raise CaseError(
-                f"lateral stiffnesses {stiffness.tolist()} N/m", code="E-COUPLING", limit="finite, 0 or more"
-            )
-        for name, value in (("columns", columns), ("stiffness", stiffness)):
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
-
-    @property
-    def reference(self) -> np.ndarray:
-        """Every centre held by its spring, (g, 4) [N/m]."""
-        return np.repeat(self.stiffness[:, None], 4, axis=1)
-
-    def evaluate(self, x, theta):
-        """Forces (..., g, 4) and tangents (..., g, 4, 4)."""
-        c, s = np.moveaxis(self.wave.at(theta), -1, 0)
-        # d = D x with x = (x_1, y_1, x_2, y_2)
-        D = np.zeros((*c.shape, 2, 4))
-        D[..., 0, 0] = D[..., 1, 1] = 1.0
-        D[..., 0, 2], D[..., 0, 3] = -c, s
-        D[..., 1, 2], D[..., 1, 3] = -s, -c
-        square = np.swapaxes(D, -1, -2) @ D
-        tangent = self.stiffness[:, None, None] * square[..., None, :, :]
-        force = (tangent @ x[..., None])[..., 0]
-        return force, np.broadcast_to(tangent, (*force.shape, 4))
-
-
-def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSeries:
-    """Cosine and sine of ``phi = phase + orders . theta``.
-
-    Parameters
-    ----------
-    orders : tuple of int
-        Multiples of the base frequencies; negative ones for a frame that turns clockwise.
-    phase : float
-        phi at time zero [rad].
-    """
-    if not math.isfinite(phase):
-        raise CaseError(f"a phase of {phase} rad", code="E-VALUE", key="phase", limit="finite")
-    turned = np.exp(1j * phase)
-    return FourierSeries(np.array([[0.0, turned], [0.0, -1j * turned]]), orders)

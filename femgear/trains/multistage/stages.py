@@ -1,110 +1,77 @@
-"""Modes and response of planetary stages in series.
+"""The pipeline of a multistage case: modes -> response, and balance.
 
 Modes come with their kinds and the stage in which each one lives; the response is that to transmission errors
-of every stage, by modal summation, or that of the nonlinear train. No case file describes such a train: there
-is no table of stages, and the functions are called from Python.
+of every stage, by modal summation; harmonic balance has the stiffnesses k(t) of all meshes. `MULTISTAGE` at
+the end is the train: the table of its stages, with what the report says and draws of each.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from femgear.errors import CaseError, checked_numbers
+from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
 from femgear.solvers.linear.receptance import MeshErrorResponse, modal_response
 from femgear.system.assembler import gear_set_system, mesh_elements
-from femgear.system.elements import GearMeshes
+from femgear.system.elements import GearMeshes, TurningSprings, turning_wave
+from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample
 from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
+from femgear.threads import one_blas_thread
 from femgear.trains.multistage.model import (
     MultistageSet,
     Stage,
-    TurningSprings,
     joined_motions,
     mean_mesh_stiffness,
     mesh_columns,
     multistage_system,
     stage_slices,
     train_speeds,
+    train_torques,
     turning_couplings,
-    turning_wave,
 )
+from femgear.trains.multistage.results import (
+    BalanceResult,
+    MultistageModes,
+    ResponseResult,
+    balance_warnings,
+    describe_forces,
+    describe_modes,
+    describe_multistage,
+    multistage_warnings,
+)
+from femgear.trains.multistage.section import (
+    MultistageCase,
+    OperationSection,
+    ResponseSection,
+    build_multistage,
+    multistage_of,
+    stage_gears,
+)
+from femgear.trains.protocol import Figures, OwnFile, Progress, Train
+from femgear.trains.protocol import Stage as RunStage
 
 # relative distance of frequencies that count as one
 _MULTIPLE = 1e-7
 
 
-@dataclass(frozen=True, eq=False)
-class MultistageModes:
-    """Modes of the whole train.
-
-    Parameters
-    ----------
-    modes : Modes
-        ``kind``: ``rigid``; ``rotational``, ``translational`` or ``planet`` where at least 99 % of the
-        kinetic energy belongs to that class in all stages together; else ``mixed``. With equally spaced
-        planets every mode is pure: rotational and translational modes reach over all stages, a planet mode
-        stays in one (Kiracofe and Parker, J. Vib. Acoust. 129, 2007).
-    share : (S, m) array
-        Of every stage in the kinetic energy.
-    strain : (S + 1, m) array
-        Of every stage's meshes in the strain energy, and of everything else (supports, bearings, couplings)
-        in the last row; zero for rigid motions.
-    """
-
-    modes: Modes
-    share: np.ndarray
-    strain: np.ndarray
-
-    @property
-    def stage(self) -> np.ndarray:
-        """Stage (m,) with most of the kinetic energy, from 1."""
-        return self.share.argmax(axis=0) + 1
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Such as ``"planet, stage 2 (100 %)"``."""
-        return tuple(
-            f"{kind}, stage {stage} ({100.0 * share[stage - 1]:.0f} %)"
-            for kind, stage, share in zip(self.modes.kind, self.stage.tolist(), self.share.T)
-        )
-
-
-def multistage_modes(
-    data: MultistageSet, *, mesh_stiffness=None, damping_ratio: float | Sequence[float] = 0.0
-) -> MultistageModes:
-    """Modes of the train at rest, with their kinds and stages.
-
-    Parameters
-    ----------
-    data : MultistageSet
-    mesh_stiffness : (n_meshes,) array, optional
-        Of all stages [N/m]; that of the sets when not given.
-    damping_ratio : float or (m,) array
-    """
-    k = mean_mesh_stiffness(data)
-    if mesh_stiffness is not None:
-        k = checked_numbers(mesh_stiffness, "mesh_stiffness", code="E-SHAPE", unit="N/m")
-    if k.shape != (data.n_meshes,) or not np.all(np.isfinite(k)):
-        raise CaseError(
-            f"mesh stiffnesses of shape {k.shape}", code="E-SHAPE", key="mesh_stiffness",
-            limit=f"{data.n_meshes} finite numbers, one a mesh",
-        )  # fmt: skip
+def multistage_modes(data: MultistageSet, *, damping_ratio: float | Sequence[float] = 0.0) -> MultistageModes:
+    """Modes of the train at rest with mean mesh stiffnesses, with their kinds and stages."""
     system = multistage_system(data)
-    modes = solve_modes(system, k, damping_ratio=damping_ratio)
+    modes = solve_modes(system, mean_mesh_stiffness(data), damping_ratio=damping_ratio)
     masses = stage_masses(data)
     modes = _by_stage(modes, masses)
     share = stage_shares(masses, modes.shape)
     kinds = multistage_kinds(data, modes.shape, frequency=modes.frequency)
-    return MultistageModes(replace(modes, kind=kinds), share, _strain(data, system, modes))
+    return MultistageModes(data, replace(modes, kind=kinds), share, _strain(data, system, modes))
 
 
 def stage_masses(data: MultistageSet) -> np.ndarray:
-    """Mass matrix of every stage in the coordinates of the train, (S, n, n)."""
+    """Assemble the mass matrix of every stage in the coordinates of the train, (S, n, n)."""
     Z = joined_motions(data)
     return np.array(
         [
@@ -195,7 +162,7 @@ def stage_error(stage: Stage, sun_planet, planet_ring) -> np.ndarray:
     if stage.phases is None:
         raise CaseError(
             "the stage has no mesh phases", code="E-PHASES", key="phases",
-            remedy="give phases, or make the stage with stage_of_set",
+            remedy="give phases, such as those of the gears",
         )  # fmt: skip
     waves = np.array([np.atleast_1d(one) for one in (sun_planet, planet_ring)], complex)
     h = np.arange(1, waves.shape[1] + 1)
@@ -210,7 +177,6 @@ def error_response(
     *,
     damping_ratio: float = 0.0,
     modes: Modes | None = None,
-    outputs=None,
 ) -> dict[int, MeshErrorResponse]:
     """Response of the whole train to transmission errors of its stages, by modal summation.
 
@@ -231,7 +197,6 @@ def error_response(
         Of all modes; ignored where modes are given.
     modes : Modes, optional
         Of the train at rest, such as `MultistageModes.modes` with damping; all when not given.
-    outputs : (n_outputs, n) array, optional
 
     Returns
     -------
@@ -248,15 +213,14 @@ def error_response(
     if modes is None:
         modes = multistage_modes(data, damping_ratio=damping_ratio).modes
     frequencies, forward = _mesh_frequencies(data, speed)
-    rows = np.empty((0, len(system.M))) if outputs is None else np.atleast_2d(np.asarray(outputs, float))
-    seen, found = np.vstack([system.W.T, rows]), {}
+    found = {}
     for number, columns in enumerate(mesh_columns(data), 1):
         if number not in errors:
             continue
         error = _checked_error(errors[number], number, len(columns))
         # where the sun turns backwards the mesh runs through its period from the end
         error = error if forward[number - 1] else error.conj()
-        found[number] = _stage_response(system, modes, frequencies[:, number - 1], columns, error, k, seen)
+        found[number] = _stage_response(system, modes, frequencies[:, number - 1], columns, error, k)
     if unknown := set(errors) - set(found):
         raise CaseError(
             f"transmission errors of stage {sorted(unknown)[0]}", code="E-SHAPE", key="errors",
@@ -348,16 +312,16 @@ def _standing(data: MultistageSet, turning) -> np.ndarray:
     return multistage_system(replace(data, couplings=couplings)).K
 
 
-def _stage_response(system, modes, mesh_frequency, columns, error, k, seen) -> MeshErrorResponse:
+def _stage_response(system, modes, mesh_frequency, columns, error, k) -> MeshErrorResponse:
+    """Answer of all meshes to the errors (columns, H) of one stage."""
     harmonics = np.arange(1, error.shape[1] + 1)
     inputs = system.W[:, columns] * k[columns]
-    transfer = modal_response(system, modes, np.outer(mesh_frequency, harmonics).ravel(), inputs, seen)
-    transfer = transfer.reshape(len(mesh_frequency), len(harmonics), len(seen), len(columns))
-    answer = np.einsum("fhoj,jh->fho", transfer, error)
-    deflection, force = answer[..., : len(k)], np.empty((*answer.shape[:2], len(k)), complex)
-    force[:] = k * deflection
+    transfer = modal_response(system, modes, np.outer(mesh_frequency, harmonics).ravel(), inputs, system.W.T)
+    transfer = transfer.reshape(len(mesh_frequency), len(harmonics), len(k), len(columns))
+    deflection = np.einsum("fhoj,jh->fho", transfer, error)
+    force = k * deflection
     force[..., columns] -= k[columns] * error.T
-    return MeshErrorResponse(mesh_frequency, harmonics, deflection, force, answer[..., len(k) :])
+    return MeshErrorResponse(mesh_frequency, harmonics, deflection, force, np.empty((*force.shape[:2], 0)))
 
 
 def _mesh_frequencies(data: MultistageSet, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -416,5 +380,167 @@ def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int
         phase = data.stages[one.second.stage - 1].angle - data.stages[one.first.stage - 1].angle
         first = data.n_meshes + 4 * place
         wave = turning_wave(tuple(orders), phase=phase)
-        elements.append(TurningSprings(np.arange(first, first + 4)[None], [one.lateral], wave))
+        elements.append(TurningSprings(np.arange(first, first + 4)[None], np.array([one.lateral]), wave))
     return tuple(elements)
+
+
+def solve_multistage_modes(case: MultistageCase) -> MultistageModes:
+    """Natural frequencies, modes, their kinds and stages."""
+    ratio = 0.0 if case.response is None else case.response.damping_ratio
+    return multistage_modes(multistage_of(case), damping_ratio=ratio)
+
+
+@one_blas_thread()
+def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResult:
+    """Response to the transmission errors that the changing number of tooth pairs makes under the torque."""
+    _, given = _asked(case)
+    speed = np.linspace(given.lowest, given.highest, given.points)
+    errors = loaded_errors(case, modes.data)
+    return ResponseResult(modes.data, speed, error_response(modes.data, speed, errors, modes=modes.modes))
+
+
+@one_blas_thread()
+def solve_balance(case: MultistageCase, *, progress: Progress | None = None) -> BalanceResult:
+    """Harmonic balance with the stiffnesses k(t) of all meshes, first orders of two stages together."""
+    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+
+    train, (operation, given) = multistage_of(case), _asked(case)
+    stages, unit = len(train.stages), np.eye(len(train.stages), dtype=int)
+    orders = [h * unit[n] for n in range(stages) for h in range(1, given.harmonics + 1)]
+    orders += [unit[n] + sign * unit[m] for n in range(stages) for m in range(n) for sign in (-1, 1)]
+    problem = multistage_problem(
+        train, meshes=wave_meshes(case, train), torque=operation.torque, damping=given.damping_ratio
+    )
+    speeds = np.linspace(given.lowest, given.highest, given.balance_points + 2)[1:-1]
+    found = []
+    for number, speed in enumerate(speeds):
+        if progress is not None:
+            progress("balance", number, len(speeds))
+        frequency = base_frequencies(train, speed)[:stages]
+        found.append(
+            solve_harmonic_balance(problem, frequency, orders=distinct_lines(orders), stability=False)
+        )
+    force, converged = np.array([one.force for one in found]), np.array([one.converged for one in found])
+    return BalanceResult(train, speeds, found[0].orders, force, converged)
+
+
+def stiffness_waves(case: MultistageCase, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Harmonics 1 to H of sun-planet and planet-ring stiffness over its mean, at phase zero.
+
+    Stiffness in proportion to the number of tooth pairs in contact: a pair is, from the start s to the end e
+    of its path in base pitches from the pitch point, so that ``k_h / k_0 = (exp(-2 pi i h s) - exp(-2 pi i h
+    e)) / (pi i h (e - s))``.
+
+    Parameters
+    ----------
+    case : MultistageCase
+        H is ``response.harmonics``.
+    number : int
+        Of the stage, from 1.
+
+    Returns
+    -------
+    two (H,) complex arrays
+    """
+    geared, h = stage_gears(case.stage[number - 1]), np.arange(1, _asked(case)[1].harmonics + 1)
+    waves = []
+    for path in (geared.path_sun_planet, geared.path_planet_ring):
+        start, end = (one / geared.base_pitch for one in path)
+        wave = np.exp(-2j * np.pi * h * start) - np.exp(-2j * np.pi * h * end)
+        waves.append(wave / (1j * np.pi * h * (end - start)))
+    return waves[0], waves[1]
+
+
+def loaded_errors(case: MultistageCase, train: MultistageSet) -> dict[int, np.ndarray]:
+    """Transmission errors (2N, H) [m] of every stage: deflection of its meshes under their mean force.
+
+    ``e = F / k(t)`` without its mean. It stands for the stiffness k(t) in linear models where the dynamic
+    forces are small beside F.
+    """
+    errors = {}
+    on_sun = train_torques(train, _asked(case)[0].torque).sun
+    for number, stage in enumerate(train.stages, 1):
+        data, mean = stage.data, stage.data.mesh_stiffness[[0, -1]]
+        force = abs(on_sun[number - 1]) / (data.n_planets * data.sun_radius)
+        waves = stiffness_waves(case, number)
+        errors[number] = stage_error(stage, *(force / k * _inverse(wave) for k, wave in zip(mean, waves)))
+    return errors
+
+
+def _inverse(wave: np.ndarray) -> np.ndarray:
+    """Harmonics 1 to H of ``1 / (1 + wave)``."""
+    samples = 32 * len(wave)
+    return harmonics_of(1.0 / sample(np.concatenate([[1.0], wave]), samples), len(wave))[1:]
+
+
+def wave_meshes(case: MultistageCase, train: MultistageSet) -> dict[int, GearMeshes]:
+    """Meshes with the stiffness waves, for `multistage_problem`; they do not part."""
+    made = {}
+    for number, stage in enumerate(train.stages, 1):
+        mean = stage.data.mesh_stiffness
+        lines = np.column_stack([np.ones(len(mean)), stage_error(stage, *stiffness_waves(case, number))])
+        stiffness = FourierSeries(mean[:, None] * lines)
+        made[number] = mesh_elements(stage.data, stiffness=stiffness, separates=False)
+    return made
+
+
+def _asked(case: MultistageCase) -> tuple[OperationSection, ResponseSection]:
+    """Operation and response of a case that has both, which `_no_response` sees to."""
+    assert case.operation is not None and case.response is not None
+    return case.operation, case.response
+
+
+def _no_response(case: MultistageCase) -> str:
+    if case.operation is None or case.response is None:
+        return "it needs the sections operation and response"
+    return "" if case.geared else "every stage needs its table gears"
+
+
+def _no_balance(case: MultistageCase) -> str:
+    return _no_response(case) or ("" if _asked(case)[1].balance_points else "response.balance_points is 0")
+
+
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.multistage.figures import FIGURES
+
+    return FIGURES
+
+
+MULTISTAGE = Train(
+    name="multistage",
+    words="a multistage case",
+    model=MultistageCase,
+    own_file=OwnFile(
+        lambda data: data.get("model") == "multistage", build_multistage, MultistageCase.model_json_schema
+    ),
+    stages=(
+        RunStage(
+            name="modes",
+            title="Modes",
+            solve=lambda case, *_: solve_multistage_modes(case),
+            verdict=lambda result: {"modes": len(result.modes.frequency)},
+            describe=lambda results: describe_modes(results.modes),
+        ),
+        RunStage(
+            name="response",
+            title="Response",
+            solve=lambda case, results, _: solve_response(case, results["modes"]),
+            verdict=lambda result: {"speeds": len(result.speed)},
+            describe=lambda results: describe_forces(results.response, "Response"),
+            unavailable=_no_response,
+            needs=lambda case: ("modes",),
+        ),
+        RunStage(
+            name="balance",
+            title="Harmonic balance",
+            solve=lambda case, _, context: solve_balance(case, progress=context.progress),
+            verdict=lambda result: {"speeds": len(result.speed), "converged": int(result.converged.sum())},
+            describe=lambda results: describe_forces(results.balance, "Harmonic balance"),
+            unavailable=_no_balance,
+        ),
+    ),
+    describe=lambda case: describe_multistage(case, multistage_of(case)),
+    warnings=multistage_warnings,
+    result_warnings=lambda results: balance_warnings(results.balance) if "balance" in results.stages else (),
+    figures=_figures,
+)

@@ -1,0 +1,200 @@
+"""The sections of a case file with ``model = "gear_pair"``: two gears, their mesh, and what is computed."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from femgear.case.fields import Count, Number, Quantity, Section, Several, Title
+from femgear.case.problems import checked_case
+from femgear.case.sections import FORMAT, Inertia, Mass, Radius, Stiffness
+from femgear.case.text import ReadCase
+from femgear.case.units import ANGLE, LENGTH, STIFFNESS, TORQUE
+from femgear.errors import CaseError
+from femgear.trains.gear_pair.model import ImpactPair, PairBearings, PairScales, pair_scales
+
+Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
+Ratio = Number(1e-3, 100.0)
+Steps = Count(20, 10_000)
+_MOST_WAVES = 50
+
+
+class GearsSection(Section):
+    """The driving and the driven gear: two entries of each."""
+
+    teeth: Several(Count(4, 5000), 2)
+    inertia: Several(Inertia, 2)
+    base_radii: Several(Radius, 2)
+    eccentricity: Several(Quantity(LENGTH, 0.0, 0.01), 2) = (0.0, 0.0)
+    eccentricity_angles: Several(Angle, 2) = (0.0, 0.0)
+    mass: Several(Mass, 2) | None = None
+    bearing_stiffness: Several(Stiffness, 2) | None = None
+    bearing_damping_ratio: Number(0.0, 1.0, open_high=True) = 0.0
+
+
+class MeshSection(Section):
+    """Mesh stiffness, backlash, damping, tooth error; waves are harmonics of the tooth frequency, from 1."""
+
+    stiffness: Quantity(STIFFNESS, 1e3, 1e13)
+    stiffness_waves: Annotated[tuple[Number(-1.0, 1.0), ...], Field(max_length=_MOST_WAVES)] = ()
+    stiffness_angles: Annotated[tuple[Angle, ...], Field(max_length=_MOST_WAVES)] = ()
+    backlash: Quantity(LENGTH, 1e-7, 0.05)
+    damping_ratio: Number(0.0, 1.0, open_high=True)
+    error: Annotated[tuple[Quantity(LENGTH, -1e-3, 1e-3), ...], Field(max_length=_MOST_WAVES)] = ()
+    error_angles: Annotated[tuple[Angle, ...], Field(max_length=_MOST_WAVES)] = ()
+
+
+class OperationSection(Section):
+    """Torque on the driving gear; a positive one presses the drive flanks together."""
+
+    torque: Quantity(TORQUE, -1e9, 1e9)
+
+
+class ResponseSection(Section):
+    """Periodic motions over the frequency ratio by harmonic balance, from one end to the other."""
+
+    start: Ratio = Field(default=3.5, alias="from")
+    to: Ratio = 0.1
+    harmonics: Count(1, 100) = 12
+    largest_step: Number(1e-4, 1.0) = 0.02
+
+
+class RatioRange(Section):
+    """Equally spaced frequency ratios, both ends among them."""
+
+    start: Ratio = Field(alias="from")
+    to: Ratio
+    count: Count(2, 10_000)
+
+
+class SweepSection(Section):
+    """Integration in time over ascending ratios and back, at each until the motion repeats."""
+
+    ranges: Annotated[tuple[RatioRange, ...], Field(min_length=1, max_length=20)]
+    steps: Steps = 100
+    most_periods: Count(5, 100_000) = 300
+
+
+class ChaosSection(RatioRange):
+    """Lyapunov exponents over the ratio, each from the end of the motion before, and sections."""
+
+    points: Count(8, 100_000) = 100
+    skip: Count(0, 100_000) = 60
+    steps: Steps = 100
+    sections: Annotated[tuple[Ratio, ...], Field(max_length=6)] = ()
+
+
+class GearPairCase(Section, ReadCase):
+    """A gear pair with backlash, its load and what is computed of it, in SI units.
+
+    The fields carry the names of the case file; ``source`` is the text that gives this case.
+    """
+
+    format: Count(1, 2**31) = FORMAT
+    model: Literal["gear_pair"]
+    title: Title
+    gears: GearsSection
+    mesh: MeshSection
+    operation: OperationSection
+    response: ResponseSection = ResponseSection()
+    sweep: SweepSection | None = None
+    chaos: ChaosSection | None = None
+
+
+def build_gear_pair(data: dict, text: str, name: str, *, numbered: bool = True) -> GearPairCase:
+    """Case of the tables of a TOML text; see `femgear.trains.protocol.OwnFile`.
+
+    Raises
+    ------
+    CaseError
+        Everything that is wrong, at once.
+    """
+    lines = text if numbered else ""
+    case = checked_case(GearPairCase, data, lines, name, check=cross_check)
+    case.read_from(text, lines, name)
+    return case
+
+
+def cross_check(case: GearPairCase) -> Iterator[CaseError]:
+    """What no entry shows alone."""
+    mesh, gears = case.mesh, case.gears
+    for wave, angles in (("stiffness_waves", "stiffness_angles"), ("error", "error_angles")):
+        count, given = len(getattr(mesh, wave)), len(getattr(mesh, angles))
+        if given not in (0, count):
+            yield CaseError(
+                f"{given} angles of {count} harmonics", code="E-COUNT", key=f"mesh.{angles}",
+                limit=f"none, or {count}, one for each entry of mesh.{wave}",
+            )  # fmt: skip
+    # k(t) of no sign change whatever the angles are
+    if (size := sum(abs(one) for one in mesh.stiffness_waves)) >= 1.0:
+        yield CaseError(
+            "the mesh stiffness may turn negative", code="E-RANGE", key="mesh.stiffness_waves",
+            value=f"{size:.4g} in sum", limit="a sum of the amplitudes below 1, the mean",
+        )  # fmt: skip
+    if (gears.mass is None) != (gears.bearing_stiffness is None):
+        yield CaseError(
+            "bearings need the masses of both gears and both stiffnesses", code="E-KEY-MISSING",
+            key="gears.mass" if gears.mass is None else "gears.bearing_stiffness",
+            remedy="add it, or leave both out: axes that are held",
+        )  # fmt: skip
+    if all(gears.eccentricity) and gears.teeth[0] == gears.teeth[1]:
+        yield CaseError(
+            "both gears are eccentric and turn with one frequency", code="E-PAIR", key="gears.eccentricity",
+            value=", ".join(LENGTH.show(one) for one in gears.eccentricity),
+            limit="one of them, or other teeth", remedy="give the sum of both to one gear",
+        )  # fmt: skip
+    if any(gears.eccentricity) and case.sweep is None and case.chaos is None:
+        yield CaseError(
+            "an eccentric gear leaves the stage response out, and nothing is computed", code="E-KEY-MISSING",
+            key="sweep", remedy="add the section sweep, or chaos",
+        )  # fmt: skip
+    for key in ("response", "chaos"):
+        one = getattr(case, key)
+        if one is not None and one.start == one.to:
+            yield CaseError("a range of one ratio", code="E-RANGE", key=f"{key}.to", value=one.to,
+                            limit="another ratio than from")  # fmt: skip
+
+
+def scales_of(case: GearPairCase) -> PairScales:
+    """Half backlash, natural frequency and force that count as one."""
+    gears, mesh = case.gears, case.mesh
+    return pair_scales(
+        inertia=gears.inertia,
+        base_radius=gears.base_radii,
+        stiffness=mesh.stiffness,
+        backlash=mesh.backlash,
+    )
+
+
+def pair_of(case: GearPairCase) -> ImpactPair:
+    """The dimensionless pair of a case."""
+    gears, mesh, scales = case.gears, case.mesh, scales_of(case)
+    bearings = None
+    if gears.mass is not None and gears.bearing_stiffness is not None:
+        equivalent = mesh.stiffness / scales.frequency**2
+        bearings = PairBearings(
+            mass=tuple(one / equivalent for one in gears.mass),
+            stiffness=tuple(one / mesh.stiffness for one in gears.bearing_stiffness),
+            damping_ratio=gears.bearing_damping_ratio,
+        )
+    error = [one / scales.length for one in mesh.error]
+    eccentricity = [one / scales.length for one in gears.eccentricity]
+    first, second = _waves(eccentricity, gears.eccentricity_angles)
+    return ImpactPair(
+        damping_ratio=mesh.damping_ratio,
+        load=case.operation.torque / gears.base_radii[0] / scales.force,
+        stiffness=_waves(mesh.stiffness_waves, mesh.stiffness_angles),
+        tooth_error=_waves(error, mesh.error_angles),
+        eccentricity=(first, second),
+        teeth=gears.teeth,
+        bearings=bearings,
+    )
+
+
+def _waves(amplitudes, angles) -> tuple[complex, ...]:
+    """Complex amplitudes; without angles all are cosines."""
+    return tuple(a * cmath.exp(1j * angle) for a, angle in zip(amplitudes, angles or [0.0] * len(amplitudes)))

@@ -1,0 +1,376 @@
+"""The pipeline of a gear pair: response by harmonic balance, sweep and chaos by integration in time.
+
+The stages know nothing of one another. Lengths count in half backlashes and times in 1 / omega_n, as in
+`femgear.trains.gear_pair.model`; every file tells these units. `GEAR_PAIR` at the end is the train.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.report.tables import Block
+from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
+from femgear.system.contact_states import (
+    STATE_NAMES,
+    range_states,
+    solution_states,
+    state_regions,
+)
+from femgear.threads import one_blas_thread
+from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
+from femgear.trains.gear_pair.section import GearPairCase, build_gear_pair, pair_of, scales_of
+from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.solvers.continuation.branches import Branch
+    from femgear.solvers.stability.lyapunov import LyapunovExponents
+    from femgear.solvers.time.stroboscopic import SweepResponse
+
+# instants of a period at which extremes and contact are looked for
+_INSTANTS = 512
+# points of a motion that the bifurcation diagram shows, periods of a section over those of an exponent
+_SHOWN, _LONGER = 80, 8
+_SHARES = {
+    "drive": "share of the time on the drive flank",
+    "free": "share of the time between the flanks",
+    "back": "share of the time on the back flank",
+}
+_CHAOTIC = {True: "yes", False: "no", None: "not told"}
+_LENGTH, _RATE = "in half backlashes", "in natural angular frequencies"
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseResult:
+    """Periodic motions along the branch, extremes and shares (p,), and ratios where flanks part or hit."""
+
+    case: GearPairCase
+    branch: Branch
+    lowest: np.ndarray
+    highest: np.ndarray
+    shares: dict[str, np.ndarray]
+    borders: dict[float, np.ndarray]
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of response.nc."""
+        branch = self.branch
+        variables = _motions(("point",), self.lowest, self.highest, np.real(branch.lines[:, 0, 0]))
+        variables |= _numbers(
+            ("point",),
+            stable=(branch.stable, "whether the motion is known to be stable"),
+            multiplier=(branch.largest_multiplier, "largest Floquet multiplier"),
+            **{name: (share, _SHARES[name.partition("_")[0]]) for name, share in self.shares.items()},
+        )
+        variables |= _numbers(("limit_point",), fold=(branch.folds, "number of the point, from 0"))
+        words = "frequency ratio from which {} flanks {}"
+        for name, level, verb in (("drive", DRIVE, "part"), ("back", BACK, "touch")):
+            border = {f"{name}_border": (self.borders[level], words.format(name, verb))}
+            variables |= _numbers((f"{name}_crossing",), **border)
+        lines = [("deflection", ("point", "line"), branch.lines[:, 0], "1", f"relative deflection {_LENGTH}")]
+        coords = _ratios(self.case, "point", branch.parameter)
+        coords |= _numbers(("line",), line=(branch.orders[:, 0], "harmonic of the tooth frequency"))
+        attrs = {"message": branch.message, "complete": int(branch.complete), "fourier_convention": FOURIER}
+        title = "periodic motions by harmonic balance"
+        return dataset(variables | complex_entries(lines), coords, _units(self.case, title) | attrs)
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """Motions to which integration settles, over ascending ratios and back."""
+
+    case: GearPairCase
+    up: SweepResponse
+    down: SweepResponse
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of sweep.nc; both directions over the ascending ratio."""
+
+        def both(name: str) -> np.ndarray:
+            return np.array([getattr(self.up, name), getattr(self.down, name)[::-1]])
+
+        dims = ("direction", "ratio")
+        extremes = both("lowest")[..., 0], both("highest")[..., 0], np.real(both("lines")[..., 0, 0])
+        variables = _motions(dims, *extremes) | _numbers(
+            dims,
+            settled=(both("settled"), "whether the motion repeats"),
+            periods=(both("periods"), "periods until then"),
+        )
+        coords = _ratios(self.case, "ratio", self.up.frequency)
+        coords |= _numbers(("direction",), direction=(["up", "down"], "direction of the sweep"))
+        return dataset(variables, coords, _units(self.case, "settled motions, ratio up and down"))
+
+
+@dataclass(frozen=True, eq=False)
+class ChaosResult:
+    """Exponents and sections over the ratio, and long sections at some of the ratios."""
+
+    case: GearPairCase
+    ratio: np.ndarray
+    found: list[LyapunovExponents]
+    sections: list[tuple[float, LyapunovExponents]]
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of chaos.nc; exponents are per unit of time 1 / omega_n."""
+        ratio, found = self.ratio, self.found
+        variables = _numbers(
+            ("ratio",),
+            exponent=(ratio * [one.largest for one in found], f"largest Lyapunov exponent {_RATE}"),
+            error=(ratio * [one.error[0] for one in found], f"its error {_RATE}"),
+            lowest=([one.lowest[0] for one in found], f"smallest deflection {_LENGTH}"),
+            highest=([one.highest[0] for one in found], f"largest deflection {_LENGTH}"),
+            repeats=([one.section.repeats_after(1e-3) for one in found], "periods until it repeats, or 0"),
+            chaotic=([_CHAOTIC[one.chaotic] for one in found], "yes, no or not told"),
+        )
+        points = [one.section.deflection[-_SHOWN:, 0] for one in found]
+        variables |= _numbers(("ratio", "period"), point=(points, f"deflection once a period {_LENGTH}"))
+        if self.sections:
+            at, long = np.array([r for r, _ in self.sections]), [one for _, one in self.sections]
+            velocity = at[:, None] * [one.section.velocity[:, -1] for one in long]
+            variables |= _numbers(
+                ("section",),
+                section_ratio=(at, "frequency ratio of the section"),
+                section_exponent=(at * [one.largest for one in long], f"largest exponent {_RATE}"),
+                section_error=(at * [one.error[0] for one in long], f"its error {_RATE}"),
+            )
+            variables |= _numbers(
+                ("section", "run"),
+                section_deflection=([one.section.deflection[:, 0] for one in long], f"deflection {_LENGTH}"),
+                section_velocity=(velocity, f"velocity {_LENGTH}, {_RATE}"),
+            )
+        title = "Lyapunov exponents and sections once a period"
+        return dataset(variables, _ratios(self.case, "ratio", ratio), _units(self.case, title))
+
+
+def _numbers(dims: tuple[str, ...], **entries: tuple) -> dict[str, tuple]:
+    """Entries ``(values, words)`` without a unit."""
+    return {name: (dims, values, "1", words) for name, (values, words) in entries.items()}
+
+
+def _motions(dims: tuple[str, ...], lowest, highest, mean) -> dict[str, tuple]:
+    return _numbers(
+        dims,
+        amplitude=(0.5 * (highest - lowest), f"half of largest less smallest, {_LENGTH}"),
+        mean=(mean, f"mean deflection {_LENGTH}"),
+        lowest=(lowest, f"smallest deflection {_LENGTH}"),
+        highest=(highest, f"largest deflection {_LENGTH}"),
+        state=(
+            np.array(STATE_NAMES)[range_states(lowest, highest, drive=DRIVE, back=BACK)],
+            "contact state",
+        ),
+    )
+
+
+def _ratios(case: GearPairCase, dimension: str, ratio) -> dict[str, tuple]:
+    """Frequency ratio and speed of the driving gear along a dimension."""
+    speed = ratio * scales_of(case).frequency / case.gears.teeth[0]
+    words = "tooth frequency over natural frequency"
+    return {
+        "ratio": ((dimension,), ratio, "1", words),
+        "speed": ((dimension,), speed / RPM, "rpm", "speed of the driving gear"),
+    }
+
+
+def _units(case: GearPairCase, title: str) -> dict[str, Any]:
+    """Attributes: title, half backlash [m], natural frequency [Hz], and force that counts as one [N]."""
+    scales = scales_of(case)
+    natural = scales.frequency / (2.0 * np.pi)
+    lengths = {"half_backlash": scales.length, "natural_frequency": natural, "unit_force": scales.force}
+    return {"title": title} | lengths
+
+
+@one_blas_thread()
+def solve_response(case: GearPairCase) -> ResponseResult:
+    """Periodic motions over the frequency ratio past limit points, with stability and contact."""
+    from femgear.solvers.continuation.arclength import StepOptions
+    from femgear.solvers.continuation.branches import parameter_curve
+
+    pair, given = pair_of(case), case.response
+    branch = parameter_curve(
+        pair.problem, (given.start, given.to), 1.0, harmonics=given.harmonics, samples=1024, radius=False,
+        options=StepOptions(largest=given.largest_step),
+    )  # fmt: skip
+    phase = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
+    x = np.array([solution.at(phase)[:, 0] for solution in branch.solutions])
+    states = [solution_states(pair.mesh(), one, samples=_INSTANTS) for one in branch.solutions]
+    shares = {f"{name}_share": np.array([getattr(one, name)[0] for one in states]) for name in _SHARES}
+    borders = {level: np.sort(impact_borders(pair, branch, level)) for level in (DRIVE, BACK)}
+    return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), shares, borders)
+
+
+@one_blas_thread()
+def solve_sweep(case: GearPairCase) -> SweepResult:
+    """Integrate at every ratio until the motion repeats, upwards and from there back."""
+    from femgear.solvers.time.stroboscopic import sweep_up_and_down
+
+    pair, given = pair_of(case), case.sweep
+    assert given is not None
+    ratios = np.concatenate([np.linspace(one.start, one.to, one.count) for one in given.ranges])
+    up, down = sweep_up_and_down(
+        lambda ratio: (pair.problem(ratio), pair.frequency),
+        ratios, steps=given.steps * pair.periods, periods=pair.periods, most=given.most_periods,
+    )  # fmt: skip
+    return SweepResult(case, up, down)
+
+
+@one_blas_thread()
+def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> ChaosResult:
+    """Lyapunov exponents over the ratio, each from the last point of the one before, and long sections."""
+    from femgear.solvers.stability.lyapunov import lyapunov_exponents
+
+    pair, given, found = pair_of(case), case.chaos, []
+    assert given is not None
+    ratios, start = np.linspace(given.start, given.to, given.count), None
+    options: dict[str, Any] = {"steps": given.steps * pair.periods, "periods": pair.periods}
+    for number, ratio in enumerate(ratios):
+        if progress is not None:
+            progress("chaos", number, len(ratios))
+        found.append(
+            lyapunov_exponents(
+                pair.problem(ratio), pair.frequency, points=given.points, skip=given.skip, start=start,
+                **options,
+            )
+        )  # fmt: skip
+        start = found[-1].section.displacement[-1], found[-1].section.velocity[-1]
+    sections = []
+    for wanted in given.sections:
+        place = int(np.argmin(np.abs(ratios - wanted)))
+        end = found[place].section
+        once = lyapunov_exponents(
+            pair.problem(ratios[place]), pair.frequency, points=_LONGER * given.points, skip=100,
+            start=(end.displacement[-1], end.velocity[-1]), **options,
+        )  # fmt: skip
+        sections.append((float(ratios[place]), once))
+    return ChaosResult(case, ratios, found, sections)
+
+
+def describe_gear_pair(case: GearPairCase) -> tuple[Block, ...]:
+    """Title, units, numbers of the pair, and warnings of a case."""
+    scales, pair = scales_of(case), pair_of(case)
+    numbers = {
+        "natural frequency [Hz]": scales.frequency / (2.0 * np.pi),
+        "its speed of the driving gear [rpm]": scales.frequency / case.gears.teeth[0] / RPM,
+        "half backlash b [um]": 1e6 * scales.length,
+        "force k b [N]": scales.force,
+        "load over k b": pair.load,
+        "damping ratio": pair.damping_ratio,
+    }
+    rows = [(text, f"{value:.6g}") for text, value in numbers.items()]
+    waves = {"tooth error over b": pair.tooth_error, "mesh stiffness wave over its mean": pair.stiffness}
+    for text, wave in waves.items():
+        rows.append((text, ", ".join(f"{abs(one):.6g}" for one in wave) or "none"))
+    notes: tuple[str, ...] = ()
+    if pair.load and len(pair.tooth_error) == 1 and pair.bearings is None:
+        parting = separation_ratios(
+            damping_ratio=pair.damping_ratio, load=abs(pair.load), error=abs(pair.tooth_error[0])
+        )
+        ends = " and ".join(f"{ratio:.4f}" for ratio in parting) or "no ratio"
+        notes = (f"with constant stiffness drive flanks begin to part at {ends} of the natural frequency",)
+    warnings = tuple(gear_pair_warnings(case)) or ("none",)
+    return Block(case.title), Block("Gear pair", (), tuple(rows), notes), Block("Warnings", notes=warnings)
+
+
+def gear_pair_warnings(case: GearPairCase) -> Iterator[str]:
+    """What is allowed but deserves a look."""
+    if case.operation.torque == 0.0:
+        yield "[W-LOAD] operation.torque: without load nothing keeps the flanks on one side"
+    if not (case.mesh.error or case.mesh.stiffness_waves or any(case.gears.eccentricity)):
+        yield "[W-EXCITATION] mesh: neither error nor stiffness waves nor eccentricity excite the pair"
+
+
+def result_warnings(results) -> Iterator[str]:
+    """What the solvers say against their own results."""
+    if "response" in results.stages and not results.response.attrs["complete"]:
+        yield f"[W-BRANCH] response: {results.response.attrs['message']}"
+    if "sweep" in results.stages and (lost := int((~results.sweep["settled"].values.astype(bool)).sum())):
+        yield f"[W-SETTLED] sweep: {lost} motions do not repeat within sweep.most_periods"
+
+
+def _describe_response(data: xr.Dataset) -> Block:
+    rows = [
+        ("largest amplitude [half backlashes]", f"{float(data['amplitude'].max()):.4f}"),
+        ("limit points at ratio", _listed(data["ratio"].values[data["fold"].values])),
+        ("drive flanks begin to part at", _listed(data["drive_border"].values)),
+        ("back flanks begin to touch at", _listed(data["back_border"].values)),
+    ]
+    points = f"{data.sizes['point']} points, {int(data['stable'].sum())} stable; {data.attrs['message']}"
+    return Block("Response", ("", "ratio"), tuple(rows), (points,))
+
+
+def _listed(values) -> str:
+    return ", ".join(f"{value:.4f}" for value in np.sort(values)) or "none"
+
+
+def _describe_sweep(data: xr.Dataset) -> Block:
+    rows = [
+        (str(direction), STATE_NAMES[number], f"{min(ends):.3f}", f"{max(ends):.3f}")
+        for direction, states in zip(data["direction"].values, data["state"].values)
+        for number, *ends in state_regions(data["ratio"].values, [STATE_NAMES.index(one) for one in states])
+    ]
+    return Block("Sweep", ("sweep", "contact state", "from ratio", "to ratio"), tuple(rows))
+
+
+def _describe_chaos(data: xr.Dataset) -> Block:
+    words = [str(one) for one in data["chaotic"].values]
+    chaotic = data["ratio"].values[[one == "yes" for one in words]]
+    ends = [f"{ratio:.4g}" for ratio in chaotic[[0, -1]]] if len(chaotic) else ["none", "none"]
+    counts, lowest = [len(words), len(chaotic), words.count("not told")], float(data["lowest"].min())
+    row = str(counts[0]), str(counts[1]), *ends, str(counts[2]), f"{lowest:.3f}"
+    header = ("ratios", "chaotic", "from", "to", "not told", "smallest deflection [half backlashes]")
+    notes = ("chaotic: exponent clearly positive, bounded, no repetition",)
+    return Block("Chaos", header, (row,), notes)
+
+
+def _no_response(case: GearPairCase) -> str:
+    eccentric = any(case.gears.eccentricity)
+    return "the shafts of eccentric gears add base frequencies; take sweep" if eccentric else ""
+
+
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.gear_pair.figures import FIGURES
+
+    return FIGURES
+
+
+GEAR_PAIR = Train(
+    name="gear_pair",
+    words="a gear pair",
+    model=GearPairCase,
+    own_file=OwnFile(
+        lambda data: data.get("model") == "gear_pair", build_gear_pair, GearPairCase.model_json_schema
+    ),
+    stages=(
+        Stage(
+            name="response",
+            title="Response",
+            solve=lambda case, *_: solve_response(case),
+            verdict=lambda result: {"points": len(result.lowest), "message": result.branch.message},
+            describe=lambda results: _describe_response(results.response),
+            unavailable=_no_response,
+        ),
+        Stage(
+            name="sweep",
+            title="Sweep",
+            solve=lambda case, *_: solve_sweep(case),
+            verdict=lambda result: {"settled": int(result.up.settled.sum() + result.down.settled.sum())},
+            describe=lambda results: _describe_sweep(results.sweep),
+            unavailable=lambda case: "" if case.sweep else "the case has no section sweep",
+        ),
+        Stage(
+            name="chaos",
+            title="Chaos",
+            solve=lambda case, _, context: solve_chaos(case, progress=context.progress),
+            verdict=lambda result: {"ratios": len(result.ratio)},
+            describe=lambda results: _describe_chaos(results.chaos),
+            unavailable=lambda case: "" if case.chaos else "the case has no section chaos",
+        ),
+    ),
+    describe=describe_gear_pair,
+    warnings=gear_pair_warnings,
+    result_warnings=result_warnings,
+    figures=_figures,
+)

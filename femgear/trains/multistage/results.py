@@ -1,0 +1,268 @@
+"""Results of a multistage case: modes.nc, response.nc, balance.nc, and the tables of case and numbers.
+
+Every variable of a file carries its units; complex amplitudes are stored as real and imaginary parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.report.tables import Block
+from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
+from femgear.trains.multistage.model import (
+    MultistageSet,
+    mean_mesh_stiffness,
+    mesh_columns,
+    multistage_system,
+    speed_ratio,
+    train_speeds,
+    train_torques,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.solvers.linear.receptance import MeshErrorResponse
+    from femgear.system.system import Modes
+    from femgear.trains.multistage.section import MultistageCase
+
+_SHOWN = 16
+"""Modes of the table."""
+
+
+@dataclass(frozen=True, eq=False)
+class MultistageModes:
+    """Modes of the whole train.
+
+    Parameters
+    ----------
+    data : MultistageSet
+    modes : Modes
+        ``kind``: ``rigid``; ``rotational``, ``translational`` or ``planet`` where at least 99 % of the
+        kinetic energy belongs to that class in all stages together; else ``mixed``. With equally spaced
+        planets every mode is pure: rotational and translational modes reach over all stages, a planet mode
+        stays in one (Kiracofe and Parker, J. Vib. Acoust. 129, 2007).
+    share : (S, m) array
+        Of every stage in the kinetic energy.
+    strain : (S + 1, m) array
+        Of every stage's meshes in the strain energy, and of everything else (supports, bearings, couplings)
+        in the last row; zero for rigid motions.
+    """
+
+    data: MultistageSet
+    modes: Modes
+    share: np.ndarray
+    strain: np.ndarray
+
+    @property
+    def stage(self) -> np.ndarray:
+        """Stage (m,) with most of the kinetic energy, from 1."""
+        return self.share.argmax(axis=0) + 1
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Such as ``"planet, stage 2 (100 %)"``."""
+        return tuple(
+            f"{kind}, stage {stage} ({100.0 * share[stage - 1]:.0f} %)"
+            for kind, stage, share in zip(self.modes.kind, self.stage.tolist(), self.share.T)
+        )
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of modes.nc."""
+        modes, along = self.modes, ("mode",)
+        parts = [*(f"meshes of stage {n}" for n in _stages(self.data)), "supports, bearings and couplings"]
+        deflection, numbers = modes.mesh_deflection, np.arange(1, len(modes.frequency) + 1)
+        variables = {
+            "frequency": (along, modes.frequency, "Hz", "undamped natural frequency"),
+            "damping_ratio": (along, modes.damping_ratio, "1", "fraction of critical damping"),
+            "kind": (along, list(modes.kind), "1", "kind of mode"),
+            "main_stage": (along, self.stage, "1", "stage with most of the kinetic energy"),
+            "energy": (("stage", "mode"), self.share, "1", "share of the stage in the kinetic energy"),
+            "strain": (("part", "mode"), self.strain, "1", "share in the strain energy"),
+            "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+            "mesh_deflection": (("mesh", "mode"), deflection, "kg^-1/2", "mesh deflection of the mode"),
+            "mesh_stiffness": (("mesh",), mean_mesh_stiffness(self.data), "N/m", "mean mesh stiffness"),
+        }
+        coords = _coordinates(self.data) | {
+            "mode": (along, numbers, "1", "mode"),
+            "part": (("part",), parts, "1", "part of the train"),
+            "dof": (("dof",), list(multistage_system(self.data).dofs), "1", "degree of freedom"),
+        }
+        attrs = {"title": "modes of the train at rest, mean mesh stiffness", "unknowns": len(modes.shape)}
+        return dataset(variables, coords, attrs)
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseResult:
+    """Answers of all meshes to the transmission errors of every stage over the input's speed [rad/s]."""
+
+    data: MultistageSet
+    speed: np.ndarray
+    answers: dict[int, MeshErrorResponse]
+
+    @property
+    def forces(self) -> dict[str, np.ndarray]:
+        """Root mean squares (F, S) of the force in sun-planet 1 of every stage, by the stage that excites."""
+        first, squares = _first_meshes(self.data), {}
+        for n, one in self.answers.items():
+            squares[f"meshes of stage {n}"] = 0.5 * (np.abs(one.force[..., first]) ** 2).sum(axis=1)
+        total = {"all stages": np.sqrt(sum(squares.values()))}
+        return total | {text: np.sqrt(square) for text, square in squares.items()}
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of response.nc."""
+        answers, along = list(self.answers.values()), ("excited_by", "speed")
+        total, *single = self.forces.values()
+        words = "r.m.s. of the force in sun-planet 1 of every stage"
+        hertz = [one.mesh_frequency for one in answers]
+        variables = {
+            "mesh_frequency": (along, hertz, "Hz", "mesh frequency of the stage that excites"),
+            "first_force": ((*along, "stage"), single, "N", words),
+            "total_force": (("speed", "stage"), total, "N", f"{words}, meshes of all stages"),
+        }
+        force = np.array([one.force for one in answers])
+        lines = [("mesh_force", (*along, "harmonic", "mesh"), force, "N", "dynamic mesh force")]
+        coords = _coordinates(self.data, self.speed) | {
+            "excited_by": (("excited_by",), list(self.answers), "1", "stage whose meshes excite"),
+            "harmonic": (("harmonic",), answers[0].harmonics, "1", "of the mesh frequency"),
+        }
+        attrs = {"title": "response to the transmission errors by modal summation"}
+        attrs["fourier_convention"] = FOURIER
+        return dataset(variables | complex_entries(lines), coords, attrs)
+
+
+@dataclass(frozen=True, eq=False)
+class BalanceResult:
+    """Mesh forces (F, meshes, lines) by harmonic balance with k(t) of all meshes.
+
+    ``orders`` (lines, S) are the multiples of the mesh frequencies; the first line is the mean.
+    """
+
+    data: MultistageSet
+    speed: np.ndarray
+    orders: np.ndarray
+    force: np.ndarray
+    converged: np.ndarray
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Root mean squares (F, S) of the force in sun-planet 1 of every stage; NaN where not converged."""
+        squares = np.abs(self.force[:, _first_meshes(self.data), 1:]) ** 2
+        return np.where(self.converged[:, None], np.sqrt(0.5 * squares.sum(axis=2)), np.nan)
+
+    def dataset(self) -> xr.Dataset:
+        """Contents of balance.nc."""
+        words = "r.m.s. of the force in sun-planet 1 of every stage"
+        variables = {
+            "orders": (("line", "stage"), self.orders, "1", "multiples of the mesh frequency of the stage"),
+            "converged": (("speed",), self.converged, "1", "whether harmonic balance found a solution"),
+            "total_force": (("speed", "stage"), self.forces, "N", words),
+        }
+        lines = [("mesh_force", ("speed", "mesh", "line"), self.force, "N", "mesh force")]
+        attrs = {"title": "response with the mesh stiffnesses k(t) by harmonic balance"}
+        return dataset(variables | complex_entries(lines), _coordinates(self.data, self.speed), attrs)
+
+
+def _stages(data: MultistageSet) -> range:
+    return range(1, len(data.stages) + 1)
+
+
+def _first_meshes(data: MultistageSet) -> list[int]:
+    """Columns of sun-planet 1 of every stage."""
+    return [int(columns[0]) for columns in mesh_columns(data)]
+
+
+def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
+    """Stages, meshes, and speeds of the input where there are some."""
+    names = []
+    for number, stage in enumerate(data.stages, 1):
+        planets = range(1, stage.data.n_planets + 1)
+        names += [f"stage {number} sun-planet {n}" for n in planets]
+        names += [f"stage {number} planet {n}-ring" for n in planets]
+    found = {"mesh": (("mesh",), names, "1", "gear mesh"), "stage": (("stage",), _stages(data), "1", "stage")}
+    if speed is not None:
+        found["speed"] = ("speed",), speed / RPM, "rpm", "speed of the input"
+    return found
+
+
+def describe_multistage(case: MultistageCase, train: MultistageSet) -> tuple[Block, ...]:
+    """Title, stages with speeds and torques, couplings, and warnings of a case."""
+    header = ["stage", "teeth", "planets", "fixed", "sun-planet [N/m]", "planet-ring [N/m]"]
+    rows = []
+    for n, one in enumerate(train.stages, 1):
+        teeth, k = "/".join(map(str, one.teeth or ())), one.data.mesh_stiffness[[0, -1]]
+        fixed = one.fixed or "none"
+        rows.append([str(n), teeth or "-", str(one.data.n_planets), fixed, f"{k[0]:.4g}", f"{k[1]:.4g}"])
+    notes: tuple[str, ...] = ()
+    if case.operation is not None:
+        speeds = train_speeds(train, case.operation.speed)
+        torques = train_torques(train, case.operation.torque)
+        header += ["sun [rpm]", "carrier [rpm]", "mesh [Hz]", "sun [N m]", "carrier [N m]"]
+        numbers = speeds.sun / RPM, speeds.carrier / RPM, speeds.mesh_frequency, torques.sun, torques.carrier
+        for row, values in zip(rows, zip(*numbers)):
+            row += [f"{value:.3f}" for value in values[:3]] + [f"{value:.1f}" for value in values[3:]]
+        power = 1e-3 * case.operation.torque * case.operation.speed
+        notes = (
+            f"from {train.input} to {train.output}: ratio {speed_ratio(train):.6g}, {power:.4g} kW, output "
+            f"torque {torques.output:.6g} N m",
+        )
+    couplings = [
+        (str(one.first), str(one.second), f"{one.torsional:.4g}", f"{one.lateral:.4g}")
+        for one in train.couplings
+    ]
+    return (
+        Block(case.title),
+        Block("Stages", tuple(header), tuple(map(tuple, rows)), notes),
+        Block("Couplings", ("from", "to", "torsional [N m/rad]", "lateral [N/m]"), tuple(couplings)),
+        Block("Warnings", notes=tuple(multistage_warnings(case)) or ("none",)),
+    )
+
+
+def multistage_warnings(case: MultistageCase) -> Iterator[str]:
+    """What is allowed but deserves a look."""
+    response = case.response
+    if response is not None and (case.operation is None or not case.geared):
+        yield "[W-RESPONSE] response: without operation, or gears of every stage, there are modes alone"
+
+
+def describe_modes(data: xr.Dataset) -> Block:
+    """First modes of modes.nc: frequency, kind, and the stage in which each one lives."""
+    shown = min(data.sizes["mode"], _SHOWN)
+    rows = tuple(
+        (
+            str(i + 1), f"{float(data.frequency[i]):.2f}", str(data.kind.values[i]),
+            str(int(data.main_stage[i])), f"{100.0 * float(data.energy[:, i].max()):.0f}",
+        )
+        for i in range(shown)
+    )  # fmt: skip
+    notes = (
+        f"{data.sizes['mode']} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown; "
+        "stage: with most of the kinetic energy",
+    )
+    return Block("Modes", ("mode", "frequency [Hz]", "kind", "stage", "its energy [%]"), rows, notes)
+
+
+def describe_forces(data: xr.Dataset, title: str) -> Block:
+    """Largest r.m.s. force in sun-planet 1 of every stage, of response.nc or balance.nc."""
+    rows = []
+    for n, force in zip(data["stage"].values, data["total_force"].values.T):
+        known = np.nan_to_num(force)
+        place = int(known.argmax())
+        rows.append((str(n), f"{known[place]:.4g}", f"{float(data['speed'][place]):.6g}"))
+    count = f"{data.sizes['speed']} speeds of the input"
+    if "converged" in data:
+        count += f", {int(data['converged'].sum())} converged"
+    header = ("stage", "largest force in sun-planet 1 [N r.m.s.]", "at [rpm]")
+    return Block(title, header, tuple(rows), (count,))
+
+
+def balance_warnings(data: xr.Dataset) -> Iterator[str]:
+    """What harmonic balance says against balance.nc."""
+    lost = data["speed"].values[~data["converged"].values.astype(bool)]
+    if len(lost):
+        shown = ", ".join(f"{value:.6g}" for value in lost[:8])
+        yield f"[W-BALANCE] harmonic balance did not converge at {len(lost)} speeds: {shown} rpm"

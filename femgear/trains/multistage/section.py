@@ -1,0 +1,357 @@
+"""The sections of a case file with ``model = "multistage"``: planetary stages, shafts, operation, response.
+
+`multistage_of` makes the train of a case, `stage_gears` the gears of a stage that has a module. `cross_check`
+refuses entries that contradict one another, and trains that cannot turn.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from published.iso6336_stiffness import mesh_stiffness_method_b
+from pydantic import BeforeValidator, Field
+
+from femgear.case.fields import (
+    Count,
+    Number,
+    Quantity,
+    Section,
+    Several,
+    StiffnessOrRigid,
+    Title,
+    described,
+    refuse,
+)
+from femgear.case.problems import checked_case
+from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
+from femgear.case.text import ReadCase
+from femgear.case.units import ANGLE, LENGTH, SPEED, STIFFNESS, TORQUE, TORSION
+from femgear.errors import CaseError, FemgearError
+from femgear.gears.checks import check_set
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
+from femgear.gears.profile import BasicRack
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet, planar_from_set
+from femgear.system.shaft import ShaftSection, joint_springs
+from femgear.trains.multistage.model import (
+    STIFFEST,
+    Member,
+    MultistageSet,
+    Stage,
+    StageCoupling,
+    check_turns,
+    in_series,
+    train_torques,
+)
+
+_MEMBER = re.compile(r"stage ([1-9]\d?) (carrier|ring|sun)")
+_RPM = SPEED.scale
+# entries of the file for those that refusals of gears and of lumped sets name
+_ENTRIES = {
+    "profile_shift": "gears.profile_shifts", "centre_distance": "gears.profile_shifts",
+    "teeth": "gears.teeth", "root_radius": "gears.addendum", "tip_diameter": "gears.addendum",
+}  # fmt: skip
+_REMEDIES = {
+    "E-COAXIAL": "choose teeth with sun + 2 planet = ring, or profile shifts that close the set",
+    "E-FILLET": "reduce the addendum of that gear",
+    "E-POINTED": "change the profile shift of that gear, or reduce its addendum",
+}
+
+
+def _member(value: object) -> str:
+    if not isinstance(value, str):
+        raise refuse(f"a member of a stage is needed, not {described(value)}", code="E-TYPE", value=value)
+    if not _MEMBER.fullmatch(value):
+        limit = 'a stage and its carrier, ring or sun, such as "stage 1 sun"'
+        raise refuse("not a member of a stage", code="E-CHOICE", value=value, limit=limit)
+    return value
+
+
+MemberName = Annotated[str, BeforeValidator(_member)]
+Length = Quantity(LENGTH, 1e-4, 20.0)
+Speed = Quantity(SPEED, 1e-3 * _RPM, 1e6 * _RPM)
+Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
+PressureAngle = Quantity(ANGLE, math.radians(5), math.radians(45))
+Teeth = Count(4, 5000)
+
+
+class BodySection(Section):
+    """Sun, ring or carrier, and the stiffnesses that hold it in the housing."""
+
+    mass: Mass
+    inertia: Inertia
+    support_stiffness: StiffnessOrRigid(STIFFNESS, 0.0, 1e15) = 0.0
+    torsional_stiffness: StiffnessOrRigid(TORSION, 0.0, 1e15) = 0.0
+
+
+class PlanetSection(Section):
+    """One of the equal planets on its bearing."""
+
+    mass: Mass
+    inertia: Inertia
+    bearing_stiffness: StiffnessOrRigid(STIFFNESS, 1.0, 1e15)
+
+
+class GearsSection(Section):
+    """Gears of a stage: sun, planet, ring; mesh phases, contact ratios and stiffness follow from them."""
+
+    teeth: Several(Teeth, 3)
+    module: Quantity(LENGTH, 5e-5, 0.5)
+    face_width: Quantity(LENGTH, 1e-4, 5.0)
+    pressure_angle: PressureAngle = math.radians(20.0)
+    profile_shifts: Several(Number(-5.0, 5.0), 3) = (0.0, 0.0, 0.0)
+    addendum: Several(Number(0.1, 3.0), 3) = (1.0, 1.0, 1.0)
+    mesh_stiffness: MeshStiffnessSection | None = None
+
+
+class RadiiSection(Section):
+    """Base radii of sun and planet in place of gears; the ring's is that of the sun and two planets."""
+
+    sun: Radius
+    planet: Radius
+    pressure_angle: PressureAngle = math.radians(20.0)
+    teeth: Several(Teeth, 3) | None = None
+    mesh_stiffness: MeshStiffnessSection
+
+
+class StageSection(Section):
+    """A planetary set."""
+
+    planets: Count(1, 24) = 3
+    planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
+    gears: GearsSection | None = None
+    radii: RadiiSection | None = None
+    fixed: Literal["carrier", "ring", "sun", "none"] = "ring"
+    angle: Angle = 0.0
+    sun: BodySection
+    planet: PlanetSection
+    ring: BodySection
+    carrier: BodySection
+
+    @property
+    def angles(self) -> tuple[float, ...]:
+        """Of the planets [rad]: as given, or equally spaced."""
+        return self.planet_angles or equal_planet_angles(self.planets)
+
+
+class CouplingSection(Section):
+    """A shaft between members of two stages: springs, or a solid round section of steel."""
+
+    between: Several(MemberName, 2)
+    diameter: Length | None = None
+    length: Length | None = None
+    torsional: StiffnessOrRigid(TORSION, 1e-3, STIFFEST["torsional"]) | None = None
+    lateral: StiffnessOrRigid(STIFFNESS, 0.0, STIFFEST["lateral"]) | None = None
+
+
+class OperationSection(Section):
+    """Speed of and torque on the input, and where input and output are."""
+
+    speed: Speed
+    torque: Quantity(TORQUE, -1e9, 1e9)
+    input: MemberName = "stage 1 sun"
+    output: MemberName | None = None
+
+
+class ResponseSection(Section):
+    """Speeds of the input, harmonics of every mesh frequency, and speeds of harmonic balance beside them."""
+
+    lowest: Speed
+    highest: Speed
+    points: Count(2, 20_000) = 341
+    harmonics: Count(1, 20) = 3
+    damping_ratio: Number(0.0, 1.0, open_low=True, open_high=True) = 0.03
+    balance_points: Count(0, 200) = 0
+
+
+class MultistageCase(Section, ReadCase):
+    """Planetary stages and their couplings, the operation and what is computed, in SI units.
+
+    The fields carry the names of the case file; ``source`` is the text that gives this case.
+    """
+
+    format: Count(1, 2**31) = FORMAT
+    model: Literal["multistage"]
+    title: Title
+    stage: Annotated[tuple[StageSection, ...], Field(min_length=1, max_length=20)]
+    coupling: Annotated[tuple[CouplingSection, ...], Field(max_length=60)] = ()
+    operation: OperationSection | None = None
+    response: ResponseSection | None = None
+
+    @property
+    def geared(self) -> bool:
+        """Whether every stage has gears, and with them mesh phases and tooth pairs in contact."""
+        return all(one.gears is not None for one in self.stage)
+
+
+def build_multistage(data: dict, text: str, name: str, *, numbered: bool = True) -> MultistageCase:
+    """Case of the tables of a TOML text; see `femgear.trains.protocol.OwnFile`.
+
+    Raises
+    ------
+    CaseError
+        Everything that is wrong with the entries, or why they make no train.
+    """
+    lines = text if numbered else ""
+    case = checked_case(MultistageCase, data, lines, name, check=cross_check)
+    case.read_from(text, lines, name)
+    return case
+
+
+def cross_check(case: MultistageCase) -> Iterator[CaseError]:
+    """What no entry shows alone."""
+    found = list(_entry_problems(case))
+    yield from found
+    if not found:
+        train, operation = multistage_of(case), case.operation
+        _named(check_turns, "coupling", train)
+        if operation is not None:
+            _named(lambda one: train_torques(one, operation.torque), "coupling", train)
+
+
+def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
+    for n, stage in enumerate(case.stage):
+        if (stage.gears is None) == (stage.radii is None):
+            key, limit = f"stage[{n}].gears", "one of the tables gears and radii"
+            yield CaseError("the sizes of the gears are needed once", code="E-CHOICE", key=key, limit=limit)
+    named = [(f"coupling[{n}].between", one) for n, c in enumerate(case.coupling) for one in c.between]
+    if case.operation is not None:
+        named += [(f"operation.{key}", getattr(case.operation, key)) for key in ("input", "output")]
+    for key, member in named:
+        if member is not None and _member_of(member).stage > len(case.stage):
+            yield CaseError(
+                "there is no such stage", code="E-COUPLING", key=key, value=member,
+                limit=f"stage 1 to stage {len(case.stage)}",
+            )  # fmt: skip
+    for n, one in enumerate(case.coupling):
+        round_section = (one.diameter is not None, one.length is not None)
+        if round_section[0] != round_section[1] or not (round_section[0] or one.torsional is not None):
+            yield CaseError(
+                "the shaft has neither a torsional stiffness nor a whole section", code="E-CHOICE",
+                key=f"coupling[{n}].between", limit="torsional, or diameter and length",
+            )  # fmt: skip
+    response = case.response
+    if response is not None and not response.lowest < response.highest:
+        yield CaseError(
+            "the speeds do not ascend", code="E-RANGE", key="response.highest",
+            value=SPEED.show(response.highest), limit=f"above {SPEED.show(response.lowest)}",
+        )  # fmt: skip
+
+
+def multistage_of(case: MultistageCase) -> MultistageSet:
+    """The train of a case.
+
+    Without couplings each carrier turns the next sun, joined rigidly.
+
+    Raises
+    ------
+    CaseError
+        With the keys of the file.
+    """
+    stages = [_named(_stage, f"stage[{n}]", one) for n, one in enumerate(case.stage)]
+    couplings = [_named(_coupling, f"coupling[{n}]", one) for n, one in enumerate(case.coupling)]
+    operation = case.operation
+    ends = (Member(1, "sun"), Member(len(stages), "carrier"))
+    if operation is not None:
+        ends = _member_of(operation.input), _member_of(operation.output or str(ends[1]))
+    made = couplings or in_series(stages).couplings
+    return _named(
+        lambda _: MultistageSet(stages=tuple(stages), couplings=tuple(made), input=ends[0], output=ends[1]),
+        "operation",
+        operation,
+    )
+
+
+def _named(make, key: str, section):
+    """What a function makes of a section; its refusals name the keys of the file."""
+    try:
+        return make(section)
+    except FemgearError as error:
+        entry = (error.key or "").removeprefix("set.").replace("torsional_support", "torsional_stiffness")
+        entry = _ENTRIES.get(entry.rpartition(".")[2], entry)
+        remedy, value = _REMEDIES.get(error.code, error.remedy), error.value
+        raise CaseError(
+            error.message, code=error.code, key=f"{key}.{entry}" if entry else key,
+            value=None if error.code in _REMEDIES else value, limit=error.limit, remedy=remedy,
+        ) from None  # fmt: skip
+
+
+def _member_of(text: str) -> Member:
+    found = _MEMBER.fullmatch(text)
+    assert found is not None
+    return Member(int(found[1]), found[2])
+
+
+def _coupling(one: CouplingSection) -> StageCoupling:
+    given = {name: getattr(one, name) for name in ("torsional", "lateral") if getattr(one, name) is not None}
+    springs = {}
+    if one.diameter is not None and one.length is not None:
+        # ends that do not tilt: Timoshenko's beam (Przemieniecki, Theory of Matrix Structural Analysis, 5.6)
+        shaft, length = ShaftSection(one.diameter), one.length
+        bending = 12.0 * shaft.young * shaft.second_moment / (length**3 * (1.0 + shaft.shear_ratio(length)))
+        springs = {"torsional": joint_springs(shaft, length).torsion, "lateral": bending}
+    first, second = (_member_of(text) for text in one.between)
+    return StageCoupling(first, second, **springs | given)
+
+
+def stage_gears(stage: StageSection) -> PlanetarySet:
+    """Geared set of a stage that has gears; the rims have no effect on anything computed here."""
+    given = stage.gears
+    assert given is not None
+    sun, planet, ring = (0.5 * given.module * z for z in given.teeth)
+    rims = (0.3 * sun, 0.5 * planet, ring + 4.0 * given.module)
+    gears = [
+        Gear(
+            z, given.module, given.pressure_angle, shift, given.face_width, rim, internal=name == "ring",
+            rack=BasicRack(addendum=addendum), name=name,
+        )
+        for name, z, shift, rim, addendum in zip(
+            ("sun", "planet", "ring"), given.teeth, given.profile_shifts, rims, given.addendum
+        )
+    ]  # fmt: skip
+    closed = close_set(*gears, planet_angles=stage.angles)
+    check_set(closed)
+    return closed
+
+
+def _stage(stage: StageSection) -> Stage:
+    members = (("sun", stage.sun), ("ring", stage.ring), ("carrier", stage.carrier))
+    lumped: dict[str, Any] = {
+        name: PlanarBody(one.mass, one.inertia, one.support_stiffness, one.torsional_stiffness)
+        for name, one in members
+    }
+    lumped["planet"] = PlanarBody(stage.planet.mass, stage.planet.inertia)
+    lumped["planet_bearing"] = stage.planet.bearing_stiffness
+    fixed, size = None if stage.fixed == "none" else stage.fixed, stage.gears or stage.radii
+    assert size is not None
+    if size.mesh_stiffness is not None:
+        lumped["stiffness_sun_planet"] = size.mesh_stiffness.sun_planet
+        lumped["stiffness_planet_ring"] = size.mesh_stiffness.planet_ring
+    if isinstance(size, GearsSection):
+        gears = stage_gears(stage)
+        data = planar_from_set(gears, **_iso_stiffness(size, gears) | lumped)
+        return Stage(data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle)
+    alpha = size.pressure_angle
+    data = PlanarSet(
+        **lumped, sun_radius=size.sun, planet_radius=size.planet, ring_radius=size.sun + 2.0 * size.planet,
+        centre_distance=(size.sun + size.planet) / math.cos(alpha), planet_angles=stage.angles,
+        pressure_angle_sun_planet=alpha, pressure_angle_planet_ring=alpha,
+    )  # fmt: skip
+    return Stage(data=data, teeth=size.teeth, fixed=fixed, angle=stage.angle)
+
+
+def _iso_stiffness(given: GearsSection, gears: PlanetarySet) -> dict[str, Any]:
+    """Mean stiffness of both meshes after ISO 6336-1, method B."""
+    (sun, planet, _), (x_sun, x_planet, x_ring) = given.teeth, given.profile_shifts
+    # the standard's sign of the ring's shift
+    meshes = {
+        "stiffness_sun_planet": (sun, planet, x_sun, x_planet, gears.contact_ratio_sun_planet),
+        "stiffness_planet_ring": (planet, math.inf, x_planet, -x_ring, gears.contact_ratio_planet_ring),
+    }
+    return {
+        name: given.face_width * mesh_stiffness_method_b(*mesh, pressure_angle=given.pressure_angle)[1]
+        for name, mesh in meshes.items()
+    }
