@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Annotated, Literal
 
 import numpy as np
@@ -83,9 +85,9 @@ def main(
         Run case and optimum anew into the folders before and after.
     """
     from femgear.run import grid_cache
-    from femgear.study.names import named_quantity, parse_limit, parse_variable, tip_reliefs
-    from femgear.study.problem import Problem
-    from femgear.study.search import minimise
+    from femgear.study.objectives import named_quantity
+    from femgear.study.problem import Problem, parse_limit, parse_variable, tip_reliefs
+    from femgear.study.search import SearchOptions, minimise
     from femgear.trains.reading import read_case, with_value, with_values
 
     data = read_case(case)
@@ -103,7 +105,8 @@ def main(
     limits = [parse_limit(text, speeds=speeds) for text in limit]
     problem = Problem(coarse, variables, first, also=others, limits=limits)
     folder = ready_folder(output)
-    options = {"seed": seed, "samples": samples, "max_designs": max_designs, "cache": grid_cache()}
+    extent = SearchOptions(seed=seed, samples=samples, max_designs=max_designs)
+    options = {"options": extent, "cache": grid_cache()}
     coarsely = options | {"journal": folder / "journal.jsonl"}
     with Progress() as progress:
         rough = minimise(problem, method=method, sensitivity=False, progress=progress, **coarsely)
@@ -153,15 +156,15 @@ def _refined(rough, case, folder: Path, options, method: str):
     local = "auto" if rough.method == "minimax" else "simplex" if method in ("auto", "global") else method
     if any(variable.integer for variable in problem.variables):
         local = "global"
-    options = options | {"samples": 0, "journal": folder / "journal_fine.jsonl"}
-    return minimise(problem, method=local, start=rough.x, starts=1, **options)
+    extent = replace(options["options"], samples=0, starts=1)
+    options = options | {"options": extent, "journal": folder / "journal_fine.jsonl"}
+    return minimise(problem, method=local, start=rough.x, **options)
 
 
 def _write(found, data, folder: Path, rough) -> list[str]:
     """Tables on the terminal, and the files of the search."""
     from femgear.report.style import save_figure
     from femgear.storage.files import write_text
-    from femgear.study.figures import tolerance_bars
     from femgear.study.search import comparison_rows, tolerance_rows, verdict
     from femgear.trains.reading import to_toml, with_values
 
@@ -189,15 +192,14 @@ def _write(found, data, folder: Path, rough) -> list[str]:
 
 def _front(problem, second, folder: Path, options) -> list[str]:
     from femgear.report.style import save_figure
-    from femgear.study.figures import front
-    from femgear.study.search import pareto_front
+    from femgear.study.front import pareto_front
 
     with Progress() as progress:
         found = pareto_front(problem, second, progress=progress, **options)
     both = (problem.objective, second)
     scale = np.array([q.dimension.scale for q in both])
     titles = [f"{q.name} [{q.dimension.shown}]".replace("um]", "µm]") for q in both]
-    figure = front(
+    figure = front_figure(
         found.values / scale, found.dominated / scale, found.before / scale, names=titles,
         compromise=found.compromise,
     )  # fmt: skip
@@ -215,7 +217,6 @@ def _front(problem, second, folder: Path, options) -> list[str]:
 def _check(found, data, folder: Path, speeds, rough) -> list[str]:
     """Case and optimum anew: a full run each on a finer grid, read back from its files."""
     from femgear.report.style import save_figure
-    from femgear.study.figures import before_and_after
     from femgear.trains.reading import with_values
 
     fine = {"static.positions": 128, "static.flank_elements": 32} | QUIET
@@ -289,6 +290,122 @@ def _dynamic_force(dynamics) -> np.ndarray:
 def _costs(found) -> list[float]:
     """Objective over that of the case, in the order of the search."""
     return [value / (found.before[found.problem.objective.name] or 1.0) for value in found.course]
+
+
+def before_and_after(position, errors, speed=None, forces=None, *, costs=()):
+    """Transmission error over the mesh period, dynamic mesh force over speed, and course of the search.
+
+    Parameters
+    ----------
+    position : (P,) array
+        In mesh periods.
+    errors : sequence of two (P,) arrays
+        From sun to ring [m], before and after; their means are taken off.
+    speed : (S,) array, optional
+        Of the input [rpm].
+    forces : sequence of two (S,) arrays, optional
+        Largest dynamic part of any mesh [N].
+    costs : (designs,) array
+        Objective over that of the case, in the order of the search; NaN for designs outside the limits.
+    """
+    from femgear.report.style import BLUE, GREY, label, legend_below, new_figure, periodic
+
+    styles = (
+        {"color": GREY, "linestyle": "--", "label": "before"},
+        {"color": BLUE, "linestyle": "-", "label": "optimum"},
+    )
+    columns = 1 + (speed is not None) + bool(len(costs))
+    figure, axes = new_figure(columns=columns, width=4.2 * columns + 1.0, height=4.4)
+    for values, line in zip(errors, styles):
+        place, closed = periodic(position, 1e6 * (np.asarray(values) - np.mean(values)))
+        axes[0].plot(place, closed, linewidth=1.6, **line)
+    label(axes[0], "position [mesh periods]", "transmission error less its mean [µm]", "sun to ring, static")
+    if speed is not None:
+        for values, line in zip(forces, styles):
+            axes[1].plot(speed, values, linewidth=1.6, **line)
+        axes[1].set_ylim(bottom=0)
+        label(axes[1], "speed of the input [rpm]", "largest deviation from the mean [N]", "mesh force")
+    if len(costs):
+        _course(axes[-1], np.asarray(costs, float))
+    legend_below(figure)
+    return figure
+
+
+def _course(ax, costs: np.ndarray) -> None:
+    """Every design, and the best so far."""
+    from femgear.report.style import GREY, VERMILION, label
+
+    number = np.arange(1, len(costs) + 1)
+    best = np.minimum.accumulate(np.where(np.isfinite(costs), costs, np.inf))
+    shown = np.isfinite(best)
+    ax.semilogy(number, costs, ".", color=GREY, markersize=4, label="designs")
+    ax.step(number[shown], best[shown], where="post", color=VERMILION, linewidth=1.6, label="best so far")
+    label(ax, "design", "objective over that of the case [1]", "search at few positions")
+
+
+def tolerance_bars(names: Sequence[str], less, more, value: float, *, quantity: str, unit: str):
+    """What the objective becomes with each variable off by its tolerance.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Variables with their tolerances.
+    less, more : (n,) arrays
+        Objective with the variable lower and higher, in `unit`; NaN leaves a bar out.
+    value : float
+        Of the optimum.
+    quantity, unit : str
+    """
+    from femgear.report.style import BLACK, BLUE, VERMILION, label, legend_below, new_figure
+
+    n = len(names)
+    figure, (ax,) = new_figure(width=9.0, height=1.4 + 0.45 * n)
+    place = np.arange(n)[::-1]
+    for values, shift, colour, text in ((less, 0.19, BLUE, "less"), (more, -0.19, VERMILION, "more")):
+        values = np.asarray(values, float)
+        ax.barh(place + shift, values, height=0.36, color=colour, label=text)
+    ax.axvline(value, color=BLACK, linewidth=1.2, label="optimum")
+    ax.set_yticks(place, names)
+    ax.grid(False, axis="y")
+    label(ax, f"{quantity} [{unit}]")
+    legend_below(figure)
+    return figure
+
+
+def front_figure(values, dominated, before, *, names: Sequence[str], compromise: int | None = None):
+    """Pareto front with the other designs.
+
+    Parameters
+    ----------
+    values : (m, 2) array
+        Front, in the units of `names`.
+    dominated : (k, 2) array
+    before : (2,) array
+        The case as it is.
+    names : sequence of two str
+        Axis labels with units.
+    compromise : int, optional
+        Row of the front to be marked.
+    """
+    from femgear.report.style import BLACK, BLUE, VERMILION, label, legend_below, new_figure
+
+    values, dominated = np.asarray(values, float), np.asarray(dominated, float).reshape(-1, 2)
+    figure, (ax,) = new_figure(width=7.0, height=4.8)
+    ax.plot(*dominated.T, ".", color="0.75", markersize=4, label="other designs")
+    ax.step(*values.T, where="post", color=BLUE, linewidth=1.2)
+    ax.plot(*values.T, "o", color=BLUE, markersize=5, label="front")
+    ax.plot(*before, "s", color=BLACK, markersize=7, label="before")
+    if compromise is not None:
+        ax.plot(
+            *values[compromise], "o", color=VERMILION, markersize=10, fillstyle="none", label="compromise"
+        )
+    # designs far beyond both are of no interest
+    right, top = 1.1 * np.maximum(values.max(axis=0), before)
+    ax.set_xlim(0, right)
+    ax.set_ylim(0, top)
+    label(ax, *(fill(name, 44) for name in names))
+    legend_below(figure)
+    return figure
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from femgear.gears.deviations import SetDeviations
     from femgear.gears.planetary import PlanetarySet
 
+Found = TypeVar("Found")
 ROUGH_STIFFNESS = 10e9
 """Stiffness of a mesh per face width, to size windows [N/m^2]."""
 HELD = 2.56
@@ -253,12 +254,12 @@ def walk_mesh_cycle(
     width = bodies.face_width
     # without torque the windows begin with what one micrometre of wedging may carry
     share = sun_torque / (planetary_set.sun.base_radius * N) or 1e-6 * ROUGH_STIFFNESS * width
-    enlarge, nearest = 1.0, 3.0 * share / (ROUGH_STIFFNESS * width)
-    for _ in range(8):
+
+    def attempt(share: float, nearest: float):
         setup = mesh_windows(
             planetary_set,
             bodies,
-            share=share * enlarge**2,
+            share=share,
             positions=positions,
             cells=cells,
             nearest=nearest,
@@ -273,11 +274,37 @@ def walk_mesh_cycle(
         )
         missed = missed if contact == "profile" else 0.0
         if not overflow and missed <= nearest:
-            cycle = replace(nothing, **found)
-            return cycle if cycle.force.any() else nothing
-        if overflow:
-            enlarge = _enlarged(enlarge, share, max(found["force"].max(), found["back_force"].max()))
-        nearest = max(nearest, 1.2 * missed)
+            return found, share, nearest
+        wider = _enlarged(share, max(found["force"].max(), found["back_force"].max())) if overflow else share
+        return found, wider, max(nearest, 1.2 * missed)
+
+    cycle = replace(nothing, **in_windows(attempt, share, 3.0 * share / (ROUGH_STIFFNESS * width)))
+    return cycle if cycle.force.any() else nothing
+
+
+def in_windows(
+    attempt: Callable[[float, float], tuple[Found, float, float]], share: float, nearest: float
+) -> Found:
+    """What is found in windows that contain the contact; they are enlarged until they do.
+
+    Parameters
+    ----------
+    attempt : callable
+        ``(share, nearest) -> found, share, nearest``: what is found in these windows, and the windows to
+        try next; the same ones where they contain the contact.
+    share, nearest : float
+        Of the first windows, as `mesh_windows` takes them [N], [m].
+
+    Raises
+    ------
+    ContactError
+        E-CONTACT-WINDOW
+    """
+    for _ in range(8):
+        found, *wider = attempt(share, nearest)
+        if wider == [share, nearest]:
+            return found
+        share, nearest = wider
     raise ContactError(
         "the contact windows do not contain the contact after seven enlargements",
         code="E-CONTACT-WINDOW",
@@ -436,12 +463,12 @@ def cycle_without_load(
     )
 
 
-def _enlarged(enlarge: float, share: float, force: float) -> float:
-    """Twice the window width, and twice again until windows sized by `share` hold the largest force."""
-    enlarge *= 2.0
-    while share * enlarge**2 < force / HELD:
-        enlarge *= 2.0
-    return enlarge
+def _enlarged(share: float, force: float) -> float:
+    """Load that sizes windows twice as wide, and twice again until they hold the largest force."""
+    share *= 4.0
+    while share < force / HELD:
+        share *= 4.0
+    return share
 
 
 def _walk(

@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
-from femgear.contact.cycle import ROUGH_STIFFNESS, walk_either_flank
+from femgear.contact.cycle import ROUGH_STIFFNESS, in_windows, walk_either_flank
 from femgear.contact.sides import mirrored_set
 from femgear.contact.solve import solve_contact
-from femgear.contact.supports import RIGID, Supports, moving_members
+from femgear.contact.supports import Supports, moving_members
 from femgear.errors import CaseError, ContactError
-from femgear.gears.deviations import SetDeviations, mesh_normals, mirrored_deviations, no_deviations
-from femgear.study.linearised import in_windows
+from femgear.gears.deviations import mesh_normals, mirrored_deviations, no_deviations
+from femgear.study.relief import DesignBasis
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -73,15 +73,12 @@ class SharingModel:
 
 @one_blas_thread()
 def sharing_model(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
+    basis: DesignBasis,
     *,
     sun_torque: float,
     position: int = 0,
     positions: int = 8,
     contact: str = "profile",
-    supports: Supports = RIGID,
-    deviations: SetDeviations | None = None,
     loads: int = 40,
     progress: Callable[[int, int], None] | None = None,
 ) -> SharingModel:
@@ -89,14 +86,14 @@ def sharing_model(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
-    bodies : Bodies
+    basis : DesignBasis
+        Gears, flank compliances, supports, and deviations; samples add to the pin errors of these.
     sun_torque : float
         [N m]; the curves reach to where one planet carries all of it.
     position, positions : int
         Number of the position among those of one mesh period.
-    contact, supports, deviations
-        As for `contact.cycle.walk_mesh_cycle`; samples add to the pin errors of the deviations.
+    contact : {"profile", "line_of_action"}
+        As for `contact.cycle.walk_mesh_cycle`.
     loads : int
         Points of a curve.
     progress : callable, optional
@@ -113,6 +110,46 @@ def sharing_model(
         E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
     ContactError
     """
+    _check_request(basis.supports, sun_torque, position, positions)
+    original, deviations = basis.gears, basis.deviations
+    solved, order = original, np.arange(original.n_planets)
+    if sun_torque < 0:
+        solved, order = mirrored_set(original)
+        if deviations is not None:
+            deviations = mirrored_deviations(deviations, original, solved, order)
+        position = -position
+    N = solved.n_planets
+    load = abs(sun_torque) / solved.sun.base_radius
+    # planets open and close at small loads, where a line contact changes most
+    force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
+    place = {"positions": np.array([position / positions]), "contact": contact, "deviations": deviations}
+    deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
+    for k, one in enumerate(force):
+        deflection[:, k], coupling[k] = _paths(solved, basis.bodies, max(one, 1e-9 * load), place)
+        if progress is not None:
+            progress(k + 1, len(force))
+    mean = int(np.abs(force - load / N).argmin())
+    between = coupling[mean]
+    change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
+    deflection -= np.outer(between.sum(axis=1), force)
+    members = moving_members(solved, basis.supports)
+    path = members.approach[:N] + members.approach[N:]
+    sprung, free = path[:, ~members.free], path[:, members.free]
+    between = between + (sprung / members.stiffness[~members.free]) @ sprung.T
+    back, mirror = np.argsort(order), np.array([1.0, -1.0 if sun_torque < 0 else 1.0])
+    return SharingModel(
+        load=load,
+        force=force,
+        deflection=deflection[back],
+        coupling=between[np.ix_(back, back)],
+        approach=np.column_stack([np.ones(N), free])[back],
+        pin=(pin_directions(solved) * mirror)[back],
+        coupling_change=float(change),
+    )
+
+
+def _check_request(supports: Supports, sun_torque: float, position: int, positions: int) -> None:
+    """Refuse what `sharing_model` cannot represent."""
     if not (np.isfinite(sun_torque) and sun_torque):
         raise CaseError("without torque there is nothing to share", code="E-TORQUE", value=sun_torque)
     if not 0 <= position < positions:
@@ -126,29 +163,6 @@ def sharing_model(
             limit="0 um",
             remedy='set it to zero, or solve single cases with static.members = "elastic"',
         )
-    solved, order = planetary_set, np.arange(planetary_set.n_planets)
-    if sun_torque < 0:
-        solved, order = mirrored_set(planetary_set)
-        if deviations is not None:
-            deviations = mirrored_deviations(deviations, planetary_set, solved, order)
-        position = -position
-    N = solved.n_planets
-    load = abs(sun_torque) / solved.sun.base_radius
-    # planets open and close at small loads, where a line contact changes most
-    force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
-    place = {"positions": np.array([position / positions]), "contact": contact, "deviations": deviations}
-    deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
-    for k, one in enumerate(force):
-        deflection[:, k], coupling[k] = _paths(solved, bodies, max(one, 1e-9 * load), place)
-        if progress is not None:
-            progress(k + 1, len(force))
-    mean = int(np.abs(force - load / N).argmin())
-    between = coupling[mean]
-    change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
-    deflection -= np.outer(between.sum(axis=1), force)
-    return _placed(
-        solved, order, load, force, deflection, between, supports, float(change), mirrored=sun_torque < 0
-    )
 
 
 def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
@@ -164,7 +178,9 @@ def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
         overflow = problem.touches_window_end(state.active, setup)
         gap = setup.smallest_gap[:, 0]
         outside = ~setup.near[:, 0] & (gap < state.motions[:, None])
-        return (problem, mesh, state), overflow, outside.any() and place["contact"] == "profile"
+        missed = place["contact"] == "profile" and outside.any()
+        wider = share * (4.0 if overflow else 1.0), nearest * (2.0 if missed else 1.0)
+        return (problem, mesh, state), *wider
 
     first = 3.0 * force / (ROUGH_STIFFNESS * bodies.face_width)
     problem, mesh, state = in_windows(attempt, force, first)
@@ -173,26 +189,6 @@ def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
     between = compliance.reshape(2, N, 2, N).sum(axis=(0, 2))
     np.fill_diagonal(between, 0.0)
     return state.motions[:N] + state.motions[N:], between
-
-
-def _placed(s, order, load, force, deflection, between, supports, change, *, mirrored) -> SharingModel:
-    """The model with supports and directions, its planets in the original order."""
-    N = s.n_planets
-    members = moving_members(s, supports)
-    path = members.approach[:N] + members.approach[N:]
-    sprung, free = path[:, ~members.free], path[:, members.free]
-    coupling = between + (sprung / members.stiffness[~members.free]) @ sprung.T
-    back = np.argsort(order)
-    pin = pin_directions(s)
-    return SharingModel(
-        load=load,
-        force=force,
-        deflection=deflection[back],
-        coupling=coupling[np.ix_(back, back)],
-        approach=np.column_stack([np.ones(N), free])[back],
-        pin=(pin * np.array([1.0, -1.0]) if mirrored else pin)[back],
-        coupling_change=change,
-    )
 
 
 def pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
@@ -405,16 +401,13 @@ def _residual(model, curves, separation, forces, motions) -> float:
 
 @one_blas_thread()
 def walked_shares(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
+    basis: DesignBasis,
     pins,
     *,
     sun_torque: float,
     position: int = 0,
     positions: int = 8,
     contact: str = "profile",
-    supports: Supports = RIGID,
-    deviations: SetDeviations | None = None,
 ) -> np.ndarray:
     """Shares (S, N) of a few samples from the whole contact problem, to check `sharing_of_samples`.
 
@@ -422,19 +415,19 @@ def walked_shares(
     ----------
     pins : (S, N, 2) array
         See there.
-    planetary_set, bodies, sun_torque, position, positions, contact, supports, deviations
+    basis, sun_torque, position, positions, contact
         As for `sharing_model`.
     """
-    base = no_deviations(planetary_set) if deviations is None else deviations
+    base = no_deviations(basis.gears) if basis.deviations is None else basis.deviations
     shares = []
     for errors in np.asarray(pins, float):
         cycle = walk_either_flank(
-            planetary_set,
-            bodies,
+            basis.gears,
+            basis.bodies,
             sun_torque=sun_torque,
             positions=positions,
             contact=contact,
-            supports=supports,
+            supports=basis.supports,
             deviations=replace(base, pin_errors=base.pin_errors + errors),
         )
         shares.append(cycle.load_share[:, position])

@@ -14,20 +14,23 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.sections import Case
 from femgear.errors import CaseError
 from femgear.storage.files import storage_errors, write_text
-from femgear.study.names import named_quantity
-from femgear.study.objectives import Quantity
-from femgear.study.problem import Failure, open_designs
-from femgear.study.variables import Variable, split
-from femgear.study.variants import need_elastic_ring
+from femgear.study.designs import Failure, open_designs
+from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
+from femgear.study.problem import Variable, split
 from femgear.threads import one_blas_thread
 from femgear.trains.protocol import Progress
 from femgear.trains.reading import with_value
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LARGEST = 100_000
 """Combinations at most."""
@@ -255,7 +258,7 @@ def sweep_into(
     over : sequence of str
         As `parse_over` takes them.
     of : sequence of str
-        Quantities, see `names.NAMES`.
+        Quantities, see `objectives.NAMES`.
     speeds : (str, str), optional
         First and last speed of the input, for mesh forces and housing levels.
     cache, progress
@@ -298,7 +301,6 @@ def sweep_into(
 def _draw(found: Sweep, counts: Sequence[int], path: Path) -> None:
     """Curves over the last key, one for every combination of the others, at most twelve of them."""
     from femgear.report.style import save_figure
-    from femgear.study.figures import sweep_curves
 
     last = counts[-1]
     scale = np.array([quantity.dimension.scale for quantity in found.quantities])
@@ -324,3 +326,35 @@ def _axis(values: Sequence[object]) -> tuple[Sequence[object], str]:
     if len(units) > 1:
         return [str(value) for value in values], ""
     return [number for number, _ in parts], units.pop()
+
+
+def sweep_curves(x, curves, *, names: Sequence[str], axis: str, quantities: Sequence[str]) -> Figure:
+    """Quantities over the values of one entry, one panel each, one curve for each of the other entries.
+
+    Parameters
+    ----------
+    x : (m,) array, or sequence of str
+    curves : (k, m, q) array
+        NaN where a case cannot be computed.
+    names : sequence of k str
+        Legend; one empty text for a single curve.
+    axis : str
+        Label of the x axis.
+    quantities : sequence of q str
+        With units.
+    """
+    from femgear.report.style import label, legend_below, line_style, new_figure
+
+    curves, count = np.asarray(curves, float), len(quantities)
+    columns = min(count, 3)
+    rows = -(-count // columns)
+    figure, axes = new_figure(rows=rows, columns=columns, width=4.4 * columns + 0.6, height=3.6 * rows + 0.6)
+    for q, name in enumerate(quantities):
+        for k, one in enumerate(curves):
+            legend = {"label": names[k]} if names[k] else {}
+            axes[q].plot(x, one[:, q], marker="o", markersize=4, **line_style(k), **legend)
+        label(axes[q], axis, fill(name, 36))
+    for ax in axes[count:]:
+        ax.set_visible(False)
+    legend_below(figure)
+    return figure

@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations
-from femgear.case.dependencies import check_entries, dynamic_entries, modal_entries, static_entries
+from femgear.case.dependencies import (
+    Steps,
+    check_entries,
+    dynamic_entries,
+    modal_entries,
+    ring_entries,
+    state_entries,
+    static_entries,
+)
 from femgear.case.sections import Case
 from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.threads import one_blas_thread
@@ -39,13 +47,15 @@ from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import (
     STATIC,
     STRESS,
-    _backlash,
-    _ring_foundation,
-    _supports_of,
+    case_supports,
+    material_of,
+    mesh_backlash,
     response_verdict,
+    ring_foundation,
 )
 
 if TYPE_CHECKING:
+    from femgear.contact.assembly import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
     from femgear.gears.planetary import PlanetarySet
@@ -61,7 +71,9 @@ twice a frequency carry the response there."""
 
 
 @one_blas_thread()
-def solve_modes(case: Case, static: StaticResult, *, progress: Progress | None = None) -> ModesResult:
+def solve_modes(
+    case: Case, static: StaticResult, *, progress: Progress | None = None, steps: Steps | None = None
+) -> ModesResult:
     """Modal basis of the set with its elastic ring and mean mesh stiffnesses.
 
     Its loaded state, from which the meshes take stiffness and excitation, is that of the set on its supports
@@ -73,40 +85,67 @@ def solve_modes(case: Case, static: StaticResult, *, progress: Progress | None =
     static : StaticResult
     progress : callable, optional
         Called with (stage, done, total).
+    steps : Steps, optional
+        Compliances, loaded states and ring models of other cases, taken where they are those of this one.
 
     Raises
     ------
     CaseError
         Without torque, or when the ring, which is the housing of this model, is not the fixed member.
     """
-    from femgear.contact.bodies import active_flank_load, with_ring
-    from femgear.fe.elasticity import Material, mass
+    check_entries(static.entries, static_entries(case), "static solution")
+    check_dynamic_case(case, static.planetary_set)
+    steps, entries = steps or Steps(), ring_entries(case)
+    bodies = _ring_states(case, static, steps)
+    state = steps.take(
+        "loaded state",
+        state_entries(case),
+        lambda: state_on_supports(case, bodies, static.sun_torque, progress=progress),
+    )
+    reach, side = excitation_reach(case, state, static.sun_torque), 1.0 if static.sun_torque >= 0 else -1.0
+    ring = steps.take(
+        "ring model",
+        {**entries, "reach": reach, "side": side},
+        lambda: ring_of_case(case, static, reach=reach, side=side),
+    )
+    return modal_basis(case, ring, bodies, state, sun_torque=static.sun_torque, reach=reach)
+
+
+def _ring_states(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
+    """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
+    from femgear.contact.bodies import with_ring
+
+    fixed = case.static.members == "fixed"
+
+    def other() -> Bodies:
+        springs = ring_foundation(case, static.sectors.ring) if fixed else None
+        return with_ring(static.bodies, static.sectors, depth=case.static.depth, ring_foundation=springs)
+
+    found = steps.take("ring compliances", ring_entries(case), other)
+    return (found, static.bodies) if fixed else (static.bodies, found)
+
+
+def ring_of_case(case: Case, static: StaticResult, *, reach: float, side: float) -> RingModel:
+    """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz].
+
+    ``side`` is the sign of the sun's torque.
+    """
+    from femgear.contact.bodies import active_flank_load
+    from femgear.fe.elasticity import mass
     from femgear.trains.elastic.model import ring_model
 
-    check_entries(static.entries, static_entries(case), "static solution")
     gears, sector = static.planetary_set, static.sectors.ring
-    check_dynamic_case(case, gears)
-    side = 1.0 if static.sun_torque >= 0 else -1.0
-    foundation = _ring_foundation(case, sector)
-    springs = foundation if case.static.members == "fixed" else None
-    other = with_ring(static.bodies, static.sectors, depth=case.static.depth, ring_foundation=springs)
-    bodies = (other, static.bodies) if springs is not None else (static.bodies, other)
-    state = state_on_supports(case, bodies, static.sun_torque, progress=progress)
-    reach = excitation_reach(case, state, static.sun_torque)
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-    diameter = max_nodal_diameter(case)
-    ring = ring_model(
+    return ring_model(
         gears,
         sector.grid,
         sector.stiffness,
-        mass(sector.grid, material, gears.ring.face_width),
-        foundation,
+        mass(sector.grid, material_of(case), gears.ring.face_width),
+        ring_foundation(case, sector),
         active_flank_load(sector.grid, gears, side),
-        max_diameter=diameter,
+        max_diameter=max_nodal_diameter(case),
         max_frequency=MODES_ABOVE * reach,
         side=side,
     )
-    return modal_basis(case, ring, bodies, state, sun_torque=static.sun_torque, reach=reach)
 
 
 def state_on_supports(case: Case, bodies, sun_torque: float, *, progress=None) -> LoadedPeriod:
@@ -125,7 +164,7 @@ def state_on_supports(case: Case, bodies, sun_torque: float, *, progress=None) -
         contact=case.static.contact,
         deviations=None if deviations.ideal else deviations,
         # the bearings of the dynamic model are linear
-        supports=replace(_supports_of(case), planet_clearance=0.0),
+        supports=replace(case_supports(case), planet_clearance=0.0),
         progress=None if progress is None else lambda done, total: progress("modes", done, total),
     )
 
@@ -163,7 +202,7 @@ def modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, sun
         held,
         ring_compliance=compliance,
         flexibility=flexibility,
-        backlash=_backlash(gears),
+        backlash=mesh_backlash(gears),
     )
     model = elastic_set(
         gears,
@@ -241,6 +280,21 @@ def solve_dynamics(
         compared_to=compared_to,
         entries=dynamic_entries(case),
     )
+
+
+@one_blas_thread()
+def solve_response(case: Case, modes: ModesResult) -> Response:
+    """Periodic response at the speeds of the case, without stability and fields of `solve_dynamics`.
+
+    Raises
+    ------
+    CaseError
+        E-CRITICAL-SPEED, as there.
+    """
+    found = turning_speeds(case, planetary_set(case))
+    check_rim_speed(modes.ring.modes, [s.carrier for s in found])
+    frequency = np.array([s.mesh_frequency for s in found])
+    return periodic_response(case, modes, frequency, modes.reach, given=case.dynamics.mesh_harmonics)[1]
 
 
 def turning_speeds(case: Case, gears: PlanetarySet) -> tuple[Speeds, ...]:
