@@ -292,7 +292,7 @@ def evaluations(
     progress: Progress | None = None,
 ) -> Iterator[Evaluations]:
     """Evaluations of a problem; parameters as for `open_designs`."""
-    keys = [variable.key for variable in problem.variables]
+    keys = [variable.keys for variable in problem.variables]
     with open_designs(problem.case, keys, journal=journal, cache=cache, progress=progress) as designs:
         yield Evaluations(problem, designs, max_designs=max_designs)
 

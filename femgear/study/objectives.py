@@ -275,12 +275,12 @@ def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
     harmonics = force.shape[-1]
     padded = np.zeros((*force.shape[:2], 8 * harmonics + 1), complex)
     padded[..., :harmonics] = force
-    padded[..., 0] = 2.0 * force[..., 0].real
+    padded[..., 0] = 2.0 * np.real(force[..., 0])
     samples = 16 * harmonics
     history = np.fft.irfft(padded, samples, axis=-1) * (0.5 * samples)
     if not dynamic:
         return history.max(axis=-1)
-    return np.abs(history - force[..., :1].real).max(axis=-1)
+    return np.abs(history - np.real(force[..., :1])).max(axis=-1)
 
 
 def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:

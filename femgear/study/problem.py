@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -103,9 +104,14 @@ class Variable:
             )  # fmt: skip
 
     @property
+    def keys(self) -> tuple[str, ...]:
+        """Dotted keys that get the value."""
+        return tuple(self.key)
+
+    @property
     def name(self) -> str:
         """Its keys as one text."""
-        return " = ".join(self.key)
+        return " = ".join(self.keys)
 
     @property
     def unit(self) -> str:
@@ -117,7 +123,7 @@ class Variable:
         """Both bounds in `unit`."""
         return split(self.low, self.name)[0], self.number(self.high)
 
-    def number(self, value: str | float) -> float:
+    def number(self, value: object) -> float:
         """A value as the case file holds it, as a number in `unit`.
 
         Raises
@@ -183,8 +189,8 @@ def split(value: object, key: str) -> tuple[float, str]:
 
 def current(case: Case, variable: Variable) -> float | None:
     """Value that the case has now, in the unit of the variable; None where its file leaves the entry out."""
-    table: object = case_text.parse(case.source, case.name)
-    for part in re.findall(r"\[(\d+)\]|([^.\[\]]+)", variable.key[0]):
+    table: Any = case_text.parse(case.source, case.name)
+    for part in re.findall(r"\[(\d+)\]|([^.\[\]]+)", variable.keys[0]):
         try:
             table = table[int(part[0])] if part[0] else table[part[1]]
         except (KeyError, IndexError, TypeError):
@@ -210,7 +216,7 @@ def check_variables(case: Case, variables: Sequence[Variable]) -> None:
     CaseError
         E-VARIABLE: none, or one key twice; what `femgear.with_value` refuses.
     """
-    keys = [key for variable in variables for key in variable.key]
+    keys = [key for variable in variables for key in variable.keys]
     twice = sorted({key for key in keys if keys.count(key) > 1})
     if not keys or twice:
         raise CaseError(
@@ -222,7 +228,7 @@ def check_variables(case: Case, variables: Sequence[Variable]) -> None:
     for variable in variables:
         for bound in variable.bounds:
             try:
-                with_values(case, dict.fromkeys(variable.key, variable.text(bound)))
+                with_values(case, dict.fromkeys(variable.keys, variable.text(bound)))
             except CaseError as error:
                 if error.code == "E-KEY" and error.message.endswith("is not a list"):
                     # entries of a list can only be varied where the file has them

@@ -582,7 +582,7 @@ def _descend(peak: Callable, start, bounds, sizes, step, left: Callable[[], int]
             options={"initial_simplex": simplex, "maxfev": max(left(), 3), "xatol": 0.01, "fatol": 1e-3},
         )
         around = {place: peak(place) for place in _neighbours(found.x, bounds, step)}
-        best = min(around, key=around.get)
+        best = min(around, key=around.__getitem__)
         if around[best] >= found.fun - SMALLEST_GAIN or left() <= 0:
             return found.x, float(found.fun), around
         point, size = np.array(best), 2.0 * step
@@ -598,7 +598,7 @@ def _neighbours(point, bounds, step):
             yield float(place[0]), float(place[1])
 
 
-def _slopes(point, value: float, around):
+def _slopes(point, value: float, around) -> tuple[tuple[float, float], tuple[float, float]]:
     """Rises per unit of the first and of the second parameter, (less, more) each; NaN without a neighbour."""
     rises = [[np.nan, np.nan], [np.nan, np.nan]]
     for place, found in around.items():
@@ -606,4 +606,5 @@ def _slopes(point, value: float, around):
         (moved,) = np.nonzero(away)
         if len(moved) == 1:
             rises[moved[0]][int(away[moved[0]] > 0)] = float((found - value) / abs(away[moved[0]]))
-    return [tuple(pair) for pair in rises]
+    (a, b), (c, d) = rises
+    return (a, b), (c, d)

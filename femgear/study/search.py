@@ -142,7 +142,7 @@ class Optimum:
     def values(self) -> dict[str, str | float | int]:
         """Value of every key as the case file holds it."""
         pairs = zip(self.problem.variables, self.problem.point(self.x), strict=True)
-        return {key: value for variable, value in pairs for key in variable.key}
+        return {key: value for variable, value in pairs for key in variable.keys}
 
     @property
     def at_bounds(self) -> tuple[str, ...]:
@@ -277,10 +277,11 @@ def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tupl
 
     problem, count = run.problem, options.sample_count(run.problem)
     integral = np.array([variable.integer for variable in problem.variables])
+    population = np.vstack([x0, samples_of(problem, max(count, 5) - 2, options.seed)])
     found = differential_evolution(
         run.cost,
         problem.bounds,
-        init=np.vstack([x0, samples_of(problem, max(count, 5) - 2, options.seed)]),
+        init=population,  # type: ignore[arg-type]  # SciPy takes arrays as well
         maxiter=options.generations,
         integrality=integral,
         rng=options.seed,
@@ -363,12 +364,13 @@ def polish(
     rounds : int
         Simplexes one after the other.
     """
-    from scipy.optimize import Bounds, minimize
+    from scipy.optimize import minimize
 
     low, high = run.problem.bounds.T
-    width, unit = high - low, Bounds(np.zeros(len(low)), np.ones(len(low)))
+    width, n = high - low, len(low)
+    unit = [(0.0, 1.0)] * n
     # a point at a bound is one after scaling back and forth as well
-    u, n = np.clip((x0 - low) / width, 0.0, 1.0), len(low)
+    u = np.clip((x0 - low) / width, 0.0, 1.0)
 
     def scaled(v):
         return cost(np.clip(low + width * v, low, high))
@@ -430,7 +432,7 @@ def has_derivatives(problem: Problem) -> bool:
     case = problem.case
     sided = problem.objective.signal is not None and not case.static.back_flanks
     clear = not (case.static.members == "elastic" and case.planet.bearing_clearance)
-    keys = [key for variable in problem.variables for key in variable.key]
+    keys = [key for variable in problem.variables for key in variable.keys]
     deviations = all(re.split(r"[.\[]", key.partition(".")[2])[0] in FLANK_ENTRIES for key in keys)
     return bool(sided and clear and deviations and not any(v.integer for v in problem.variables))
 
@@ -539,15 +541,16 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
         periods=static.cycle.periods,
         contact=case.static.contact,
     )
-    n = static.planetary_set.n_planets
-    value = objective.signal(linear.sun_arc, linear.deflection, n)
+    n, signal = static.planetary_set.n_planets, objective.signal
+    assert signal is not None, "see has_derivatives"
+    value = signal(linear.sun_arc, linear.deflection, n)
     slopes = []
     for variable, number in zip(problem.variables, x, strict=True):
         low, high = variable.bounds
         step = _STEP * (high - low)
         inside = min(max(float(number), low + step), high - step)
         found = sensitivity(linear, _deviations(case, variable), inside, step=step)
-        slopes.append(objective.signal(found.sun_arc, found.deflection, n))
+        slopes.append(signal(found.sun_arc, found.deflection, n))
     if not np.isfinite(slopes).all():
         raise ContactError("a planet that carries nothing has no derivative", code="E-DERIVATIVE")
     return value, np.array(slopes)
@@ -558,7 +561,7 @@ def _deviations(case: Case, variable: Variable):
 
     def variant(number: float):
         text = f"{number!r} {variable.unit}" if variable.unit else number
-        return set_deviations(with_values(case, dict.fromkeys(variable.key, text)))
+        return set_deviations(with_values(case, dict.fromkeys(variable.keys, text)))
 
     return variant
 

@@ -190,7 +190,7 @@ def _warn_of_time(left: int, seconds: float) -> None:
     )
 
 
-def parse_over(text: str) -> tuple[str, list[object]]:
+def parse_over(text: str) -> tuple[str, Sequence[object]]:
     """Key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``.
 
     Raises
@@ -214,7 +214,7 @@ def parse_over(text: str) -> tuple[str, list[object]]:
     return key, found
 
 
-def _value(text: str) -> object:
+def _value(text: str) -> str | float | bool:
     """A value of the command line as the case file holds it: whole number, number, truth value or text."""
     text = text.strip()
     if text in ("true", "false"):

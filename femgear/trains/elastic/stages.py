@@ -23,7 +23,7 @@ from femgear.case.dependencies import (
     state_entries,
     static_entries,
 )
-from femgear.case.sections import Case
+from femgear.case.sections import CarrierSection, Case, MachineSection, SunSection
 from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.threads import one_blas_thread
 from femgear.trains.elastic.checks import (
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
     from femgear.system.system import Modes, Response
     from femgear.trains.elastic.checks import FrequencyLimit
-    from femgear.trains.elastic.model import ElasticSet, RingModel
+    from femgear.trains.elastic.model import ElasticSet, RigidBodies, RingModel
 
 RECORD = 2**13
 """Positions of the excitation in one mesh period at least."""
@@ -175,7 +175,7 @@ def excitation_reach(case: Case, state: LoadedPeriod, sun_torque: float) -> floa
     from femgear.trains.elastic.model import highest_mesh_mode
 
     gears, stiffness = planetary_set(case), state.resampled("held_stiffness", RECORD).mean(axis=1)
-    mesh_mode = highest_mesh_mode(gears, stiffness, **_bodies_of(case), sun_torque=sun_torque)
+    mesh_mode = highest_mesh_mode(gears, stiffness, rigid_bodies(case), sun_torque=sun_torque)
     return highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
 
 
@@ -198,7 +198,9 @@ def modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, sun
     # equal planets are equal to rounding when their phases are among the positions
     record = gears.n_planets * -(-RECORD // gears.n_planets)
     excitation = mesh_excitation(
-        *(state.resampled(name, record) for name in ("held_stiffness", "deflection", "force")),
+        state.resampled("held_stiffness", record),
+        state.resampled("deflection", record),
+        state.resampled("force", record),
         held,
         ring_compliance=compliance,
         flexibility=flexibility,
@@ -207,8 +209,7 @@ def modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, sun
     model = elastic_set(
         gears,
         ring,
-        **_bodies_of(case),
-        **_shafts_of(case),
+        rigid_bodies(case),
         sun_torque=sun_torque,
         driven=case.operation.input,
         flexibility=flexibility,
@@ -456,25 +457,21 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     )
 
 
-def _bodies_of(case: Case) -> dict:
-    """Rigid bodies of the case as the elastic model takes them."""
-    from femgear.trains.elastic.model import BodyData
+def rigid_bodies(case: Case) -> RigidBodies:
+    """Rigid bodies of a case, with motor and brake where it has them."""
+    from femgear.trains.elastic.model import BodyData, RigidBodies, ShaftData
 
-    return {
-        "sun": BodyData(case.sun.mass, case.sun.inertia, case.sun.support_stiffness),
-        "carrier": BodyData(case.carrier.mass, case.carrier.inertia, case.carrier.support_stiffness),
-        "planet": BodyData(case.planet.mass, case.planet.inertia, case.planet.bearing_stiffness),
-    }
+    def supported(section: SunSection | CarrierSection) -> BodyData:
+        # given, or found from the shaft by the reader of the case
+        assert section.support_stiffness is not None
+        return BodyData(section.mass, section.inertia, section.support_stiffness)
 
-
-def _shafts_of(case: Case) -> dict:
-    """Motor and brake of the case as the elastic model takes them."""
-    from femgear.trains.elastic.model import ShaftData
-
-    def shaft(section):
+    def shaft(section: MachineSection | None) -> ShaftData | None:
         return None if section is None else ShaftData(section.inertia, section.coupling_stiffness)
 
-    return {"motor": shaft(case.motor), "brake": shaft(case.brake)}
+    planet = BodyData(case.planet.mass, case.planet.inertia, case.planet.bearing_stiffness)
+    ends = shaft(case.motor), shaft(case.brake)
+    return RigidBodies(supported(case.sun), supported(case.carrier), planet, *ends)
 
 
 def _named(modes: Modes, model: ElasticSet) -> Modes:

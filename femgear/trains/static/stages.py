@@ -258,8 +258,9 @@ def _influences(case: Case, static: StaticResult) -> RootStresses:
     from femgear.contact.root_stress import RootStresses, observed_root_stress, root_stress
 
     sectors, bodies = static.sectors, static.bodies
-    pairs = (sectors.sun, bodies.sun), (sectors.planet, bodies.planet)
-    sun, planet = (observed_root_stress(sector.gear, flank.root) for sector, flank in pairs)
+    assert bodies.sun.root is not None and bodies.planet.root is not None
+    sun = observed_root_stress(sectors.sun.gear, bodies.sun.root)
+    planet = observed_root_stress(sectors.planet.gear, bodies.planet.root)
     elastic, ring = case.static.members == "elastic", sectors.ring
     held, support = (None, ring_foundation(case, ring)) if elastic else ("rim", None)
     material = material_of(case)
