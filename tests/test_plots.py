@@ -39,9 +39,7 @@ def all_figures():
         "sharing unequal": static_figures.load_sharing(unequal),
         "teeth": static_figures.tooth_loads(static),
         "shapes": elastic_figures.mode_shapes(modes, gears),
-        "frequencies": elastic_figures.natural_frequencies(
-            modes, mesh_frequencies=[("mesh at 250 rpm", 90.0)]
-        ),
+        "frequencies": elastic_figures.natural_frequencies(modes),
         "dte": elastic_figures.transmission_error_period(dynamics, static),
         "dte of four speeds": elastic_figures.transmission_error_period(
             synthetic.dynamics(speeds=np.arange(500, 3000, 500))

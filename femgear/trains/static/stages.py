@@ -21,7 +21,7 @@ from femgear.contact.load_spectrum import load_spectrum, loaded_teeth, root_rang
 from femgear.errors import GeometryError
 from femgear.threads import one_blas_thread
 from femgear.trains.protocol import Progress, Stage
-from femgear.trains.static.checks import check_motions
+from femgear.trains.static.description import check_motions
 from femgear.trains.static.results import (
     NominalStresses,
     StaticResult,
