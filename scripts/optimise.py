@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import fill
 from typing import Annotated, Literal
@@ -21,37 +22,13 @@ QUIET = {"static.stresses": False, "housing.published": None}
 COLUMNS = ("quantity", "before", "optimum", "change")
 
 
-def main(
-    case: Path = REFERENCE_CASE,
-    /,
-    *,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/optimise"),
-    vary: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    objective: str = "ste",
-    limit: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    of: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    second: str | None = None,
-    torque: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
-    speeds: tuple[str, str] = ("1000 rpm", "3500 rpm"),
-    method: Literal["auto", "minimax", "global", "simplex", "powell"] = "auto",
-    positions: int = 24,
-    flank_elements: int = 12,
-    samples: int | None = None,
-    max_designs: int | None = None,
-    seed: int = 0,
-    check: bool = True,
-) -> None:
-    """Search with few positions on a coarse grid, refine with those of the case, check on a finer one.
-
-    Every design is kept in the journals of the output folder: the same command goes on where an interrupted
-    one was. The optimum is written as a case file.
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Task:
+    """What is searched.
 
     Parameters
     ----------
-    case
-        TOML case file; the reference set when left out.
-    output
-        Folder of the results.
     vary
         Design variable, as in "sun.modifications[0].amount=0 um..15 um +- 1 um" with its tolerance; may be
         repeated. Default: a tip relief more on every loaded flank, its amount and its start.
@@ -69,6 +46,24 @@ def main(
         Of the input, with its unit. Default: that of the case.
     speeds
         First and last speed of the input, for mesh forces and the housing.
+    """
+
+    vary: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    objective: str = "ste"
+    limit: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    of: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    second: str | None = None
+    torque: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    speeds: tuple[str, str] = ("1000 rpm", "3500 rpm")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Extent:
+    """How far the search goes.
+
+    Parameters
+    ----------
     method
         Of the search; auto takes derivatives where the problem has them.
     positions
@@ -84,48 +79,83 @@ def main(
     check
         Run case and optimum anew into the folders before and after.
     """
+
+    method: Literal["auto", "minimax", "global", "simplex", "powell"] = "auto"
+    positions: int = 24
+    flank_elements: int = 12
+    samples: int | None = None
+    max_designs: int | None = None
+    seed: int = 0
+    check: bool = True
+
+
+def main(
+    case: Path = REFERENCE_CASE,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/optimise"),
+    task: Task = Task(),
+    extent: Extent = Extent(),
+) -> None:
+    """Search with few positions on a coarse grid, refine with those of the case, check on a finer one.
+
+    Every design is kept in the journals of the output folder: the same command goes on where an interrupted
+    one was. The optimum is written as a case file.
+
+    Parameters
+    ----------
+    case
+        TOML case file; the reference set when left out.
+    output
+        Folder of the results.
+    """
     from femgear.run import grid_cache
     from femgear.study.objectives import named_quantity
-    from femgear.study.problem import Problem, parse_limit, parse_variable, tip_reliefs
     from femgear.study.search import SearchOptions, minimise
     from femgear.trains.reading import read_case, with_value, with_values
 
     data = read_case(case)
-    data = data if torque is None else with_value(data, "operation.torque", torque)
-    _check_request(data, positions, flank_elements, samples, max_designs)
-    variables = tuple(parse_variable(text) for text in vary)
-    if not variables:
-        data, variables = tip_reliefs(data)
-    fast = {"static.positions": positions, "static.flank_elements": flank_elements}
-    coarse = with_values(data, fast | QUIET)
-    elastic = not data.rigid
-    reported = of or (*ERRORS, *(FORCES if elastic else ()))
-    first, *others = (named_quantity(words, speeds=speeds) for words in (objective, *reported))
-    another = None if second is None else named_quantity(second, speeds=speeds)
-    limits = [parse_limit(text, speeds=speeds) for text in limit]
-    problem = Problem(coarse, variables, first, also=others, limits=limits)
+    data = data if task.torque is None else with_value(data, "operation.torque", task.torque)
+    _check_request(data, extent)
+    data, problem = _problem(data, task, extent)
+    another = None if task.second is None else named_quantity(task.second, speeds=task.speeds)
     folder = ready_folder(output)
-    extent = SearchOptions(seed=seed, samples=samples, max_designs=max_designs)
-    options = {"options": extent, "cache": grid_cache()}
+    counts = SearchOptions(seed=extent.seed, samples=extent.samples, max_designs=extent.max_designs)
+    options = {"options": counts, "cache": grid_cache()}
     coarsely = options | {"journal": folder / "journal.jsonl"}
     with Progress() as progress:
-        rough = minimise(problem, method=method, sensitivity=False, progress=progress, **coarsely)
+        rough = minimise(problem, method=extent.method, sensitivity=False, progress=progress, **coarsely)
         progress("refinement", 0, 1)
-        found = _refined(rough, with_values(data, QUIET), folder, options, method)
+        found = _refined(rough, with_values(data, QUIET), folder, options, extent.method)
         progress("refinement", 1, 1)
     names = _write(found, data, folder, rough)
     if another is not None:
         names += _front(problem, another, folder, coarsely | {"start": rough.x})
-    if check:
-        names += _check(found, data, folder, speeds if elastic else None, rough)
+    if extent.check:
+        names += _check(found, data, folder, None if data.rigid else task.speeds, rough)
     say_files(folder, names)
 
 
-def _check_request(case, positions: int, flank_elements: int, samples, max_designs) -> None:
+def _problem(data, task: Task, extent: Extent):
+    """The case with its variables, and the problem on a coarse grid."""
+    from femgear.study.objectives import named_quantity
+    from femgear.study.problem import Problem, parse_limit, parse_variable, tip_reliefs
+    from femgear.trains.reading import with_values
+
+    variables = tuple(parse_variable(text) for text in task.vary)
+    if not variables:
+        data, variables = tip_reliefs(data)
+    fast = {"static.positions": extent.positions, "static.flank_elements": extent.flank_elements}
+    reported = task.of or (*ERRORS, *(() if data.rigid else FORCES))
+    first, *others = (named_quantity(words, speeds=task.speeds) for words in (task.objective, *reported))
+    limits = [parse_limit(text, speeds=task.speeds) for text in task.limit]
+    return data, Problem(with_values(data, fast | QUIET), variables, first, also=others, limits=limits)
+
+
+def _check_request(case, extent: Extent) -> None:
     """Refuse at once what no search can do."""
-    given = {"samples": samples, "max_designs": max_designs}
-    given |= {"positions": positions, "flank_elements": flank_elements}
-    for name, value in given.items():
+    for name in ("samples", "max_designs", "positions", "flank_elements"):
+        value = getattr(extent, name)
         least = 2 if name == "max_designs" else 1
         if value is not None and not least <= value <= 1_000_000:
             key = f"--{name.replace('_', '-')}"
@@ -148,8 +178,6 @@ def _check_request(case, positions: int, flank_elements: int, samples, max_desig
 
 def _refined(rough, case, folder: Path, options, method: str):
     """The optimum at the positions and on the grid of the case: between few positions errors may hide."""
-    from dataclasses import replace
-
     from femgear.study.search import minimise
 
     problem = replace(rough.problem, case=case)

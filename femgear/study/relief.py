@@ -23,9 +23,10 @@ import numpy as np
 from femgear.case.case import planetary_set, set_deviations
 from femgear.contact.assembly import mesh_pairs
 from femgear.contact.cycle import walk_either_flank
+from femgear.contact.sides import mirrored_set
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
-from femgear.gears.deviations import SetDeviations, common_period, no_deviations
+from femgear.gears.deviations import SetDeviations, common_period, mirrored_deviations, no_deviations
 from femgear.gears.kinematics import torques
 from femgear.gears.modifications import FlankForm, TipRelief
 from femgear.threads import one_blas_thread
@@ -65,6 +66,16 @@ class DesignBasis:
     bodies: Bodies
     supports: Supports = RIGID
     deviations: SetDeviations | None = None
+
+    def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
+        """The set as it is solved, mirrored under a negative torque, and its planets by number, (N,)."""
+        if sun_torque >= 0:
+            return self, np.arange(self.gears.n_planets)
+        mirrored, order = mirrored_set(self.gears)
+        deviations = self.deviations
+        if deviations is not None:
+            deviations = mirrored_deviations(deviations, self.gears, mirrored, order)
+        return replace(self, gears=mirrored, deviations=deviations), order
 
 
 @one_blas_thread()

@@ -36,7 +36,6 @@ from femgear.contact.assembly import (
 from femgear.contact.candidates import cell_centres, separation
 from femgear.contact.cycle import ROUGH_STIFFNESS, in_windows
 from femgear.contact.pivoting import factor
-from femgear.contact.sides import mirrored_set
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
 from femgear.errors import CaseError
@@ -198,25 +197,19 @@ def linearise(
             value=basis.supports.planet_clearance,
             limit="0 m",
         )
-    original, deviations = basis.gears, basis.deviations
-    solved, order = original, np.arange(original.n_planets)
-    position = cycle_positions(positions, periods=periods)
-    numbers = chosen
+    solved, order = basis.loaded(sun_torque)
+    position, numbers = cycle_positions(positions, periods=periods), chosen
     if sun_torque < 0:
         # the mirror image turns the other way and ends at position zero
-        solved, order = mirrored_set(original)
         position, numbers = -position[::-1], len(position) - 1 - chosen
-        if deviations is not None:
-            deviations = mirrored_deviations(deviations, original, solved, order)
-    load = abs(sun_torque) / solved.sun.base_radius
-    record = {"positions": position, "periods": periods, "contact": contact, "cells": cells}
-    members = moving_members(solved, basis.supports)
-    setup, answers = _solve(solved, basis.bodies, load, numbers, members, record | {"deviations": deviations})
+    load = abs(sun_torque) / solved.gears.sun.base_radius
+    options = {"positions": position, "periods": periods, "contact": contact, "cells": cells}
+    setup, answers = _solve(solved, load, numbers, options)
     rows = original_rows(order)
     stacked = {name: np.stack([answer[name] for answer in answers]) for name in answers[0] if name != "cells"}
     return LinearContact(
-        original=original,
-        solved=solved,
+        original=basis.gears,
+        solved=solved.gears,
         order=order,
         load=load,
         position=chosen / positions,
@@ -224,7 +217,7 @@ def linearise(
         sun_arc=stacked["sun_arc"],
         deflection=stacked["deflection"].T[rows],
         force=stacked["force"].T[rows],
-        touching=_touching(solved, basis.bodies, setup, numbers, [answer["cells"] for answer in answers]),
+        touching=_touching(solved.gears, setup, numbers, [answer["cells"] for answer in answers]),
         arc_response=stacked["arc_response"],
         deflection_response=stacked["deflection_response"],
         force_response=stacked["force_response"],
@@ -232,14 +225,17 @@ def linearise(
     )
 
 
-def _solve(solved, bodies, load, numbers, members, options):
+def _solve(solved: DesignBasis, load: float, numbers, options):
     """Windows wide enough, and the answers of all positions in them."""
-    N = solved.n_planets
+    gears, bodies, N = solved.gears, solved.bodies, solved.gears.n_planets
+    members = moving_members(gears, solved.supports)
     right = np.zeros(N + 1 + int(members.free.sum()))
     right[N] = load
 
     def attempt(share: float, nearest: float):
-        setup = mesh_windows(solved, bodies, share=share, nearest=nearest, **options)
+        setup = mesh_windows(
+            gears, bodies, share=share, nearest=nearest, deviations=solved.deviations, **options
+        )
         answers, overflow, outside, previous = [], False, False, None
         for p in numbers:
             problem = assemble_contact(setup, bodies, p, members)
@@ -252,7 +248,7 @@ def _solve(solved, bodies, load, numbers, members, options):
             outside |= options["contact"] == "profile" and bool(penetrates.any())
         return (setup, answers), share * (4.0 if overflow else 1.0), nearest * (2.0 if outside else 1.0)
 
-    return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * solved.sun.face_width))
+    return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * gears.sun.face_width))
 
 
 def _answer(problem, state, members) -> dict:
@@ -284,7 +280,7 @@ def _answer(problem, state, members) -> dict:
     }
 
 
-def _touching(solved, bodies, setup, numbers, cells) -> TouchingCells:
+def _touching(solved: PlanetarySet, setup, numbers, cells) -> TouchingCells:
     """Where all loaded cells lie on their teeth."""
     N = solved.n_planets
     at = np.repeat(np.arange(len(cells)), [len(c[0]) for c in cells])

@@ -21,16 +21,14 @@ import numpy as np
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.cycle import ROUGH_STIFFNESS, in_windows, walk_either_flank
-from femgear.contact.sides import mirrored_set
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, moving_members
 from femgear.errors import CaseError, ContactError
-from femgear.gears.deviations import mesh_normals, mirrored_deviations, no_deviations
+from femgear.gears.deviations import mesh_normals, no_deviations
 from femgear.study.relief import DesignBasis
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from femgear.contact.assembly import Bodies
     from femgear.gears.planetary import PlanetarySet
 
 SOFTEST = 1e-10
@@ -111,28 +109,21 @@ def sharing_model(
     ContactError
     """
     _check_request(basis.supports, sun_torque, position, positions)
-    original, deviations = basis.gears, basis.deviations
-    solved, order = original, np.arange(original.n_planets)
-    if sun_torque < 0:
-        solved, order = mirrored_set(original)
-        if deviations is not None:
-            deviations = mirrored_deviations(deviations, original, solved, order)
-        position = -position
-    N = solved.n_planets
-    load = abs(sun_torque) / solved.sun.base_radius
+    solved, order = basis.loaded(sun_torque)
+    N, load = solved.gears.n_planets, abs(sun_torque) / solved.gears.sun.base_radius
     # planets open and close at small loads, where a line contact changes most
     force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
-    place = {"positions": np.array([position / positions]), "contact": contact, "deviations": deviations}
+    at = (-position if sun_torque < 0 else position) / positions
     deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
     for k, one in enumerate(force):
-        deflection[:, k], coupling[k] = _paths(solved, basis.bodies, max(one, 1e-9 * load), place)
+        deflection[:, k], coupling[k] = _paths(solved, max(one, 1e-9 * load), at, contact)
         if progress is not None:
             progress(k + 1, len(force))
     mean = int(np.abs(force - load / N).argmin())
     between = coupling[mean]
     change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
     deflection -= np.outer(between.sum(axis=1), force)
-    members = moving_members(solved, basis.supports)
+    members = moving_members(solved.gears, solved.supports)
     path = members.approach[:N] + members.approach[N:]
     sprung, free = path[:, ~members.free], path[:, members.free]
     between = between + (sprung / members.stiffness[~members.free]) @ sprung.T
@@ -143,7 +134,7 @@ def sharing_model(
         deflection=deflection[back],
         coupling=between[np.ix_(back, back)],
         approach=np.column_stack([np.ones(N), free])[back],
-        pin=(pin_directions(solved) * mirror)[back],
+        pin=(pin_directions(solved.gears) * mirror)[back],
         coupling_change=float(change),
     )
 
@@ -165,20 +156,20 @@ def _check_request(supports: Supports, sun_torque: float, position: int, positio
         )
 
 
-def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
+def _paths(solved: DesignBasis, force: float, position: float, contact: str):
     """Path deflections (N,) and compliance between planets (N, N) with the same force in all meshes."""
-    N = s.n_planets
+    gears, bodies, N = solved.gears, solved.bodies, solved.gears.n_planets
+    place = {"positions": np.array([position]), "contact": contact, "deviations": solved.deviations}
 
     def attempt(share: float, nearest: float):
-        setup = mesh_windows(s, bodies, share=share, cells=36, nearest=nearest, **place)
+        setup = mesh_windows(gears, bodies, share=share, cells=36, nearest=nearest, **place)
         # the record of the windows begins at the position
         problem = assemble_contact(setup, bodies, 0)
         mesh = problem.mesh[:, None] == np.arange(2 * N)
         state = solve_contact(problem.H, problem.gap, mesh.astype(float), np.full(2 * N, force))
+        outside = ~setup.near[:, 0] & (setup.smallest_gap[:, 0] < state.motions[:, None])
         overflow = problem.touches_window_end(state.active, setup)
-        gap = setup.smallest_gap[:, 0]
-        outside = ~setup.near[:, 0] & (gap < state.motions[:, None])
-        missed = place["contact"] == "profile" and outside.any()
+        missed = contact == "profile" and outside.any()
         wider = share * (4.0 if overflow else 1.0), nearest * (2.0 if missed else 1.0)
         return (problem, mesh, state), *wider
 

@@ -55,8 +55,44 @@ class StaticResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of static.nc."""
-
-        return static_dataset(self)
+        cycle, gears = self.cycle, self.planetary_set
+        bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
+        variables = {
+            name: (dims, getattr(cycle, _ATTRIBUTES.get(name, name)), unit, words)
+            for name, (dims, unit, words) in CYCLE_VARIABLES.items()
+        }
+        teeth, planets = cycle.tooth_load.shape[1], gears.n_planets
+        return dataset(
+            variables,
+            coords={
+                "mesh": ("mesh", list(gears.mesh_names), "1", "gear mesh"),
+                "position": ("position", cycle.position, "1", "position in mesh periods"),
+                "planet": ("planet", np.arange(1, planets + 1), "1", "planet"),
+                "axis": ("axis", ["x", "y"], "1", "axis of the frame of the carrier"),
+                "member": ("member", list(cycle.member_names), "1", "moving member and direction"),
+                "tooth": ("tooth", np.arange(teeth), "1", "tooth pair in the order of the path"),
+            },
+            attrs={
+                "title": "static transmission error, load sharing and mesh stiffness",
+                "contact_ratio_sun_planet": gears.contact_ratio_sun_planet,
+                "contact_ratio_planet_ring": gears.contact_ratio_planet_ring,
+                "working_pressure_angle_sun_planet": gears.working_pressure_angle_sun_planet,
+                "working_pressure_angle_planet_ring": gears.working_pressure_angle_planet_ring,
+                "mesh_phases": np.asarray(gears.mesh_phases),
+                "planet_angles": np.asarray(gears.planet_angles),
+                "centre_distance": gears.centre_distance,
+                "face_width": gears.sun.face_width,
+                "teeth": np.array([gears.sun.teeth, gears.planet.teeth, gears.ring.teeth]),
+                "sun_torque": self.sun_torque,
+                "contact": cycle.contact,
+                "mesh_periods": cycle.periods,
+                "period": self.period_message,
+                "pressure_cells": cycle.unknowns,
+                "unknowns": np.array([body.unknowns for body in bodies]),
+                "message": cycle.message,
+                "warnings": " ".join(self.warnings),
+            },
+        )
 
 
 @dataclass(frozen=True)
@@ -118,8 +154,32 @@ class StressResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of stress.nc."""
-
-        return stress_dataset(self)
+        cycle, edges, names = self.cycle, self.spectrum.edges, self.planetary_set.mesh_names
+        variables = {
+            **_root_entries(self.roots, names),
+            **_worst_entries(self),
+            **_range_entries(self),
+            **_pressure_entries(cycle),
+            **_load_entries(self.spectrum),
+            **_nominal_entries(self),
+        }
+        coords = _root_coordinates(names) | {
+            "position": ("position", cycle.position, "1", "position in mesh periods"),
+            "load_bin": ("load_bin", 0.5 * (edges[1:] + edges[:-1]), "N", "middle of the load class"),
+        }
+        if "planet_root_stress" in variables:
+            n = variables["planet_root_stress"][1].shape[1]
+            words = "turns of the planet against the carrier since the pitch point with the sun"
+            coords["turn"] = ("turn", (np.arange(n) - n // 4) / n, "1", words)
+        attributes = {
+            "title": "root stresses, contact pressures and load spectra",
+            "sun_torque": self.sun_torque,
+            "mesh_periods": cycle.periods,
+            "repeats": int(self.closes),
+            "load_counting": COUNTING,
+            "iso": self.nominal.message,
+        }
+        return dataset(variables, coords, attributes)
 
 
 CYCLE_VARIABLES = {
@@ -152,78 +212,6 @@ _ATTRIBUTES = {
     "mesh_stiffness_secant": "secant_stiffness",
 }
 """Attributes of the mesh cycle whose variables have another name."""
-
-
-def static_dataset(result: StaticResult) -> xr.Dataset:
-    """Contents of static.nc."""
-    cycle, gears = result.cycle, result.planetary_set
-    bodies = result.bodies.sun, result.bodies.planet, result.bodies.ring
-    variables = {
-        name: (dims, getattr(cycle, _ATTRIBUTES.get(name, name)), unit, words)
-        for name, (dims, unit, words) in CYCLE_VARIABLES.items()
-    }
-    teeth, planets = cycle.tooth_load.shape[1], gears.n_planets
-    return dataset(
-        variables,
-        coords={
-            "mesh": ("mesh", list(gears.mesh_names), "1", "gear mesh"),
-            "position": ("position", cycle.position, "1", "position in mesh periods"),
-            "planet": ("planet", np.arange(1, planets + 1), "1", "planet"),
-            "axis": ("axis", ["x", "y"], "1", "axis of the frame of the carrier"),
-            "member": ("member", list(cycle.member_names), "1", "moving member and direction"),
-            "tooth": ("tooth", np.arange(teeth), "1", "tooth pair in the order of the path"),
-        },
-        attrs={
-            "title": "static transmission error, load sharing and mesh stiffness",
-            "contact_ratio_sun_planet": gears.contact_ratio_sun_planet,
-            "contact_ratio_planet_ring": gears.contact_ratio_planet_ring,
-            "working_pressure_angle_sun_planet": gears.working_pressure_angle_sun_planet,
-            "working_pressure_angle_planet_ring": gears.working_pressure_angle_planet_ring,
-            "mesh_phases": np.asarray(gears.mesh_phases),
-            "planet_angles": np.asarray(gears.planet_angles),
-            "centre_distance": gears.centre_distance,
-            "face_width": gears.sun.face_width,
-            "teeth": np.array([gears.sun.teeth, gears.planet.teeth, gears.ring.teeth]),
-            "sun_torque": result.sun_torque,
-            "contact": cycle.contact,
-            "mesh_periods": cycle.periods,
-            "period": result.period_message,
-            "pressure_cells": cycle.unknowns,
-            "unknowns": np.array([body.unknowns for body in bodies]),
-            "message": cycle.message,
-            "warnings": " ".join(result.warnings),
-        },
-    )
-
-
-def stress_dataset(result: StressResult) -> xr.Dataset:
-    """Contents of stress.nc: those of `root_stress_dataset`, and the rest of a `StressResult`."""
-    cycle, edges, names = result.cycle, result.spectrum.edges, result.planetary_set.mesh_names
-    variables = {
-        **_root_entries(result.roots, names),
-        **_worst_entries(result),
-        **_range_entries(result),
-        **_pressure_entries(cycle),
-        **_load_entries(result.spectrum),
-        **_nominal_entries(result),
-    }
-    coords = _root_coordinates(names) | {
-        "position": ("position", cycle.position, "1", "position in mesh periods"),
-        "load_bin": ("load_bin", 0.5 * (edges[1:] + edges[:-1]), "N", "middle of the load class"),
-    }
-    if "planet_root_stress" in variables:
-        n = variables["planet_root_stress"][1].shape[1]
-        words = "turns of the planet against the carrier since the pitch point with the sun"
-        coords["turn"] = ("turn", (np.arange(n) - n // 4) / n, "1", words)
-    attributes = {
-        "title": "root stresses, contact pressures and load spectra",
-        "sun_torque": result.sun_torque,
-        "mesh_periods": cycle.periods,
-        "repeats": int(result.closes),
-        "load_counting": COUNTING,
-        "iso": result.nominal.message,
-    }
-    return dataset(variables, coords, attributes)
 
 
 def root_stress_dataset(roots: tuple[RootCycle, ...], mesh_names) -> xr.Dataset:
