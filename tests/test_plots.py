@@ -262,7 +262,7 @@ def test_figures_do_without_pyplot():
     drawing = {path for path in package.rglob("*.py") if "matplotlib" in path.read_text(encoding="utf-8")}
     drawing |= set(package.rglob("figures.py"))
     names = [".".join(path.relative_to(package.parent).with_suffix("").parts) for path in sorted(drawing)]
-    assert {"femgear.report.style", "femgear.report.frequency", "femgear.study.sweep"} <= set(names)
+    assert {"femgear.report.style", "femgear.report.frequency"} <= set(names)
     assert len([name for name in names if name.startswith("femgear.trains.")]) >= 7
     code = f"import sys, {', '.join(names)}; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0

@@ -15,7 +15,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,9 +27,6 @@ from femgear.study.problem import Variable, split
 from femgear.threads import one_blas_thread
 from femgear.trains.protocol import Progress
 from femgear.trains.reading import with_value
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LARGEST = 100_000
 """Combinations at most."""
@@ -299,21 +295,30 @@ def sweep_into(
 
 
 def _draw(found: Sweep, counts: Sequence[int], path: Path) -> None:
-    """Curves over the last key, one for every combination of the others, at most twelve of them."""
-    from femgear.report.style import save_figure
+    """Curves over the last key, one panel a quantity, one curve for every combination of the other keys.
 
-    last = counts[-1]
+    Of at most twelve combinations; a case that cannot be computed leaves a gap.
+    """
+    from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
+
+    last, count = counts[-1], len(found.quantities)
     scale = np.array([quantity.dimension.scale for quantity in found.quantities])
-    curves = (found.values / scale).reshape(-1, last, len(scale))
-    others = [point[:-1] for point in found.points[::last]]
-    names = [
-        ", ".join(f"{key} = {value}" for key, value in zip(found.keys, point, strict=False))
-        for point in others
-    ]
+    curves = (found.values / scale).reshape(-1, last, count)
     x, unit = _axis([point[-1] for point in found.points[:last]])
-    titles = [f"{q.name} [{q.dimension.shown}]".replace("[um]", "[µm]") for q in found.quantities]
-    axis = f"{found.keys[-1]} [{unit}]" if unit else found.keys[-1]
-    save_figure(sweep_curves(x, curves[:12], names=names[:12], axis=axis, quantities=titles), path)
+    columns = min(count, 3)
+    rows = -(-count // columns)
+    figure, axes = new_figure(rows=rows, columns=columns, width=4.4 * columns + 0.6, height=3.6 * rows + 0.6)
+    for q, quantity in enumerate(found.quantities):
+        for k, (point, curve) in enumerate(zip(found.points[::last], curves[:12])):
+            name = ", ".join(f"{key} = {value}" for key, value in zip(found.keys, point[:-1], strict=False))
+            legend = {"label": name} if name else {}
+            axes[q].plot(x, curve[:, q], marker="o", markersize=4, **line_style(k), **legend)
+        title = f"{quantity.name} [{quantity.dimension.shown}]".replace("[um]", "[µm]")
+        label(axes[q], f"{found.keys[-1]} [{unit}]" if unit else found.keys[-1], fill(title, 36))
+    for ax in axes[count:]:
+        ax.set_visible(False)
+    legend_below(figure)
+    save_figure(figure, path)
 
 
 def _axis(values: Sequence[object]) -> tuple[Sequence[object], str]:
@@ -326,35 +331,3 @@ def _axis(values: Sequence[object]) -> tuple[Sequence[object], str]:
     if len(units) > 1:
         return [str(value) for value in values], ""
     return [number for number, _ in parts], units.pop()
-
-
-def sweep_curves(x, curves, *, names: Sequence[str], axis: str, quantities: Sequence[str]) -> Figure:
-    """Quantities over the values of one entry, one panel each, one curve for each of the other entries.
-
-    Parameters
-    ----------
-    x : (m,) array, or sequence of str
-    curves : (k, m, q) array
-        NaN where a case cannot be computed.
-    names : sequence of k str
-        Legend; one empty text for a single curve.
-    axis : str
-        Label of the x axis.
-    quantities : sequence of q str
-        With units.
-    """
-    from femgear.report.style import label, legend_below, line_style, new_figure
-
-    curves, count = np.asarray(curves, float), len(quantities)
-    columns = min(count, 3)
-    rows = -(-count // columns)
-    figure, axes = new_figure(rows=rows, columns=columns, width=4.4 * columns + 0.6, height=3.6 * rows + 0.6)
-    for q, name in enumerate(quantities):
-        for k, one in enumerate(curves):
-            legend = {"label": names[k]} if names[k] else {}
-            axes[q].plot(x, one[:, q], marker="o", markersize=4, **line_style(k), **legend)
-        label(axes[q], axis, fill(name, 36))
-    for ax in axes[count:]:
-        ax.set_visible(False)
-    legend_below(figure)
-    return figure

@@ -55,6 +55,7 @@ from femgear.report.style import (
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 from femgear.trains.static.figures import PICTURE_FLANK_ELEMENTS, PICTURE_REFINE
+from femgear.trains.static.stages import material_of, ring_foundation
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -468,7 +469,7 @@ def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
 def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     """Modes of the toothed ring on its foundation for 0 to 6 nodal diameters, as VTU and picture."""
     from femgear.contact.bodies import active_flank_load, make_sectors
-    from femgear.fe.elasticity import Material, foundation, mass
+    from femgear.fe.elasticity import mass
     from femgear.fe.reduction import cyclic_modes, sector_basis
     from femgear.report.scene import deformed_picture, ring_modes_grid, write_vtu
 
@@ -476,20 +477,15 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     if static is None:
         return []
 
-    gears = static.planetary_set
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    gears, material = static.planetary_set, material_of(case)
     sector = make_sectors(
         gears, material, flank_elements=PICTURE_FLANK_ELEMENTS, refine=PICTURE_REFINE, cache=drawn.cache
     ).ring
-    width = gears.ring.face_width
-    support = foundation(
-        sector.grid, "rim", case.ring.foundation_radial, case.ring.foundation_tangential, thickness=width
-    )
     load = active_flank_load(sector.grid, gears, 1.0)
     basis = sector_basis(
         sector.grid,
-        sector.stiffness + support,
-        mass(sector.grid, material, width),
+        sector.stiffness + ring_foundation(case, sector),
+        mass(sector.grid, material, gears.ring.face_width),
         count=gears.ring.teeth,
         loads=load,
     )

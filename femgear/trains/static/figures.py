@@ -41,6 +41,7 @@ from femgear.report.style import (
     periodic,
 )
 from femgear.trains.protocol import Drawn, Figures
+from femgear.trains.static.stages import material_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -635,7 +636,6 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     from femgear.contact.bodies import deformed_set, make_sectors
     from femgear.contact.cycle import walk_mesh_cycle
     from femgear.contact.sides import mirrored_set
-    from femgear.fe.elasticity import Material
     from femgear.fe.grid import copy_nodes, rotated_copies
     from femgear.report.scene import assemble_set, deformed_picture, placed, write_vtu
 
@@ -649,9 +649,12 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         cycle = walk_mesh_cycle(
             gears, static.bodies, sun_torque=-static.sun_torque, positions=1, contact=case.static.contact
         )
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
     sectors = make_sectors(
-        gears, material, flank_elements=PICTURE_FLANK_ELEMENTS, refine=PICTURE_REFINE, cache=drawn.cache
+        gears,
+        material_of(case),
+        flank_elements=PICTURE_FLANK_ELEMENTS,
+        refine=PICTURE_REFINE,
+        cache=drawn.cache,
     )
     bodies = []
     for body in deformed_set(gears, sectors, cycle):
