@@ -60,9 +60,7 @@ def main(
     """
     from femgear.case.case import need_set, planetary_set
     from femgear.case.units import LENGTH, TORQUE, to_si
-    from femgear.report.style import save_figure
     from femgear.run import grid_cache
-    from femgear.storage.files import write_text
     from femgear.study.relief import design_basis, loads_back, relief_snippet, sun_torque
     from femgear.trains.reading import read_case
 
@@ -87,17 +85,25 @@ def main(
         top = 2 * _mean_deflection(basis, target, data.static.contact) if top is None else top
         amounts = top * np.arange(1, points + 1) / points
         grid, best, fine = _search(basis, amounts, on_sun, target, options, progress)
-    write_csv(folder / "tip_relief.csv", HEADER, _records(inputs, grid))
-    optimum = best.amount, best.length
-    figure = relief_contours(grid.amounts, grid.lengths, grid.ratio, inputs, optimum=optimum, design=design)
-    save_figure(figure, folder / "tip_relief.png")
     snippet = relief_snippet(gears, amount=best.amount, length=best.length, power=power, back=target < 0)
-    write_text(snippet, folder / "relief.toml")
+    _write(folder, inputs, grid, best, design, snippet)
     _print_summary(inputs, grid, design, best)
     print(f"at {2 * positions} positions: {fine:.1%}")
     _print_verdict(best, grid)
     print(f"for the case file (relief.toml):\n\n{snippet}")
     say_files(folder, ["tip_relief.csv", "tip_relief.png", "relief.toml"])
+
+
+def _write(folder: Path, inputs, grid, best, design: float, snippet: str) -> None:
+    """Table and picture of the grid, and the tables for the case file."""
+    from femgear.report.style import save_figure
+    from femgear.storage.files import write_text
+
+    write_csv(folder / "tip_relief.csv", HEADER, _records(inputs, grid))
+    optimum = best.amount, best.length
+    figure = relief_contours(grid.amounts, grid.lengths, grid.ratio, inputs, optimum=optimum, design=design)
+    save_figure(figure, folder / "tip_relief.png")
+    write_text(snippet, folder / "relief.toml")
 
 
 def _check_counts(points: int, positions: int) -> None:

@@ -183,20 +183,7 @@ def linearise(
     ContactError
         As `contact.cycle.walk_mesh_cycle`.
     """
-    if not (np.isfinite(sun_torque) and sun_torque):
-        raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
-    record = positions * periods
-    chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
-    if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
-        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
-    if basis.supports.planet_clearance:
-        raise CaseError(
-            "bearings with clearance have no derivative here",
-            code="E-SUPPORT",
-            key="planet.bearing_clearance",
-            value=basis.supports.planet_clearance,
-            limit="0 m",
-        )
+    chosen = _chosen(basis, sun_torque, positions * periods, only)
     solved, order = basis.loaded(sun_torque)
     position, numbers = cycle_positions(positions, periods=periods), chosen
     if sun_torque < 0:
@@ -223,6 +210,24 @@ def linearise(
         force_response=stacked["force_response"],
         residual=float(stacked["residual"].max()),
     )
+
+
+def _chosen(basis: DesignBasis, sun_torque: float, record: int, only) -> np.ndarray:
+    """Numbers of the positions wanted of a record; what `linearise` cannot represent is refused."""
+    if not (np.isfinite(sun_torque) and sun_torque):
+        raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
+    chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
+    if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
+        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
+    if basis.supports.planet_clearance:
+        raise CaseError(
+            "bearings with clearance have no derivative here",
+            code="E-SUPPORT",
+            key="planet.bearing_clearance",
+            value=basis.supports.planet_clearance,
+            limit="0 m",
+        )
+    return chosen
 
 
 def _solve(solved: DesignBasis, load: float, numbers, options):
