@@ -53,9 +53,14 @@ def main(
     from femgear.case.units import LENGTH, TORQUE, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
-    from femgear.study.figures import harris_curves
-    from femgear.study.linearised import design_basis, sun_torque
-    from femgear.study.relief import harris_map, loads_back, relief_starts, with_tip_relief
+    from femgear.study.relief import (
+        design_basis,
+        harris_map,
+        loads_back,
+        relief_starts,
+        sun_torque,
+        with_tip_relief,
+    )
     from femgear.trains.reading import read_case
 
     data = read_case(case)
@@ -78,13 +83,11 @@ def main(
         options = {"length": length, "back": back}
         variants = [with_tip_relief(basis.deviations, gears, amount=a, **options) for a in amounts]
         found = harris_map(
-            gears,
-            basis.bodies,
+            basis,
             torques=on_sun,
             deviations=variants,
             positions=positions,
             contact=data.static.contact,
-            supports=basis.supports,
             progress=lambda done, total: progress("contact", done, total),
         )
     write_csv(folder / "harris_map.csv", HEADER, _records(amounts, inputs, found))
@@ -130,6 +133,42 @@ def _print_summary(amounts, inputs, found):
         rows.append((name, f"{inputs[lowest]:g}", f"{curve[lowest]:.3f}", *ends))
     ends = (f"at {inputs[0]:g} N m", f"at {inputs[-1]:g} N m")
     print_table(title, ("relief [um]", "least at [N m]", "STE p-p there [um]", *ends), rows)
+
+
+def harris_curves(torques, peak_to_peak, names, *, design: float | None = None):
+    """Transmission error peak to peak over torque, one curve a relief.
+
+    Parameters
+    ----------
+    torques : (T,) array
+        Of the input [N m].
+    peak_to_peak : (variants, 2, T) array
+        Of sun-planet and planet-ring meshes [m].
+    names : sequence of str
+        Legend text of each variant.
+    design : float, optional
+        Torque to be marked [N m].
+    """
+    from femgear.report.style import BLACK, label, legend_below, line_style, new_figure
+
+    figure, axes = new_figure(columns=2, width=10.0, height=4.6, sharex=True)
+    # one torque is no line
+    marker = {"marker": "o"} if len(torques) == 1 else {}
+    for kind, ax in enumerate(axes):
+        curves = 1e6 * peak_to_peak[:, kind]
+        # a relief of the sun side hardly changes the other meshes
+        if len(curves) > 1 and np.ptp(curves, axis=0).max() < 0.01 * curves.max():
+            ax.plot(torques, curves[0], label="all reliefs (within 1 %)", color=BLACK, **marker)
+        else:
+            for v, name in enumerate(names):
+                ax.plot(torques, curves[v], label=name, **line_style(v), **marker)
+        if design is not None:
+            ax.axvline(design, color="0.5", linewidth=1.0, label=f"{design:g} N m")
+        ax.set_ylim(bottom=0)
+        label(ax, "torque of the input [N m]", title=f"{('sun-planet', 'planet-ring')[kind]} meshes")
+    label(axes[0], y="transmission error peak to peak [µm]")
+    legend_below(figure)
+    return figure
 
 
 if __name__ == "__main__":

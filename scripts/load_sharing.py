@@ -44,7 +44,7 @@ def main(
     from femgear.case.case import planetary_set
     from femgear.case.units import LENGTH, to_si
     from femgear.report.style import save_figure
-    from femgear.study.linearised import sun_torque
+    from femgear.study.relief import sun_torque
     from femgear.trains.reading import read_case
 
     data = read_case(case)
@@ -84,7 +84,7 @@ def _solve(case, gaps, planet, progress):
     from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
     from femgear.gears.deviations import common_period
     from femgear.run import grid_cache
-    from femgear.study.linearised import design_basis, sun_torque
+    from femgear.study.relief import design_basis, sun_torque
 
     progress("compliance", 0, 1)
     basis = design_basis(case, cache=grid_cache())

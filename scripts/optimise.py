@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import fill
 from typing import Annotated, Literal
 
 import numpy as np
@@ -19,37 +22,13 @@ QUIET = {"static.stresses": False, "housing.published": None}
 COLUMNS = ("quantity", "before", "optimum", "change")
 
 
-def main(
-    case: Path = REFERENCE_CASE,
-    /,
-    *,
-    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/optimise"),
-    vary: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    objective: str = "ste",
-    limit: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    of: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    second: str | None = None,
-    torque: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
-    speeds: tuple[str, str] = ("1000 rpm", "3500 rpm"),
-    method: Literal["auto", "minimax", "global", "simplex", "powell"] = "auto",
-    positions: int = 24,
-    flank_elements: int = 12,
-    samples: int | None = None,
-    max_designs: int | None = None,
-    seed: int = 0,
-    check: bool = True,
-) -> None:
-    """Search with few positions on a coarse grid, refine with those of the case, check on a finer one.
-
-    Every design is kept in the journals of the output folder: the same command goes on where an interrupted
-    one was. The optimum is written as a case file.
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Task:
+    """What is searched.
 
     Parameters
     ----------
-    case
-        TOML case file; the reference set when left out.
-    output
-        Folder of the results.
     vary
         Design variable, as in "sun.modifications[0].amount=0 um..15 um +- 1 um" with its tolerance; may be
         repeated. Default: a tip relief more on every loaded flank, its amount and its start.
@@ -67,6 +46,24 @@ def main(
         Of the input, with its unit. Default: that of the case.
     speeds
         First and last speed of the input, for mesh forces and the housing.
+    """
+
+    vary: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    objective: str = "ste"
+    limit: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    of: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    second: str | None = None
+    torque: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    speeds: tuple[str, str] = ("1000 rpm", "3500 rpm")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Extent:
+    """How far the search goes.
+
+    Parameters
+    ----------
     method
         Of the search; auto takes derivatives where the problem has them.
     positions
@@ -82,47 +79,83 @@ def main(
     check
         Run case and optimum anew into the folders before and after.
     """
+
+    method: Literal["auto", "minimax", "global", "simplex", "powell"] = "auto"
+    positions: int = 24
+    flank_elements: int = 12
+    samples: int | None = None
+    max_designs: int | None = None
+    seed: int = 0
+    check: bool = True
+
+
+def main(
+    case: Path = REFERENCE_CASE,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/optimise"),
+    task: Task = Task(),
+    extent: Extent = Extent(),
+) -> None:
+    """Search with few positions on a coarse grid, refine with those of the case, check on a finer one.
+
+    Every design is kept in the journals of the output folder: the same command goes on where an interrupted
+    one was. The optimum is written as a case file.
+
+    Parameters
+    ----------
+    case
+        TOML case file; the reference set when left out.
+    output
+        Folder of the results.
+    """
     from femgear.run import grid_cache
-    from femgear.study.names import named_quantity, parse_limit, parse_variable, tip_reliefs
-    from femgear.study.problem import Problem
-    from femgear.study.search import minimise
+    from femgear.study.objectives import named_quantity
+    from femgear.study.search import SearchOptions, minimise
     from femgear.trains.reading import read_case, with_value, with_values
 
     data = read_case(case)
-    data = data if torque is None else with_value(data, "operation.torque", torque)
-    _check_request(data, positions, flank_elements, samples, max_designs)
-    variables = tuple(parse_variable(text) for text in vary)
-    if not variables:
-        data, variables = tip_reliefs(data)
-    fast = {"static.positions": positions, "static.flank_elements": flank_elements}
-    coarse = with_values(data, fast | QUIET)
-    elastic = not data.rigid
-    reported = of or (*ERRORS, *(FORCES if elastic else ()))
-    first, *others = (named_quantity(words, speeds=speeds) for words in (objective, *reported))
-    another = None if second is None else named_quantity(second, speeds=speeds)
-    limits = [parse_limit(text, speeds=speeds) for text in limit]
-    problem = Problem(coarse, variables, first, also=others, limits=limits)
+    data = data if task.torque is None else with_value(data, "operation.torque", task.torque)
+    _check_request(data, extent)
+    data, problem = _problem(data, task, extent)
+    another = None if task.second is None else named_quantity(task.second, speeds=task.speeds)
     folder = ready_folder(output)
-    options = {"seed": seed, "samples": samples, "max_designs": max_designs, "cache": grid_cache()}
+    counts = SearchOptions(seed=extent.seed, samples=extent.samples, max_designs=extent.max_designs)
+    options = {"options": counts, "cache": grid_cache()}
     coarsely = options | {"journal": folder / "journal.jsonl"}
     with Progress() as progress:
-        rough = minimise(problem, method=method, sensitivity=False, progress=progress, **coarsely)
+        rough = minimise(problem, method=extent.method, sensitivity=False, progress=progress, **coarsely)
         progress("refinement", 0, 1)
-        found = _refined(rough, with_values(data, QUIET), folder, options, method)
+        found = _refined(rough, with_values(data, QUIET), folder, options, extent.method)
         progress("refinement", 1, 1)
     names = _write(found, data, folder, rough)
     if another is not None:
         names += _front(problem, another, folder, coarsely | {"start": rough.x})
-    if check:
-        names += _check(found, data, folder, speeds if elastic else None, rough)
+    if extent.check:
+        names += _check(found, data, folder, None if data.rigid else task.speeds, rough)
     say_files(folder, names)
 
 
-def _check_request(case, positions: int, flank_elements: int, samples, max_designs) -> None:
+def _problem(data, task: Task, extent: Extent):
+    """The case with its variables, and the problem on a coarse grid."""
+    from femgear.study.objectives import named_quantity
+    from femgear.study.problem import Problem, parse_limit, parse_variable, tip_reliefs
+    from femgear.trains.reading import with_values
+
+    variables = tuple(parse_variable(text) for text in task.vary)
+    if not variables:
+        data, variables = tip_reliefs(data)
+    fast = {"static.positions": extent.positions, "static.flank_elements": extent.flank_elements}
+    reported = task.of or (*ERRORS, *(() if data.rigid else FORCES))
+    first, *others = (named_quantity(words, speeds=task.speeds) for words in (task.objective, *reported))
+    limits = [parse_limit(text, speeds=task.speeds) for text in task.limit]
+    return data, Problem(with_values(data, fast | QUIET), variables, first, also=others, limits=limits)
+
+
+def _check_request(case, extent: Extent) -> None:
     """Refuse at once what no search can do."""
-    given = {"samples": samples, "max_designs": max_designs}
-    given |= {"positions": positions, "flank_elements": flank_elements}
-    for name, value in given.items():
+    for name in ("samples", "max_designs", "positions", "flank_elements"):
+        value = getattr(extent, name)
         least = 2 if name == "max_designs" else 1
         if value is not None and not least <= value <= 1_000_000:
             key = f"--{name.replace('_', '-')}"
@@ -145,23 +178,21 @@ def _check_request(case, positions: int, flank_elements: int, samples, max_desig
 
 def _refined(rough, case, folder: Path, options, method: str):
     """The optimum at the positions and on the grid of the case: between few positions errors may hide."""
-    from dataclasses import replace
-
     from femgear.study.search import minimise
 
     problem = replace(rough.problem, case=case)
     local = "auto" if rough.method == "minimax" else "simplex" if method in ("auto", "global") else method
     if any(variable.integer for variable in problem.variables):
         local = "global"
-    options = options | {"samples": 0, "journal": folder / "journal_fine.jsonl"}
-    return minimise(problem, method=local, start=rough.x, starts=1, **options)
+    extent = replace(options["options"], samples=0, starts=1)
+    options = options | {"options": extent, "journal": folder / "journal_fine.jsonl"}
+    return minimise(problem, method=local, start=rough.x, **options)
 
 
 def _write(found, data, folder: Path, rough) -> list[str]:
     """Tables on the terminal, and the files of the search."""
     from femgear.report.style import save_figure
     from femgear.storage.files import write_text
-    from femgear.study.figures import tolerance_bars
     from femgear.study.search import comparison_rows, tolerance_rows, verdict
     from femgear.trains.reading import to_toml, with_values
 
@@ -189,15 +220,14 @@ def _write(found, data, folder: Path, rough) -> list[str]:
 
 def _front(problem, second, folder: Path, options) -> list[str]:
     from femgear.report.style import save_figure
-    from femgear.study.figures import front
-    from femgear.study.search import pareto_front
+    from femgear.study.front import pareto_front
 
     with Progress() as progress:
         found = pareto_front(problem, second, progress=progress, **options)
     both = (problem.objective, second)
     scale = np.array([q.dimension.scale for q in both])
     titles = [f"{q.name} [{q.dimension.shown}]".replace("um]", "µm]") for q in both]
-    figure = front(
+    figure = front_figure(
         found.values / scale, found.dominated / scale, found.before / scale, names=titles,
         compromise=found.compromise,
     )  # fmt: skip
@@ -215,7 +245,6 @@ def _front(problem, second, folder: Path, options) -> list[str]:
 def _check(found, data, folder: Path, speeds, rough) -> list[str]:
     """Case and optimum anew: a full run each on a finer grid, read back from its files."""
     from femgear.report.style import save_figure
-    from femgear.study.figures import before_and_after
     from femgear.trains.reading import with_values
 
     fine = {"static.positions": 128, "static.flank_elements": 32} | QUIET
@@ -289,6 +318,122 @@ def _dynamic_force(dynamics) -> np.ndarray:
 def _costs(found) -> list[float]:
     """Objective over that of the case, in the order of the search."""
     return [value / (found.before[found.problem.objective.name] or 1.0) for value in found.course]
+
+
+def before_and_after(position, errors, speed=None, forces=None, *, costs=()):
+    """Transmission error over the mesh period, dynamic mesh force over speed, and course of the search.
+
+    Parameters
+    ----------
+    position : (P,) array
+        In mesh periods.
+    errors : sequence of two (P,) arrays
+        From sun to ring [m], before and after; their means are taken off.
+    speed : (S,) array, optional
+        Of the input [rpm].
+    forces : sequence of two (S,) arrays, optional
+        Largest dynamic part of any mesh [N].
+    costs : (designs,) array
+        Objective over that of the case, in the order of the search; NaN for designs outside the limits.
+    """
+    from femgear.report.style import BLUE, GREY, label, legend_below, new_figure, periodic
+
+    styles = (
+        {"color": GREY, "linestyle": "--", "label": "before"},
+        {"color": BLUE, "linestyle": "-", "label": "optimum"},
+    )
+    columns = 1 + (speed is not None) + bool(len(costs))
+    figure, axes = new_figure(columns=columns, width=4.2 * columns + 1.0, height=4.4)
+    for values, line in zip(errors, styles):
+        place, closed = periodic(position, 1e6 * (np.asarray(values) - np.mean(values)))
+        axes[0].plot(place, closed, linewidth=1.6, **line)
+    label(axes[0], "position [mesh periods]", "transmission error less its mean [µm]", "sun to ring, static")
+    if speed is not None:
+        for values, line in zip(forces, styles):
+            axes[1].plot(speed, values, linewidth=1.6, **line)
+        axes[1].set_ylim(bottom=0)
+        label(axes[1], "speed of the input [rpm]", "largest deviation from the mean [N]", "mesh force")
+    if len(costs):
+        _course(axes[-1], np.asarray(costs, float))
+    legend_below(figure)
+    return figure
+
+
+def _course(ax, costs: np.ndarray) -> None:
+    """Every design, and the best so far."""
+    from femgear.report.style import GREY, VERMILION, label
+
+    number = np.arange(1, len(costs) + 1)
+    best = np.minimum.accumulate(np.where(np.isfinite(costs), costs, np.inf))
+    shown = np.isfinite(best)
+    ax.semilogy(number, costs, ".", color=GREY, markersize=4, label="designs")
+    ax.step(number[shown], best[shown], where="post", color=VERMILION, linewidth=1.6, label="best so far")
+    label(ax, "design", "objective over that of the case [1]", "search at few positions")
+
+
+def tolerance_bars(names: Sequence[str], less, more, value: float, *, quantity: str, unit: str):
+    """What the objective becomes with each variable off by its tolerance.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Variables with their tolerances.
+    less, more : (n,) arrays
+        Objective with the variable lower and higher, in `unit`; NaN leaves a bar out.
+    value : float
+        Of the optimum.
+    quantity, unit : str
+    """
+    from femgear.report.style import BLACK, BLUE, VERMILION, label, legend_below, new_figure
+
+    n = len(names)
+    figure, (ax,) = new_figure(width=9.0, height=1.4 + 0.45 * n)
+    place = np.arange(n)[::-1]
+    for values, shift, colour, text in ((less, 0.19, BLUE, "less"), (more, -0.19, VERMILION, "more")):
+        values = np.asarray(values, float)
+        ax.barh(place + shift, values, height=0.36, color=colour, label=text)
+    ax.axvline(value, color=BLACK, linewidth=1.2, label="optimum")
+    ax.set_yticks(place, names)
+    ax.grid(False, axis="y")
+    label(ax, f"{quantity} [{unit}]")
+    legend_below(figure)
+    return figure
+
+
+def front_figure(values, dominated, before, *, names: Sequence[str], compromise: int | None = None):
+    """Pareto front with the other designs.
+
+    Parameters
+    ----------
+    values : (m, 2) array
+        Front, in the units of `names`.
+    dominated : (k, 2) array
+    before : (2,) array
+        The case as it is.
+    names : sequence of two str
+        Axis labels with units.
+    compromise : int, optional
+        Row of the front to be marked.
+    """
+    from femgear.report.style import BLACK, BLUE, VERMILION, label, legend_below, new_figure
+
+    values, dominated = np.asarray(values, float), np.asarray(dominated, float).reshape(-1, 2)
+    figure, (ax,) = new_figure(width=7.0, height=4.8)
+    ax.plot(*dominated.T, ".", color="0.75", markersize=4, label="other designs")
+    ax.step(*values.T, where="post", color=BLUE, linewidth=1.2)
+    ax.plot(*values.T, "o", color=BLUE, markersize=5, label="front")
+    ax.plot(*before, "s", color=BLACK, markersize=7, label="before")
+    if compromise is not None:
+        ax.plot(
+            *values[compromise], "o", color=VERMILION, markersize=10, fillstyle="none", label="compromise"
+        )
+    # designs far beyond both are of no interest
+    right, top = 1.1 * np.maximum(values.max(axis=0), before)
+    ax.set_xlim(0, right)
+    ax.set_ylim(0, top)
+    label(ax, *(fill(name, 44) for name in names))
+    legend_below(figure)
+    return figure
 
 
 if __name__ == "__main__":

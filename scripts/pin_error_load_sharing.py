@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Literal
@@ -63,8 +64,7 @@ def main(
     from femgear.case.units import LENGTH, to_si
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
-    from femgear.study.figures import sharing_histogram
-    from femgear.study.linearised import design_basis, sun_torque
+    from femgear.study.relief import design_basis, sun_torque
     from femgear.study.sharing import pin_samples
     from femgear.trains.reading import read_case
 
@@ -130,24 +130,24 @@ def _check_place(seed: int, position: float) -> None:
 def _solve(data, basis, kind, torque, place, pins):
     """Load sharing of all samples, the difference of some from the whole contact problem, sensitivities."""
     from femgear.contact.supports import RIGID, Supports
-    from femgear.study.linearised import case_supports
     from femgear.study.sensitivity import linearise, pin_sensitivities
     from femgear.study.sharing import sharing_model, sharing_of_samples, walked_shares
+    from femgear.trains.static.stages import case_supports
 
     supports = {"fixed": RIGID, "floating": Supports(sun=0.0), "case": case_supports(data)}[kind]
-    options = {"sun_torque": torque, "supports": supports, "deviations": basis.deviations, **place}
+    basis, options = replace(basis, supports=supports), {"sun_torque": torque, **place}
     begin = perf_counter()
-    model = sharing_model(basis.gears, basis.bodies, **options)
+    model = sharing_model(basis, **options)
     curves = perf_counter()
     sharing = sharing_of_samples(model, pins)
     solved = perf_counter()
     # a few of the first, the middle and the worst
     order = np.argsort(sharing.factor)
     chosen = np.unique([0, len(pins) // 3, order[len(pins) // 2], order[-1]])
-    whole = walked_shares(basis.gears, basis.bodies, pins[chosen], **options)
+    whole = walked_shares(basis, pins[chosen], **options)
     difference = np.abs(whole - sharing.share[chosen]).max()
     walk = {key: value for key, value in options.items() if key != "position"}
-    linear = linearise(basis.gears, basis.bodies, only=[place["position"]], **walk)
+    linear = linearise(basis, only=[place["position"]], **walk)
     facts = {
         "curves": curves - begin,
         "samples": solved - curves,
@@ -221,6 +221,41 @@ def _print_sensitivities(results, names, sigma):
     print_table(
         "Linear sensitivity of a planet's share, in % of the torque per um, mean of all planets", header, rows
     )
+
+
+def sharing_histogram(factors, names, n_planets: int):
+    """Distribution of the load sharing factor, one step curve a support.
+
+    Parameters
+    ----------
+    factors : sequence of (S,) arrays
+        K_gamma of every sample.
+    names : sequence of str
+    n_planets : int
+        The largest factor there can be.
+    """
+    from femgear.report.style import label, legend_below, line_style, new_figure
+
+    figure, (left, right) = new_figure(columns=2, width=10.0, height=4.4)
+    top = min(max(float(np.max(f)) for f in factors) * 1.02 + 0.02, float(n_planets) + 0.02)
+    edges = np.linspace(0.99, max(top, 1.05), 80)
+    for i, (factor, name) in enumerate(zip(factors, names)):
+        share = 100.0 / len(factor)
+        left.hist(
+            factor, edges, weights=np.full(len(factor), share), histtype="step", label=name, **line_style(i)
+        )
+        ordered = np.sort(factor)
+        beyond = 100.0 * (1.0 - np.arange(1, len(ordered) + 1) / len(ordered))
+        right.step(ordered, beyond, where="post", label=name, **line_style(i))
+    label(left, "load sharing factor K_gamma [1]", "samples [%]", "distribution")
+    label(right, "load sharing factor K_gamma [1]", "samples beyond [%]", "probability to exceed")
+    for ax in (left, right):
+        ax.set_xlim(edges[0], edges[-1])
+    # narrow and wide distributions side by side
+    left.set_yscale("log")
+    right.set_ylim(bottom=0)
+    legend_below(figure)
+    return figure
 
 
 if __name__ == "__main__":

@@ -4,14 +4,18 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from cyclopts import Parameter
 from script_tools import print_table, ready_folder, run_script, say_files, write_csv
 
 from femgear.errors import CaseError
+
+if TYPE_CHECKING:
+    from femgear.gears.phasing import PhasingTable
 
 MOST_HARMONICS = 100
 # cases of Table 2 of the paper, four equal planets
@@ -59,7 +63,7 @@ def main(
     from femgear.gears.planetary import equal_planet_angles, feasible_angles
     from femgear.gears.teeth_numbers import check_teeth, neighbouring_teeth
     from femgear.report.style import save_figure
-    from femgear.trains.static.figures import mesh_force_spectra, phase_diagram, resultant_chart
+    from femgear.trains.static.figures import phase_diagram
 
     if points < 2 or not 1 <= harmonics <= MOST_HARMONICS:
         raise CaseError(
@@ -202,6 +206,116 @@ def _force_rows(frequency, forces, meshes):
 
 def _degrees(psi) -> str:
     return ", ".join(f"{a:.6g}" for a in np.degrees(psi))
+
+
+def resultant_chart(tables: Mapping[str, PhasingTable]):
+    """Resultants that are left and kinds of modes excited, harmonic by harmonic, one picture a set.
+
+    The counterpart of Fig. 4 of A. Kahraman (J. Mech. Des. 116, 1994, 713-720); the area of a mark is the
+    share of the mesh forces.
+
+    Parameters
+    ----------
+    tables : mapping of str to PhasingTable
+        Titles and sets.
+    """
+    from femgear.gears.phasing import MODES
+    from femgear.report.style import GREY, SIZE, label, legend_below, new_figure
+
+    count = len(tables)
+    columns = min(4, count)
+    rows = -(-count // columns)
+    tall = max(len(table.harmonics) for table in tables.values())
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=3.0 * columns, height=(0.42 * tall + 1.9) * rows + 0.4
+    )
+    names = ("torque, thrust", "lateral force, tilting", *(f"{name} modes" for name in MODES))
+    for ax in axes[count:]:
+        ax.set_visible(False)
+    for ax, (title, table) in zip(axes, tables.items()):
+        shares = np.column_stack(
+            [table.members[..., 0].max(axis=1), table.members[..., 1].max(axis=1), table.modes]
+        )
+        for column, values in enumerate(shares.T):
+            marker, colour = ("D", GREY) if column < 2 else _kind_marks()[MODES[column - 2]]
+            there = np.flatnonzero(values > 1e-9)
+            place = np.full(len(there), column)
+            ax.scatter(
+                place, table.harmonics[there], s=130 * values[there], color=colour, marker=marker, zorder=3
+            )
+            text = "resultant" if column < 2 else names[column]
+            ax.plot([], [], marker, color=colour, label=text)
+        ax.axvline(1.5, color="0.6", linewidth=1.0)
+        ax.set_xticks(range(5), names, rotation=40, ha="right", fontsize=SIZE - 2)
+        ax.set_yticks(table.harmonics)
+        ax.set_xlim(-0.6, 4.6)
+        ax.set_ylim(table.harmonics[-1] + 0.6, table.harmonics[0] - 0.6)
+        label(ax, y="harmonic of the mesh frequency [1]", title=title)
+    legend_below(figure, columns=4)
+    return figure
+
+
+def mesh_force_spectra(
+    frequency,
+    forces: Mapping[str, np.ndarray],
+    *,
+    modes: Mapping[str, np.ndarray] | None = None,
+    meshes: Sequence[str] = ("sun-planet 1",),
+):
+    """Mesh forces over the frequency of each harmonic, one picture a set.
+
+    The counterpart of Fig. 6 of A. Kahraman (J. Mech. Des. 116, 1994, 713-720).
+
+    Parameters
+    ----------
+    frequency : (F,) array
+        Of the harmonic itself, h times the mesh frequency [Hz].
+    forces : mapping of str to (H, F, n) array
+        Titles, and amplitudes [N] of harmonics 1 to H at the meshes drawn.
+    modes : mapping of str to (m,) array, optional
+        Natural frequencies [Hz] by kind, for marks along the axis.
+    meshes : sequence of str
+        Names of the n meshes; the second and further ones are drawn where they differ from the first.
+    """
+    from femgear.report.style import COLOURS, DASHES, GREY, label, legend_below, new_figure
+
+    columns = 2 if len(forces) > 1 else 1
+    rows = -(-len(forces) // columns)
+    figure, axes = new_figure(
+        rows=rows, columns=columns, width=5.4 * columns, height=3.3 * rows + 0.8, sharex=True, sharey=True
+    )
+    hertz, top = np.asarray(frequency) * 1e-3, max(np.abs(f).max() for f in forces.values())
+    for ax in axes[len(forces) :]:
+        ax.set_visible(False)
+    for ax, (title, force) in zip(axes, forces.items()):
+        size = np.abs(force)
+        for h in range(len(size)):
+            for j, name in enumerate(meshes):
+                if j and np.abs(size[h, :, j] - size[h, :, 0]).max() < 1e-6 * top:
+                    continue
+                # wide below narrow: lines that coincide are all seen
+                text = f"harmonic {h + 1}, {name}"
+                ax.plot(hertz, size[h, :, j], DASHES[j % 4], color=COLOURS[h % 7], label=text,
+                        linewidth=4.5 - 1.2 * min(h, 3), zorder=2 + h)  # fmt: skip
+        for kind, values in (modes or {}).items():
+            marker, colour = _kind_marks().get(kind, ("x", GREY))
+            ax.plot(np.asarray(values) * 1e-3, np.full(len(values), -0.05 * top), marker, color=colour,
+                    markersize=5, label=f"{kind} modes", clip_on=False)  # fmt: skip
+        ax.set_ylim(-0.09 * top, 1.05 * top)
+        label(ax, title=title)
+    for ax in axes[-columns:]:
+        label(ax, x="frequency of the harmonic [kHz]")
+    for ax in axes[::columns]:
+        label(ax, y="mesh force [N]")
+    legend_below(figure, columns=4)
+    return figure
+
+
+def _kind_marks() -> dict[str, tuple[str, str]]:
+    """Marker and colour of every kind of mode."""
+    from femgear.report.style import BLACK, BLUE, VERMILION
+
+    return {"rotational": ("o", BLUE), "translational": ("^", VERMILION), "planet": ("s", BLACK)}
 
 
 if __name__ == "__main__":

@@ -60,12 +60,8 @@ def main(
     """
     from femgear.case.case import need_set, planetary_set
     from femgear.case.units import LENGTH, TORQUE, to_si
-    from femgear.report.style import save_figure
     from femgear.run import grid_cache
-    from femgear.storage.files import write_text
-    from femgear.study.figures import relief_contours
-    from femgear.study.linearised import design_basis, relief_snippet, sun_torque
-    from femgear.study.relief import loads_back
+    from femgear.study.relief import design_basis, loads_back, relief_snippet, sun_torque
     from femgear.trains.reading import read_case
 
     data = read_case(case)
@@ -84,28 +80,30 @@ def main(
         basis = design_basis(data, cache=grid_cache())
         progress("compliance", 1, 1)
         power = 2.0 if shape == "parabolic" else 1.0
-        options = {
-            "deviations": basis.deviations,
-            "power": power,
-            "positions": positions,
-            "contact": data.static.contact,
-            "supports": basis.supports,
-        }
+        options = {"power": power, "positions": positions, "contact": data.static.contact}
         target = sun_torque(data, gears, design)
         top = 2 * _mean_deflection(basis, target, data.static.contact) if top is None else top
         amounts = top * np.arange(1, points + 1) / points
         grid, best, fine = _search(basis, amounts, on_sun, target, options, progress)
-    write_csv(folder / "tip_relief.csv", HEADER, _records(inputs, grid))
-    optimum = best.amount, best.length
-    figure = relief_contours(grid.amounts, grid.lengths, grid.ratio, inputs, optimum=optimum, design=design)
-    save_figure(figure, folder / "tip_relief.png")
     snippet = relief_snippet(gears, amount=best.amount, length=best.length, power=power, back=target < 0)
-    write_text(snippet, folder / "relief.toml")
+    _write(folder, inputs, grid, best, design, snippet)
     _print_summary(inputs, grid, design, best)
     print(f"at {2 * positions} positions: {fine:.1%}")
     _print_verdict(best, grid)
     print(f"for the case file (relief.toml):\n\n{snippet}")
     say_files(folder, ["tip_relief.csv", "tip_relief.png", "relief.toml"])
+
+
+def _write(folder: Path, inputs, grid, best, design: float, snippet: str) -> None:
+    """Table and picture of the grid, and the tables for the case file."""
+    from femgear.report.style import save_figure
+    from femgear.storage.files import write_text
+
+    write_csv(folder / "tip_relief.csv", HEADER, _records(inputs, grid))
+    optimum = best.amount, best.length
+    figure = relief_contours(grid.amounts, grid.lengths, grid.ratio, inputs, optimum=optimum, design=design)
+    save_figure(figure, folder / "tip_relief.png")
+    write_text(snippet, folder / "relief.toml")
 
 
 def _check_counts(points: int, positions: int) -> None:
@@ -134,8 +132,7 @@ def _search(basis, amounts, on_sun, target, options, progress):
     from femgear.study.relief import optimise_relief, relief_grid
 
     grid = relief_grid(
-        basis.gears,
-        basis.bodies,
+        basis,
         amounts=amounts,
         lengths=np.linspace(0.4, 1.2, len(amounts)),
         torques=on_sun,
@@ -143,7 +140,7 @@ def _search(basis, amounts, on_sun, target, options, progress):
         **options,
     )
     progress("optimum", 0, 1)
-    best = optimise_relief(basis.gears, basis.bodies, grid, torque=target, **options)
+    best = optimise_relief(basis, grid, torque=target, **options)
     fine = _at_more_positions(basis, best, target, options)
     progress("optimum", 1, 1)
     return grid, best, fine
@@ -156,13 +153,11 @@ def _at_more_positions(basis, best, torque: float, options) -> float:
     ideal, gears = basis.deviations, basis.gears
     relief = {"amount": best.amount, "length": best.length, "power": options["power"], "back": torque < 0}
     found = harris_map(
-        gears,
-        basis.bodies,
+        basis,
         torques=[torque],
         deviations=[ideal, with_tip_relief(ideal, gears, **relief)],
         positions=2 * options["positions"],
         contact=options["contact"],
-        supports=options["supports"],
     ).peak_to_peak[:, 0, 0]
     return float(found[1] / found[0])
 
@@ -216,6 +211,58 @@ def _print_summary(inputs, grid, design, best):
         f"contact, STE peak to peak {best.peak_to_peak * 1e6:.4f} um, {best.ratio:.1%} of "
         f"{best.unmodified * 1e6:.4f} um without it ({best.evaluations} mesh cycles)"
     )
+
+
+def relief_contours(amounts, lengths, ratios, torques, *, optimum=None, design=None):
+    """Transmission error peak to peak over that without relief, over amount and length of the relief.
+
+    Parameters
+    ----------
+    amounts : (A,) array
+        [m]
+    lengths : (L,) array
+        In lengths of two-pair contact.
+    ratios : (T, A, L) array
+    torques : (T,) array
+        Of the input [N m].
+    optimum : (float, float), optional
+        Amount [m] and length to be marked.
+    design : float, optional
+        Torque [N m] the optimum was found at; under the others it is marked as chosen.
+    """
+    from femgear.report.style import COLOURS, label, legend_below, new_figure
+
+    figure, axes = new_figure(
+        columns=len(torques), width=max(3.9 * len(torques), 6.0), height=4.4, sharex=True, sharey=True
+    )
+    # ratio at which a contour is drawn
+    quarter, levels = 0.25, np.linspace(0.0, 1.5, 13)
+    for ax, ratio, torque in zip(axes, ratios, torques):
+        filled = ax.contourf(lengths, 1e6 * amounts, ratio, levels=levels, cmap="viridis", extend="max")
+        if ratio.min() < quarter < ratio.max():
+            ax.contour(lengths, 1e6 * amounts, ratio, levels=[quarter], colors=[COLOURS[4]], linewidths=2.0)
+            # a contour has no legend entry of its own
+            ax.plot([], [], color=COLOURS[4], linewidth=2.0, label=f"{quarter:.0%} of unmodified")
+        if optimum is not None:
+            _mark(ax, optimum, own=design is None or np.isclose(torque, design), design=design)
+        label(ax, "length [two-pair contact]", title=f"{torque:g} N m")
+    label(axes[0], y="amount at the tips [µm]")
+    bar = figure.colorbar(filled, ax=axes)
+    bar.set_label("STE peak to peak over unmodified [1]")
+    legend_below(figure)
+    return figure
+
+
+def _mark(ax, optimum, *, own: bool, design) -> None:
+    """A full circle under the torque of the optimum, an open one under others."""
+    from femgear.report.style import VERMILION
+
+    amount, length = optimum
+    name = "optimum" if own else f"chosen for {design:g} N m"
+    name = f"optimum at {design:g} N m" if own and design is not None else name
+    face = VERMILION if own else "white"
+    style = {"color": VERMILION, "markerfacecolor": face, "markersize": 9, "markeredgewidth": 2.0}
+    ax.plot(length, 1e6 * amount, "o", label=name, clip_on=False, **style)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Design maps: closed forms of load sharing, the whole contact problem, minimum of the Harris map."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,16 @@ from femgear.case.case import planetary_set
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError, ContactError
 from femgear.gears.modifications import form_deviation
-from femgear.study.linearised import design_basis, relief_snippet, sun_torque
-from femgear.study.relief import harris_map, optimise_relief, relief_grid, relief_starts, with_tip_relief
+from femgear.study.relief import (
+    design_basis,
+    harris_map,
+    optimise_relief,
+    relief_grid,
+    relief_snippet,
+    relief_starts,
+    sun_torque,
+    with_tip_relief,
+)
 from femgear.study.sharing import SharingModel, pin_samples, sharing_model, sharing_of_samples, walked_shares
 from femgear.trains.reading import read_case
 
@@ -127,19 +136,19 @@ def test_four_planets_on_a_floating_sun_open_in_opposite_pairs():
 )
 def test_samples_agree_with_the_whole_contact_problem(basis, torque, supports):
     pins = pin_samples(3, samples=300, radial=3e-6, tangential=5e-6, seed=2)
-    options = {"sun_torque": torque, "supports": supports, "position": 3}
-    model = sharing_model(basis.gears, basis.bodies, **options)
+    basis, options = replace(basis, supports=supports), {"sun_torque": torque, "position": 3}
+    model = sharing_model(basis, **options)
     found = sharing_of_samples(model, pins)
     order = np.argsort(found.factor)
     chosen = order[[0, 100, 200, 299]]
-    whole = walked_shares(basis.gears, basis.bodies, pins[chosen], **options)
+    whole = walked_shares(basis, pins[chosen], **options)
     np.testing.assert_allclose(found.share[chosen], whole, atol=1e-3)
     assert found.residual < 1e-8 and model.coupling_change < 1e-2
     assert found.open_planets.any() == (supports == RIGID)
 
 
 def test_a_floating_sun_shares_equally_among_three_planets(basis):
-    model = sharing_model(basis.gears, basis.bodies, sun_torque=TORQUE, supports=Supports(sun=0.0))
+    model = sharing_model(replace(basis, supports=Supports(sun=0.0)), sun_torque=TORQUE)
     found = sharing_of_samples(model, pin_samples(3, samples=500, radial=5e-6, tangential=9e-6, seed=4))
     np.testing.assert_allclose(found.share, 1 / 3, rtol=1e-8)
 
@@ -165,15 +174,15 @@ def test_relief_starts_at_the_ends_of_single_pair_contact(basis):
 
 
 def test_the_optimum_is_far_under_the_unmodified_pair_and_the_map_has_its_minimum_there(basis):
-    gears, bodies = basis.gears, basis.bodies
+    gears = basis.gears
     grid = relief_grid(
-        gears, bodies, amounts=[3e-6, 4e-6, 5e-6], lengths=[0.8, 0.9, 1.0], torques=[TORQUE], positions=16
+        basis, amounts=[3e-6, 4e-6, 5e-6], lengths=[0.8, 0.9, 1.0], torques=[TORQUE], positions=16
     )
-    best = optimise_relief(gears, bodies, grid, torque=TORQUE, positions=16, max_evaluations=25)
+    best = optimise_relief(basis, grid, torque=TORQUE, positions=16, max_evaluations=25)
     assert best.peak_to_peak <= grid.peak_to_peak.min() + 1e-12
     variants = [None, with_tip_relief(None, gears, amount=best.amount, length=best.length)]
     torques = [25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 200.0]
-    found = harris_map(gears, bodies, torques=torques, deviations=variants, positions=64)
+    found = harris_map(basis, torques=torques, deviations=variants, positions=64)
     plain, relieved = found.peak_to_peak[:, 0]
     assert relieved[3] < 0.25 * plain[3]
     assert relieved.argmin() == 3
@@ -186,27 +195,25 @@ def test_the_slopes_of_the_optimum_are_those_of_single_mesh_cycles(basis):
     """Same peaks as mesh cycles with the reliefs beside it; a search cut short says it is no minimum."""
     from femgear.study.relief import two_pair_length
 
-    gears, bodies = basis.gears, basis.bodies
-    grid = relief_grid(
-        gears, bodies, amounts=[2.7e-6, 5.3e-6], lengths=[0.8, 1.2], torques=[TORQUE], positions=16
-    )
-    best = optimise_relief(gears, bodies, grid, torque=TORQUE, positions=16)
+    gears = basis.gears
+    grid = relief_grid(basis, amounts=[2.7e-6, 5.3e-6], lengths=[0.8, 1.2], torques=[TORQUE], positions=16)
+    best = optimise_relief(basis, grid, torque=TORQUE, positions=16)
     assert best.minimum and best.at_end == ()
     assert min(*best.amount_slopes, *best.length_slopes) >= 0
-    short = optimise_relief(gears, bodies, grid, torque=TORQUE, positions=16, max_evaluations=3)
+    short = optimise_relief(basis, grid, torque=TORQUE, positions=16, max_evaluations=3)
     assert not short.minimum and short.peak_to_peak > best.peak_to_peak
     away = 0.05e-3 / two_pair_length(gears)
     places = [(best.amount + d, best.length) for d in (-0.1e-6, 0.1e-6)]
     places += [(best.amount, best.length + d) for d in (-away, away)]
     variants = [with_tip_relief(None, gears, amount=a, length=length) for a, length in places]
-    found = harris_map(gears, bodies, torques=[TORQUE], deviations=variants, positions=16)
+    found = harris_map(basis, torques=[TORQUE], deviations=variants, positions=16)
     rises = found.peak_to_peak[:, 0, 0] - best.peak_to_peak
     np.testing.assert_allclose(rises[:2], 0.1e-6 * np.array(best.amount_slopes), atol=1e-13)
     np.testing.assert_allclose(rises[2:], 0.05e-3 * np.array(best.length_slopes), atol=1e-13)
 
 
 def test_the_optimum_is_marked_under_its_torque_alone():
-    from femgear.study.figures import relief_contours
+    from tip_relief_design import relief_contours
 
     amounts, lengths = np.array([2e-6, 4e-6, 6e-6]), np.array([0.4, 0.8, 1.2])
     ratios = np.array([np.full((3, 3), 0.8), [[0.9, 0.6, 0.1], [0.7, 0.5, 0.4], [0.9, 0.8, 0.7]]])
@@ -224,7 +231,7 @@ def test_a_map_of_negative_torques_is_that_of_positive_ones(basis):
     peaks = []
     for sign in (1, -1):
         variant = with_tip_relief(None, gears, amount=4e-6, length=0.9, back=sign < 0)
-        found = harris_map(gears, basis.bodies, torques=[sign * TORQUE], deviations=[variant], positions=8)
+        found = harris_map(basis, torques=[sign * TORQUE], deviations=[variant], positions=8)
         peaks.append(found.peak_to_peak)
     np.testing.assert_allclose(peaks[0], peaks[1], rtol=1e-9)
 
@@ -248,28 +255,28 @@ def test_the_tables_for_the_case_file_mean_the_same_relief(basis, tmp_path):
 
 
 def test_supports_are_those_of_the_static_stage():
-    from femgear.study.linearised import case_supports
     from femgear.trains.reading import with_value
+    from femgear.trains.static.stages import case_supports
 
     case = with_value(read_case(CASE), "planet.bearing_clearance", "3 um")
     assert case_supports(case) == Supports(sun=5e7, carrier=2e8, planet=3e8, planet_clearance=3e-6)
 
 
 def test_refusals(basis):
-    gears, bodies = basis.gears, basis.bodies
+    gears = basis.gears
     with pytest.raises(CaseError, match="differ from zero"):
-        harris_map(gears, bodies, torques=[10.0, 0.0], deviations=[None])
+        harris_map(basis, torques=[10.0, 0.0], deviations=[None])
     with pytest.raises(CaseError, match="both signs"):
-        relief_grid(gears, bodies, amounts=[1e-6], lengths=[1.0], torques=[1.0, -1.0])
+        relief_grid(basis, amounts=[1e-6], lengths=[1.0], torques=[1.0, -1.0])
     with pytest.raises(CaseError, match="not plausible"):
         relief_starts(gears, length=2.0)
     with pytest.raises(CaseError, match="nothing to share"):
-        sharing_model(gears, bodies, sun_torque=0.0)
+        sharing_model(basis, sun_torque=0.0)
     with pytest.raises(CaseError, match="no such position"):
-        sharing_model(gears, bodies, sun_torque=1.0, position=8)
+        sharing_model(basis, sun_torque=1.0, position=8)
     loose = Supports(planet=1e8, planet_clearance=1e-6)
     with pytest.raises(CaseError, match="no clearance"):
-        sharing_model(gears, bodies, sun_torque=1.0, supports=loose)
+        sharing_model(replace(basis, supports=loose), sun_torque=1.0)
     with pytest.raises(CaseError, match="number of samples"):
         pin_samples(3, samples=0, radial=1e-6, tangential=1e-6, seed=1)
     with pytest.raises(CaseError, match="negative"):
@@ -277,8 +284,6 @@ def test_refusals(basis):
     model = linear_model(3, 100.0, bearing=1e9)
     with pytest.raises(CaseError, match="shape"):
         sharing_of_samples(model, np.zeros((5, 4, 2)))
-    from dataclasses import replace
-
     with pytest.raises(ContactError, match="falls with its load"):
         sharing_of_samples(replace(model, deflection=-model.deflection), np.zeros((1, 3, 2)))
     with pytest.raises(CaseError, match="no tooth bends"):
@@ -288,8 +293,6 @@ def test_refusals(basis):
 @pytest.mark.parametrize("sun", [None, 0.0, 1e8])
 def test_newton_agrees_with_the_general_contact_solver(sun):
     """Five planets, many open; without steps of Newton every sample is a contact problem of its own."""
-    from dataclasses import replace
-
     model = linear_model(5, 4000.0, bearing=1e9, sun=sun)
     # paths that stiffen under load, as line contacts do
     model = replace(model, deflection=4e-6 * (model.deflection / model.deflection.max()) ** 0.7)

@@ -12,8 +12,8 @@ from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, MeasuredProfile
-from femgear.study.linearised import design_basis
 from femgear.study.relief import (
+    design_basis,
     pin_error,
     relief_amount,
     relief_length,
@@ -71,9 +71,10 @@ def agree(found, expected, scale):
 def test_derivatives_are_those_of_whole_solutions(basis, name, supports, torque):
     gears = basis.gears
     variant, value, step = parameter(name, gears, torque < 0)
-    options = {"sun_torque": torque, "positions": 3, "supports": supports}
-    linear = linearise(gears, basis.bodies, deviations=variant(value), **options)
+    options = {"sun_torque": torque, "positions": 3}
+    linear = linearise(replace(basis, deviations=variant(value), supports=supports), **options)
     found = sensitivity(linear, variant, value, step=step)
+    options["supports"] = supports
     arc, deflection, share = differences(gears, basis.bodies, variant, value, step, **options)
     assert np.abs(arc).max() > 0
     agree(found.sun_arc, arc, np.abs(arc).max())
@@ -85,12 +86,13 @@ def test_derivatives_are_those_of_whole_solutions(basis, name, supports, torque)
 
 def test_the_linearised_solution_is_that_of_the_walk(basis):
     variant, value, _ = parameter("amount", basis.gears, False)
-    options = {"sun_torque": TORQUE, "positions": 8, "supports": SPRUNG, "deviations": variant(value)}
-    linear = linearise(basis.gears, basis.bodies, **options)
-    cycle = walk_mesh_cycle(basis.gears, basis.bodies, **options)
+    options = {"sun_torque": TORQUE, "positions": 8}
+    held = {"supports": SPRUNG, "deviations": variant(value)}
+    linear = linearise(replace(basis, **held), **options)
+    cycle = walk_mesh_cycle(basis.gears, basis.bodies, **held, **options)
     for name in ("position", "sun_arc", "deflection", "force"):
         np.testing.assert_allclose(getattr(linear, name), getattr(cycle, name), rtol=1e-11)
-    some = linearise(basis.gears, basis.bodies, only=[5, 2], **options)
+    some = linearise(replace(basis, **held), only=[5, 2], **options)
     np.testing.assert_allclose(some.sun_arc, cycle.sun_arc[[5, 2]], rtol=1e-11)
 
 
@@ -102,7 +104,7 @@ def test_pitch_error_of_one_tooth(basis, gear, torque):
     gears, teeth = basis.gears, {"sun": 27, "planet": 40}[gear]
     variant = tooth_pitch_error(no_deviations(gears), gears, gear=gear, tooth=teeth - 3, planet=2)
     options = {"sun_torque": torque, "positions": 1, "periods": teeth if torque > 0 else teeth - 5}
-    linear = linearise(gears, basis.bodies, **options)
+    linear = linearise(basis, **options)
     found = sensitivity(linear, variant, 0.0, step=1e-10)
     arc, deflection, _ = differences(gears, basis.bodies, variant, 0.0, 1e-10, **options)
     assert 0 < np.count_nonzero(np.abs(arc) > 1e-6) < teeth / 3
@@ -114,7 +116,7 @@ def test_pitch_error_of_a_tooth_of_the_ring(basis):
     """Planet 1 passes tooth 2 of the ring in the third mesh period, counted against the ring's numbers."""
     gears, options = basis.gears, {"sun_torque": TORQUE, "positions": 1, "periods": 108}
     variant = tooth_pitch_error(no_deviations(gears), gears, gear="ring", tooth=2)
-    linear = linearise(gears, basis.bodies, **options)
+    linear = linearise(basis, **options)
     found = sensitivity(linear, variant, 0.0, step=1e-10)
     touched = np.flatnonzero(np.abs(found.sun_arc) > 1e-6)
     # three planets pass it a third of a turn apart
@@ -145,7 +147,7 @@ def test_a_pitch_error_is_that_of_the_case_file(basis):
 def test_pins_that_all_move_alike_turn_or_widen_the_set(basis, torque):
     """Willis: the carrier turned by e/a turns the sun by (1 + z_r/z_s) e/a against the fixed ring."""
     gears, sign = basis.gears, math.copysign(1.0, torque)
-    linear = linearise(gears, basis.bodies, sun_torque=torque, positions=4)
+    linear = linearise(basis, sun_torque=torque, positions=4)
 
     def arc(direction):
         def variant(value):
@@ -173,7 +175,7 @@ def test_material_off_a_whole_flank_turns_the_sun_by_as_much(basis):
     def variant(value):
         return replace(no_deviations(gears), sun=FlankForm((MeasuredProfile(ends, (value, value)),)))
 
-    linear = linearise(gears, basis.bodies, sun_torque=TORQUE, positions=4, deviations=variant(1e-6))
+    linear = linearise(replace(basis, deviations=variant(1e-6)), sun_torque=TORQUE, positions=4)
     found = sensitivity(linear, variant, 1e-6, step=1e-7)
     np.testing.assert_allclose(found.sun_arc, 1.0, rtol=1e-9)
     np.testing.assert_allclose(found.deflection[:3], 1.0, rtol=1e-9)
@@ -184,8 +186,8 @@ def test_material_off_a_whole_flank_turns_the_sun_by_as_much(basis):
 def test_a_floating_sun_makes_the_shares_of_three_planets_insensitive_to_pins(basis, torque):
     """Statics: three forces through known lines balance without any elasticity."""
     options = {"sun_torque": torque, "positions": 4, "only": [1]}
-    floating = linearise(basis.gears, basis.bodies, supports=Supports(sun=0.0), **options)
-    fixed = linearise(basis.gears, basis.bodies, **options)
+    floating = linearise(replace(basis, supports=Supports(sun=0.0)), **options)
+    fixed = linearise(basis, **options)
     largest = np.abs(pin_sensitivities(fixed)).max()
     assert np.abs(pin_sensitivities(floating)).max() < 1e-9 * largest
 
@@ -193,11 +195,11 @@ def test_a_floating_sun_makes_the_shares_of_three_planets_insensitive_to_pins(ba
 @pytest.mark.parametrize("supports", [RIGID, SPRUNG], ids=["fixed", "sprung"])
 def test_linear_shares_are_those_of_monte_carlo_for_small_errors(basis, supports):
     """Sample by sample and in their spread; the curves of `sharing_model` are another method."""
-    options = {"sun_torque": TORQUE, "positions": 8, "supports": supports}
+    basis, options = replace(basis, supports=supports), {"sun_torque": TORQUE, "positions": 8}
     pins = pin_samples(3, samples=2000, radial=0.05e-6, tangential=0.05e-6, seed=6)
-    model = sharing_model(basis.gears, basis.bodies, position=3, loads=24, **options)
+    model = sharing_model(basis, position=3, loads=24, **options)
     sampled = sharing_of_samples(model, pins)
-    linear = linearise(basis.gears, basis.bodies, only=[3], **options)
+    linear = linearise(basis, only=[3], **options)
     slopes = pin_sensitivities(linear)[..., 0]
     shares = linear.share[:, 0] + np.einsum("nmw,smw->sn", slopes, pins)
     spread = sampled.share.std(axis=0)
@@ -211,7 +213,7 @@ def test_a_planet_without_load_has_no_derivative_of_its_own(basis):
     base = replace(no_deviations(basis.gears), pin_errors=[[0, 0], [0, 60e-6], [0, 0]])
     variant = pin_error(base, planet=1, direction="tangential")
     options = {"sun_torque": TORQUE, "positions": 4}
-    linear = linearise(basis.gears, basis.bodies, deviations=base, **options)
+    linear = linearise(replace(basis, deviations=base), **options)
     assert np.all(linear.force[[1, 4]] == 0)
     found = sensitivity(linear, variant, 0.0, step=1e-10)
     arc, _, share = differences(basis.gears, basis.bodies, variant, 0.0, 1e-10, **options)
@@ -239,7 +241,7 @@ def test_slopes_of_the_peak_to_peak_are_those_of_whole_solutions(basis):
     gears, options = basis.gears, {"sun_torque": TORQUE, "positions": 8}
     variant = relief_amount(None, gears, length=0.9)
     for amount, sign in ((2e-6, -1), (7e-6, 1)):
-        linear = linearise(gears, basis.bodies, deviations=variant(amount), **options)
+        linear = linearise(replace(basis, deviations=variant(amount)), **options)
         found = sensitivity(linear, variant, amount, step=1e-9)
         left, right = peak_to_peak_slopes(linear.deflection[:3], found.deflection[:3], step=1e-10)
         peaks = [
@@ -262,17 +264,18 @@ def test_length_of_two_pair_contact(basis):
 
 
 def test_refusals(basis):
-    gears, bodies, ideal = basis.gears, basis.bodies, no_deviations(basis.gears)
+    gears, ideal = basis.gears, no_deviations(basis.gears)
+    loose = Supports(planet=1e8, planet_clearance=1e-6)
     with pytest.raises(CaseError, match="without torque"):
-        linearise(gears, bodies, sun_torque=0.0)
+        linearise(basis, sun_torque=0.0)
     with pytest.raises(CaseError, match="no such position"):
-        linearise(gears, bodies, sun_torque=1.0, positions=8, only=[8])
+        linearise(basis, sun_torque=1.0, positions=8, only=[8])
     with pytest.raises(CaseError, match="clearance"):
-        linearise(gears, bodies, sun_torque=1.0, supports=Supports(planet=1e8, planet_clearance=1e-6))
+        linearise(replace(basis, supports=loose), sun_torque=1.0)
     with pytest.raises(CaseError, match="no such pin error"):
         pin_error(ideal, planet=4, direction="radial")
     with pytest.raises(CaseError, match="no such tooth"):
         tooth_pitch_error(ideal, gears, gear="sun", tooth=27)
-    linear = linearise(gears, bodies, sun_torque=-TORQUE, positions=1)
+    linear = linearise(basis, sun_torque=-TORQUE, positions=1)
     with pytest.raises(CaseError, match="needs a step"):
         sensitivity(linear, pin_error(ideal, planet=1, direction="radial"), 0.0, step=0.0)

@@ -13,13 +13,13 @@ import pytest
 
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError, ConvergenceError, StorageError
-from femgear.study.minimax import _linear_program
+from femgear.storage.journal import Journal
+from femgear.study.designs import Designs, Failure, evaluations, open_designs
+from femgear.study.front import non_dominated, pareto_front
 from femgear.study.objectives import NUMBER, Quantity, contact_ratio, tip_thickness, transmission_error
-from femgear.study.problem import Designs, Failure, Limit, Problem, open_designs
-from femgear.study.search import minimise, non_dominated, pareto_front
+from femgear.study.problem import Limit, Problem, Variable
+from femgear.study.search import SearchOptions, _linear_program, has_derivatives, minimise, signals
 from femgear.study.sweep import parse_over, sweep, sweep_into
-from femgear.study.variables import Variable
-from femgear.study.variants import Journal
 from femgear.trains.reading import read_case, with_value, with_values
 
 CASE = Path(__file__).resolve().parents[1] / "cases" / "planetary_27_40_108.toml"
@@ -46,7 +46,10 @@ X_ALONE = function("x", lambda x, y: x)
 @pytest.mark.parametrize("method", ["global", "simplex", "powell"])
 def test_searches_find_the_minimum_of_a_curved_valley(case, method):
     found = minimise(
-        Problem(case, [X, Y], ROSENBROCK), method=method, samples=8, generations=6, sensitivity=False
+        Problem(case, [X, Y], ROSENBROCK),
+        method=method,
+        options=SearchOptions(samples=8, generations=6),
+        sensitivity=False,
     )
     assert found.after["Rosenbrock"] == pytest.approx(1.0, abs=2e-3)
     np.testing.assert_allclose(found.x, [0.6, 1.0], atol=0.05)
@@ -144,16 +147,16 @@ def relief_problem(case):
 @pytest.mark.slow
 def test_descents_find_the_relief_that_a_scan_finds(relief_problem, grids, tmp_path):
     """Against whole contact problems of `harris_map`, which knows nothing of variants and journals."""
-    from femgear.study.linearised import design_basis
-    from femgear.study.relief import harris_map, with_tip_relief
+    from femgear.study.relief import design_basis, harris_map, with_tip_relief
 
-    options = {"samples": 1, "starts": 1, "journal": tmp_path / "journal.jsonl", "cache": grids}
+    few = SearchOptions(samples=1, starts=1)
+    options = {"options": few, "journal": tmp_path / "journal.jsonl", "cache": grids}
     found = minimise(relief_problem, **options)
     assert found.method == "minimax" and found.converged
     basis = design_basis(relief_problem.case, cache=grids)
     amounts = found.x[0] * 1e-6 + np.linspace(-0.5e-6, 0.5e-6, 3)
     variants = [None, *(with_tip_relief(None, basis.gears, amount=a) for a in amounts)]
-    scan = harris_map(basis.gears, basis.bodies, torques=[100.0], deviations=variants, positions=14)
+    scan = harris_map(basis, torques=[100.0], deviations=variants, positions=14)
     peaks, name = scan.peak_to_peak[:, 0, 0], relief_problem.objective.name
     # a relief of no amount still divides the windows of the contact
     assert found.before[name] == pytest.approx(peaks[0], rel=1e-3)
@@ -169,9 +172,6 @@ def test_descents_find_the_relief_that_a_scan_finds(relief_problem, grids, tmp_p
 
 
 def test_derivatives_are_differences(relief_problem, grids):
-    from femgear.study.minimax import has_derivatives, signals
-    from femgear.study.problem import evaluations
-
     assert has_derivatives(relief_problem)
     with evaluations(relief_problem, cache=grids) as run:
         value, slopes = signals(run, [3.0])
@@ -184,7 +184,6 @@ def test_derivatives_are_differences(relief_problem, grids):
 def test_what_has_no_derivatives(case, relief_problem):
     from dataclasses import replace
 
-    from femgear.study.minimax import has_derivatives
     from femgear.study.objectives import mesh_force
 
     force = mesh_force("1000 rpm", "2000 rpm")
@@ -203,14 +202,16 @@ KILLED = """
     sys.path.insert(0, {tests!r})
     from test_optimisation import CASE, ROSENBROCK, X, Y
     from femgear import read_case
-    from femgear.study import Problem, minimise
+    from femgear.study import Problem, SearchOptions, minimise
 
     def progress(stage, done, total):
         if done == 9:
             os.kill(os.getpid(), 9)
 
-    minimise(Problem(read_case(CASE), [X, Y], ROSENBROCK), method="global", samples=8, generations=2,
-             sensitivity=False, journal={journal!r}, progress=progress)
+    options = SearchOptions(samples=8, generations=2)
+    problem = Problem(read_case(CASE), [X, Y], ROSENBROCK)
+    minimise(problem, method="global", options=options, sensitivity=False,
+             journal={journal!r}, progress=progress)
 """
 
 
@@ -222,7 +223,8 @@ def test_a_killed_search_goes_on_and_repeats_nothing(case, tmp_path):
     assert len(journal.read_bytes().splitlines()) == 1 + 9
     # the last line half written
     journal.write_bytes(journal.read_bytes()[:-20])
-    options = {"method": "global", "samples": 8, "generations": 2, "sensitivity": False}
+    extent = SearchOptions(samples=8, generations=2)
+    options = {"method": "global", "options": extent, "sensitivity": False}
     problem = Problem(case, [X, Y], ROSENBROCK)
     found, alone = minimise(problem, journal=journal, **options), minimise(problem, **options)
     assert found.computed == alone.computed - 8
@@ -254,7 +256,8 @@ def test_searches_pass_over_what_cannot_be_computed(case):
 
 
 def test_a_search_ends_after_so_many_designs(case):
-    found = minimise(Problem(case, [X, Y], ROSENBROCK), method="global", max_designs=7, sensitivity=False)
+    seven = SearchOptions(max_designs=7)
+    found = minimise(Problem(case, [X, Y], ROSENBROCK), method="global", options=seven, sensitivity=False)
     assert found.designs == 7 and not found.converged and "7 designs" in found.message
     assert found.after["Rosenbrock"] == min(found.course)
 
@@ -267,7 +270,8 @@ def test_a_hollow_front_is_found(case, tmp_path):
         function(name, lambda x, y, s=s: 1 - math.exp(-sum((u - s * r) ** 2 for u in scaled(x, y))))
         for name, s in (("one", 1), ("two", -1))
     )
-    problem, options = Problem(case, [X, Y], first), {"points": 5, "samples": 8, "journal": tmp_path / "j"}
+    problem = Problem(case, [X, Y], first)
+    options = {"points": 5, "options": SearchOptions(samples=8), "journal": tmp_path / "j"}
     front = pareto_front(problem, second, **options)
     assert front.complete and len(front.values) >= 6
     assert np.all(np.diff(front.values[:, 0]) > 0) and np.all(np.diff(front.values[:, 1]) < 0)
@@ -391,8 +395,8 @@ def test_results_that_are_no_numbers_are_failures(case):
         (lambda c: Limit(ROSENBROCK), "E-LIMIT", "Rosenbrock"),
         (lambda c: minimise(Problem(c, [X], ROSENBROCK), method="magic"), "E-METHOD", "magic"),
         (lambda c: minimise(Problem(c, [X], ROSENBROCK), start=[2.0]), "E-START", "0.05 to 0.95"),
-        (lambda c: minimise(Problem(c, [X], ROSENBROCK), max_designs=1), "E-RANGE", "max_designs"),
-        (lambda c: minimise(Problem(c, [X], ROSENBROCK), starts=0), "E-RANGE", "starts"),
+        (lambda c: SearchOptions(max_designs=1), "E-RANGE", "max_designs"),
+        (lambda c: SearchOptions(starts=0), "E-RANGE", "starts"),
         (lambda c: pareto_front(Problem(c, [X], ROSENBROCK), X_ALONE, points=1), "E-RANGE", "points"),
         (lambda c: sweep(c, {}, [ROSENBROCK]), "E-SWEEP", "0 cases"),
         (lambda c: sweep(c, {"sun.mass": ["1 mm"]}, [ROSENBROCK]), "E-UNIT", "sun.mass"),
@@ -434,7 +438,8 @@ def test_thousands_of_cases_say_how_long_they_take(case, capsys):
 def test_whole_numbers(case):
     teeth = Variable("housing.points", 40, 60, integer=True)
     parabola = Quantity("parabola", NUMBER, "gears", lambda v: 1.0 + (v.case.housing.points - 47) ** 2)
-    found = minimise(Problem(case, [teeth], parabola), method="global", samples=6, generations=8)
+    options = SearchOptions(samples=6, generations=8)
+    found = minimise(Problem(case, [teeth], parabola), method="global", options=options)
     assert found.values == {"housing.points": 47} and found.after["parabola"] == 1.0
     assert found.tolerances[0].tolerance == 1.0 and found.tolerances[0].more["parabola"] == 2.0
     with pytest.raises(CaseError, match="E-METHOD"):

@@ -2,7 +2,6 @@
 
 import csv
 import os
-import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -68,10 +67,9 @@ def test_a_search_of_the_gears_and_its_continuation(tmp_path):
 )
 def test_bad_input_ends_in_a_message(arguments, message, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(ROOT / "scripts")
+    from optimise import main
     from script_tools import run_script
 
-    main = runpy.run_path(str(ROOT / "scripts" / "optimise.py"))["main"]
     assert run_script(main, arguments=arguments) == 2
     assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -6,20 +6,23 @@ import numpy as np
 import pytest
 
 from femgear.case.case import planetary_set
+from femgear.case.dependencies import Steps, compliance_entries, fingerprint, ring_entries
 from femgear.case.units import SPEED
 from femgear.errors import CaseError
-from femgear.study.names import named_quantity, parse_limit, parse_variable, tip_reliefs
 from femgear.study.objectives import (
+    Variant,
+    at_speeds,
     contact_pressure,
     contact_ratio,
     forces_over_time,
     housing_level,
     mesh_force,
+    named_quantity,
     root_stress,
     tip_thickness,
     transmission_error,
 )
-from femgear.study.variants import Shared, Variant, at_speeds
+from femgear.study.problem import parse_limit, parse_variable, tip_reliefs
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.static.stages import solve_static
@@ -44,11 +47,11 @@ def grids(tmp_path_factory):
 @pytest.fixture(scope="module")
 def reused(coarse, grids):
     """A variant with reliefs that takes compliances and dynamic model from the one without."""
-    shared = Shared(coarse, cache=grids)
-    first = Variant(coarse, shared)
+    steps = Steps()
+    first = Variant(coarse, steps, grids)
     first.response(RANGE)
     changes = {"sun.modifications[0].amount": "5 um", "planet.modifications[0].amount": "5 um"}
-    variant = Variant(with_values(coarse, changes), shared)
+    variant = Variant(with_values(coarse, changes), steps, grids)
     variant.response(RANGE)
     return first, variant
 
@@ -101,8 +104,30 @@ def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
     assert contact_pressure().compute(variant) == data["max_pressure"].values.max()
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"carrier.mass": "4 kg"},
+        {"operation.torque": "90 N m"},
+        {"operation.torque": "-90 N m"},
+        {"ring.foundation_radial": "2e10 N/m^3"},
+        {"static.members": "elastic"},
+        {"dynamics.up_to": "60 kHz"},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_shared_steps_change_no_number(coarse, grids, changes):
+    """A variant that differs in masses, loads or supports, with all that another one left behind."""
+    steps = Steps()
+    Variant(coarse, steps, grids).response(RANGE)
+    case = with_values(coarse, changes)
+    shared, alone = Variant(case, steps, grids), Variant(case, Steps(), grids)
+    np.testing.assert_array_equal(shared.static().cycle.deflection, alone.static().cycle.deflection)
+    np.testing.assert_array_equal(shared.response(RANGE).force, alone.response(RANGE).force)
+
+
 def test_quantities_of_the_gears(coarse):
-    variant = Variant(coarse, Shared(coarse))
+    variant = Variant(coarse, Steps())
     gears = planetary_set(coarse)
     assert contact_ratio("sun-planet").compute(variant) == gears.contact_ratio_sun_planet
     # tooth thickness at the tip after ISO 21771: d_a (s/d + inv a - inv a_a)
@@ -123,19 +148,21 @@ def test_dynamic_part_and_peak_of_a_force():
 
 
 def test_other_geometry_gets_grids_and_models_of_its_own(coarse):
-    from femgear.study.variants import grid_key, model_key
-
     def keys(**changes):
         case = with_values(coarse, {k.replace("__", "."): v for k, v in changes.items()})
-        return grid_key(case) == grid_key(coarse), model_key(case) == model_key(coarse)
+        same = (fingerprint(of(case)) == fingerprint(of(coarse)) for of in (compliance_entries, ring_entries))
+        return tuple(same)
 
     assert keys(sun__profile_shift=0.52680) == (False, False)
     assert keys(material__youngs_modulus="200 GPa") == (False, False)
     assert keys(static__flank_elements=5) == (False, False)
     assert keys(static__members="elastic") == (False, False)
-    assert keys(ring__foundation_radial="2e10 N/m^3") == (False, False)
-    assert keys(carrier__mass="4 kg") == (True, False)
-    assert keys(operation__torque="90 N m") == (True, False)
+    # a ring that is held does not feel its foundation
+    assert keys(ring__foundation_radial="2e10 N/m^3") == (True, False)
+    moving = {"static__members": "elastic", "ring__foundation_radial": "2e10 N/m^3"}
+    assert keys(**moving) == (False, False)
+    assert keys(carrier__mass="4 kg") == (True, True)
+    assert keys(operation__torque="90 N m") == (True, True)
     assert keys(dynamics__damping_ratio=0.03) == (True, True)
     assert keys(static__positions=32, set__backlash="0.1 mm")[0] is False
     assert keys(sun__errors={"thickness_reduction": "1 um"}) == (True, True)
@@ -207,8 +234,8 @@ def test_the_optimum_of_the_page_is_one():
     assert len(values) == 6
     case, _ = tip_reliefs(read_case(CASE))
     case = with_values(case, {"static.positions": 40, "static.stresses": False})
-    shared = Shared(case, cache=grid_cache())
-    before, after = Variant(case, shared), Variant(with_values(case, values), shared)
+    steps, cache = Steps(), grid_cache()
+    before, after = Variant(case, steps, cache), Variant(with_values(case, values), steps, cache)
     for mesh in ("largest", "overall", "sun-planet"):
         ste = transmission_error(mesh)
         assert ste.compute(after) < 0.4 * ste.compute(before)

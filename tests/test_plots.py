@@ -39,9 +39,7 @@ def all_figures():
         "sharing unequal": static_figures.load_sharing(unequal),
         "teeth": static_figures.tooth_loads(static),
         "shapes": elastic_figures.mode_shapes(modes, gears),
-        "frequencies": elastic_figures.natural_frequencies(
-            modes, mesh_frequencies=[("mesh at 250 rpm", 90.0)]
-        ),
+        "frequencies": elastic_figures.natural_frequencies(modes),
         "dte": elastic_figures.transmission_error_period(dynamics, static),
         "dte of four speeds": elastic_figures.transmission_error_period(
             synthetic.dynamics(speeds=np.arange(500, 3000, 500))
@@ -264,7 +262,7 @@ def test_figures_do_without_pyplot():
     drawing = {path for path in package.rglob("*.py") if "matplotlib" in path.read_text(encoding="utf-8")}
     drawing |= set(package.rglob("figures.py"))
     names = [".".join(path.relative_to(package.parent).with_suffix("").parts) for path in sorted(drawing)]
-    assert {"femgear.report.style", "femgear.report.frequency", "femgear.study.figures"} <= set(names)
+    assert {"femgear.report.style", "femgear.report.frequency"} <= set(names)
     assert len([name for name in names if name.startswith("femgear.trains.")]) >= 7
     code = f"import sys, {', '.join(names)}; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from planet_phasing import mesh_force_spectra, resultant_chart
 
 from femgear.gears.phasing import MeshPhasing, phasing_table
-from femgear.trains.static.figures import mesh_force_spectra, phase_diagram, resultant_chart
+from femgear.trains.static.figures import phase_diagram
 
 
 def test_hands_of_the_dials_are_the_phases():

@@ -1,9 +1,16 @@
-"""Entries of the case file on which a result depends, so that no stage takes the result of another case."""
+"""Entries of the case file on which a result depends.
+
+No stage takes the result of another case (`check_entries`), and what many cases have in common is computed
+once (`Steps`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+import hashlib
+import json
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from femgear.errors import CaseError
 
@@ -12,6 +19,9 @@ if TYPE_CHECKING:
 
 Entries = Mapping[str, object]
 """Values by dotted key."""
+Result = TypeVar("Result")
+FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"})
+"""Entries that do nothing but separate flanks: no grid knows them, and derivatives reach them."""
 
 _WORDS = {"format", "title", "housing"}
 """No stage before the housing depends on them."""
@@ -20,6 +30,10 @@ _INERT = {"mass", "inertia", "density"}
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
 _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
 """As the supports, without effect on the static solution while all members are fixed."""
+_SOLUTION = {
+    f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")
+}
+"""How the contact is solved, whatever the grids."""
 
 
 def static_entries(case: Case) -> Entries:
@@ -41,6 +55,11 @@ def static_entries(case: Case) -> Entries:
     }
 
 
+def state_entries(case: Case) -> Entries:
+    """Entries that decide the loaded state of the set on its supports: of the modes, but for dynamics."""
+    return {key: value for key, value in modal_entries(case).items() if not key.startswith("dynamics.")}
+
+
 def modal_entries(case: Case) -> Entries:
     """Entries that decide the modal basis: all but speeds, number of harmonics, tolerance and sensor."""
     left_out = _WORDS | {"operation.speeds", "static.stresses", "static.members"}
@@ -56,6 +75,25 @@ def dynamic_entries(case: Case) -> Entries:
     """Entries that decide the periodic response: all but the sensor."""
     left_out = _WORDS | {"static.stresses", "static.members"}
     return {key: value for key, value in _flat(case.model_dump()) if not _begins(key, left_out)}
+
+
+def compliance_entries(case: Case) -> Entries:
+    """Entries that decide grids and flank compliances: shapes, material, elements, a ring that moves."""
+    fixed = case.static.members == "fixed"
+    return {key: value for key, value in ring_entries(case).items() if not (fixed and key in _FOUNDATION)}
+
+
+def ring_entries(case: Case) -> Entries:
+    """Entries that decide modes and compliances of the ring on its foundation, but for their number."""
+    left_out = _WORDS | _SOLUTION | {"operation", "dynamics", "motor", "brake", "planar", "carrier"}
+    parts = FLANK_ENTRIES | _SUPPORTS | {"mass", "inertia"}
+    return {
+        key: value
+        for key, value in _flat(case.model_dump())
+        if not _begins(key, left_out)
+        and not (key.startswith("helical.") and key != "helical.helix_angle")
+        and parts.isdisjoint(key.split("."))
+    }
 
 
 def check_entries(entries: Entries, case_entries: Entries, result: str) -> None:
@@ -89,6 +127,44 @@ def check_entries(entries: Entries, case_entries: Entries, result: str) -> None:
         limit=f"{_show(entries.get(differ[0]))}, with which the {result} was computed",
         remedy=f"compute the {result} of this case, or take the case that it belongs to",
     )
+
+
+class Steps:
+    """Results of steps that several cases share: the latest few of each step, by the entries it depends on.
+
+    Parameters
+    ----------
+    keep : int
+        Of every step.
+    """
+
+    def __init__(self, *, keep: int = 4):
+        self._keep = keep
+        self._found: dict[str, OrderedDict[str, Any]] = {}
+
+    def take(self, step: str, entries: Entries, compute: Callable[[], Result]) -> Result:
+        """Result of a step for these entries, computed now where it is not kept.
+
+        Parameters
+        ----------
+        step : str
+            Name of what is computed.
+        entries : mapping
+            All that decides it.
+        compute : callable
+        """
+        key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
+        if key not in found:
+            found[key] = compute()
+            if len(found) > self._keep:
+                found.popitem(last=False)
+        found.move_to_end(key)
+        return found[key]
+
+
+def fingerprint(entries: Entries) -> str:
+    """SHA-256 of entries, whatever their order."""
+    return hashlib.sha256(json.dumps(dict(entries), sort_keys=True, default=str).encode()).hexdigest()
 
 
 def _flat(value: object, name: str = "") -> Iterator[tuple[str, object]]:

@@ -303,7 +303,7 @@ class PhasingTable:
         return tuple(found)
 
 
-def phasing_table(phasing: MeshPhasing, harmonics=range(1, 7)) -> PhasingTable:
+def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) -> PhasingTable:
     """Cancellation of resultants and excitation of modes for harmonics of the mesh frequency.
 
     The mesh forces of one harmonic act on sun and ring along directions that turn with psi_n, and at points

@@ -20,12 +20,16 @@ MEMBERS = ("carrier", "ring", "sun")
 
 
 def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
-    """Dataset of entries ``(dims, values, units, long_name)``."""
+    """Dataset of entries ``(dims, values, units, long_name)``; dims are names, or one text with spaces."""
     import xarray as xr
 
     def made(entries):
         return {
-            name: (dims, np.asarray(values), {"units": units, "long_name": words})
+            name: (
+                dims.split() if isinstance(dims, str) else dims,
+                np.asarray(values),
+                {"units": units, "long_name": words},
+            )
             for name, (dims, values, units, words) in entries.items()
         }
 

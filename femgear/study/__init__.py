@@ -4,23 +4,27 @@ Transmission error over torque and relief, load sharing over pin errors and the 
 gears and their compliances; searches, Pareto fronts and sweeps change entries of the case file.
 """
 
-from femgear.study.linearised import LinearContact
-from femgear.study.names import NAMES, named_quantity, parse_limit, parse_variable
+from femgear.study.designs import Tolerance
+from femgear.study.front import ParetoFront, pareto_front
 from femgear.study.objectives import (
+    NAMES,
     Quantity,
     contact_pressure,
     contact_ratio,
     housing_level,
     mesh_force,
+    named_quantity,
     root_stress,
     tip_thickness,
     transmission_error,
 )
-from femgear.study.problem import Limit, Problem
+from femgear.study.problem import Limit, Problem, Variable, parse_limit, parse_variable, tip_reliefs
 from femgear.study.relief import (
+    DesignBasis,
     HarrisMap,
     ReliefGrid,
     ReliefOptimum,
+    design_basis,
     harris_map,
     optimise_relief,
     pin_error,
@@ -32,10 +36,10 @@ from femgear.study.relief import (
     two_pair_length,
     with_tip_relief,
 )
-from femgear.study.search import METHODS, Optimum, ParetoFront, minimise, pareto_front
+from femgear.study.search import METHODS, Optimum, SearchOptions, minimise
 from femgear.study.sensitivity import (
+    LinearContact,
     Sensitivity,
-    Tolerance,
     linearise,
     peak_to_peak_slopes,
     pin_sensitivities,
@@ -51,12 +55,12 @@ from femgear.study.sharing import (
     walked_shares,
 )
 from femgear.study.sweep import Sweep, parse_over, sweep, sweep_into
-from femgear.study.variables import Variable
 from femgear.trains.reading import with_values
 
 __all__ = [
     "METHODS",
     "NAMES",
+    "DesignBasis",
     "HarrisMap",
     "Limit",
     "LinearContact",
@@ -66,6 +70,7 @@ __all__ = [
     "Quantity",
     "ReliefGrid",
     "ReliefOptimum",
+    "SearchOptions",
     "Sensitivity",
     "Sharing",
     "SharingModel",
@@ -74,6 +79,7 @@ __all__ = [
     "Variable",
     "contact_pressure",
     "contact_ratio",
+    "design_basis",
     "harris_map",
     "housing_level",
     "linearise",
@@ -100,6 +106,7 @@ __all__ = [
     "sharing_of_samples",
     "sweep",
     "sweep_into",
+    "tip_reliefs",
     "tip_thickness",
     "tooth_pitch_error",
     "transmission_error",

@@ -1,20 +1,41 @@
-"""What can be minimised or limited: numbers that follow from a case, each from as few stages as it needs."""
+"""What can be minimised or limited: numbers that follow from a case, each from as few stages as it needs.
+
+`Variant` holds the stages of one case, `Quantity` takes a number from them, and `named_quantity` finds it by
+the words of a command line.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from femgear.case.case import planetary_set
+from femgear.case.dependencies import Steps, static_entries
+from femgear.case.sections import Case
 from femgear.case.units import ACCELERATION, SPEED, TORQUE, Dimension, to_si
 from femgear.errors import CaseError
+from femgear.trains.elastic import stages as elastic_stages
+from femgear.trains.reading import with_value
+from femgear.trains.static import stages as static_stages
 
 if TYPE_CHECKING:
-    from femgear.study.variants import Range, Variant
+    from femgear.gears.planetary import PlanetarySet
+    from femgear.system.system import Response
+    from femgear.trains.elastic.results import HousingResult, ModesResult
+    from femgear.trains.static.results import StaticResult, StressResult
 
 Mesh = Literal["largest", "overall", "sun-planet", "planet-ring"]
+MeshKind = Literal["sun-planet", "planet-ring"]
+GearName = Literal["sun", "planet", "ring"]
+Range = tuple[float, float, int]
+"""First and last input speed [rad/s] and number of speeds."""
+Speeds = tuple[str, str]
+"""First and last speed of the input, with their units."""
 MICROMETRES = Dimension("a length", "m", "um", 1e-6)
 FORCE = Dimension("a force", "N", "N", 1.0)
 LEVEL = ACCELERATION
@@ -22,6 +43,105 @@ STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
 NUMBER = Dimension("a number", "1", "1", 1.0)
 STAGES = ("gears", "static", "stress", "dynamics", "housing")
 """In the order of their effort."""
+
+
+class Variant:
+    """The stages of one case, each computed when it is first asked for.
+
+    Parameters
+    ----------
+    case : Case
+    steps : Steps
+        What variants of a case share: flank compliances, static solutions, loaded states, ring models.
+    cache : path, optional
+        Folder of generated grids.
+    """
+
+    def __init__(self, case: Case, steps: Steps, cache: Path | None = None):
+        self.case, self._steps, self._cache = case, steps, cache
+        self._found: dict[tuple, Any] = {}
+
+    def _once(self, *key, compute: Callable[[], Any]):
+        """What was found under a key, else computed now."""
+        if key not in self._found:
+            self._found[key] = compute()
+        return self._found[key]
+
+    @cached_property
+    def gears(self) -> PlanetarySet:
+        """Gears, closed and checked."""
+        return planetary_set(self.case)
+
+    def static(self, torque: float | None = None) -> StaticResult:
+        """Static solution under a torque on the input [N m], by default that of the case."""
+        case, steps = self.case, self._steps
+        if torque is not None and torque != case.operation.torque:
+            case = with_value(case, "operation.torque", f"{torque!r} N m")
+
+        def compute():
+            entries = {**static_entries(case), "static.stresses": case.static.stresses}
+            return steps.take(
+                "static", entries, lambda: static_stages.solve_static(case, cache=self._cache, steps=steps)
+            )
+
+        return self._once("static", case.operation.torque, compute=compute)
+
+    def stress(self) -> StressResult:
+        """Root stresses under the torque of the case."""
+        return self._once("stress", compute=lambda: static_stages.solve_stress(self.case, self.static()))
+
+    def response(self, speeds: Range) -> Response:
+        """Periodic response at a range of speeds, without the verdict on its stability."""
+        return self._once(
+            "response", speeds, compute=lambda: elastic_stages.solve_response(*self._modes(speeds))
+        )
+
+    def housing(self, speeds: Range) -> HousingResult:
+        """What the sensor on the ring hears at a range of speeds."""
+
+        def compute():
+            case, modes = self._modes(speeds)
+            return elastic_stages.solve_housing(
+                case, elastic_stages.solve_dynamics(case, self.static(), modes)
+            )
+
+        return self._once("housing", speeds, compute=compute)
+
+    def _modes(self, speeds: Range) -> tuple[Case, ModesResult]:
+        """The case at a range of speeds, and its modal basis."""
+
+        def compute():
+            case = at_speeds(self.case, speeds)
+            return case, elastic_stages.solve_modes(case, self.static(), steps=self._steps)
+
+        return self._once("modes", speeds, compute=compute)
+
+
+def at_speeds(case: Case, speeds: Range) -> Case:
+    """The case at equidistant speeds of the input, its published lines left out.
+
+    Raises
+    ------
+    CaseError
+        E-STAGE: a planar or helical case, which has no elastic ring.
+    """
+    need_elastic_ring(case, "mesh forces over speed and housing levels need")
+    first, last, count = speeds
+    low, high = (f"{value / SPEED.scale:.12g} rpm" for value in (first, last))
+    case = with_value(case, "housing.published", None)
+    return with_value(case, "operation.speeds", {"from": low, "to": high, "count": count})
+
+
+def need_elastic_ring(case: Case, subject: str) -> None:
+    """Refuse a planar or helical case (E-STAGE); the subject with its verb begins the message."""
+    other = [name for name in ("planar", "helical") if getattr(case, name, None) is not None]
+    if other:
+        raise CaseError(
+            f"{subject} a case with an elastic ring",
+            code="E-STAGE",
+            key=other[0],
+            limit="transmission error, contact ratio, tip thickness, contact pressure, root stress",
+        )
 
 
 @dataclass(frozen=True)
@@ -155,12 +275,12 @@ def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
     harmonics = force.shape[-1]
     padded = np.zeros((*force.shape[:2], 8 * harmonics + 1), complex)
     padded[..., :harmonics] = force
-    padded[..., 0] = 2.0 * force[..., 0].real
+    padded[..., 0] = 2.0 * np.real(force[..., 0])
     samples = 16 * harmonics
     history = np.fft.irfft(padded, samples, axis=-1) * (0.5 * samples)
     if not dynamic:
         return history.max(axis=-1)
-    return np.abs(history - force[..., :1].real).max(axis=-1)
+    return np.abs(history - np.real(force[..., :1])).max(axis=-1)
 
 
 def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
@@ -176,18 +296,18 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     return Quantity(f"housing level, {_words(at)}", LEVEL, "housing", compute)
 
 
-def contact_ratio(mesh: Literal["sun-planet", "planet-ring"]) -> Quantity:
+def contact_ratio(mesh: MeshKind) -> Quantity:
     """Transverse contact ratio, from the tip circles."""
     names = {"sun-planet": "contact_ratio_sun_planet", "planet-ring": "contact_ratio_planet_ring"}
     name = _chosen(mesh, names, "mesh")
     return Quantity(f"contact ratio, {mesh}", NUMBER, "gears", lambda v: float(getattr(v.gears, name)))
 
 
-def tip_thickness(gear: Literal["sun", "planet", "ring"]) -> Quantity:
+def tip_thickness(gear: GearName) -> Quantity:
     """Thickness of the teeth on the tip circle, in modules."""
     from femgear.gears.gear import tooth_thickness
 
-    name = _chosen(gear, {g: g for g in ("sun", "planet", "ring")}, "gear")
+    name = _chosen(gear, {g: g for g in get_args(GearName)}, "gear")
 
     def compute(variant: Variant) -> float:
         found = getattr(variant.gears, name)
@@ -203,7 +323,7 @@ def contact_pressure() -> Quantity:
     )
 
 
-def root_stress(gear: Literal["sun", "planet", "ring"]) -> Quantity:
+def root_stress(gear: GearName) -> Quantity:
     """Largest stress in the roots of a gear [Pa], of a planet in both its meshes."""
     from femgear.contact.root_stress import LOADED
 
@@ -246,3 +366,56 @@ def _range(first: str, last: str, count: int) -> Range:
 def _words(at: Range) -> str:
     """A range of speeds in the name of a quantity."""
     return f"{at[0] / SPEED.scale:.6g} to {SPEED.show(at[1])} ({at[2]} speeds)"
+
+
+_WORDS: dict[str, Callable[[str | None, Speeds | None], Quantity]] = {
+    "ste": lambda torque, _: transmission_error("largest", torque=torque),
+    "ste overall": lambda torque, _: transmission_error("overall", torque=torque),
+    "ste sun-planet": lambda torque, _: transmission_error("sun-planet", torque=torque),
+    "ste planet-ring": lambda torque, _: transmission_error("planet-ring", torque=torque),
+    "mesh force": lambda _, speeds: mesh_force(*_given(speeds, "mesh force")),
+    "peak mesh force": lambda _, speeds: mesh_force(*_given(speeds, "peak mesh force"), part="peak"),
+    "housing": lambda _, speeds: housing_level(*_given(speeds, "housing")),
+    **{f"contact ratio {mesh}": lambda *_, mesh=mesh: contact_ratio(mesh) for mesh in get_args(MeshKind)},
+    **{f"tip thickness {gear}": lambda *_, gear=gear: tip_thickness(gear) for gear in get_args(GearName)},
+    "contact pressure": lambda *_: contact_pressure(),
+    **{f"root stress {gear}": lambda *_, gear=gear: root_stress(gear) for gear in get_args(GearName)},
+}
+NAMES = tuple(_WORDS)
+
+
+def named_quantity(words: str, *, torque: str | None = None, speeds: Speeds | None = None) -> Quantity:
+    """Quantity of some words, one of `NAMES`.
+
+    Parameters
+    ----------
+    words : str
+    torque : str, optional
+        Of transmission errors, on the input; that of the case when left out.
+    speeds : (str, str), optional
+        First and last speed of the input, for mesh forces and housing levels.
+
+    Raises
+    ------
+    CaseError
+        E-OBJECTIVE: no such quantity, or no speeds for one that needs them.
+    """
+    try:
+        make = _WORDS[" ".join(words.split()).lower()]
+    except KeyError:
+        raise CaseError(
+            "no such quantity", code="E-OBJECTIVE", key="objective", value=words, limit=", ".join(NAMES)
+        ) from None
+    return make(torque, speeds)
+
+
+def _given(speeds: Speeds | None, words: str) -> Speeds:
+    """The speeds, refused where they are left out."""
+    if speeds is None:
+        raise CaseError(
+            f"{words} is found over a range of speeds",
+            code="E-OBJECTIVE",
+            key="speeds",
+            remedy='give two speeds of the input, "1000 rpm" and "3500 rpm"',
+        )
+    return speeds

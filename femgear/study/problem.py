@@ -1,33 +1,240 @@
-"""A problem of optimisation, and the numbers of its designs, each computed once and kept in a journal.
+"""A problem of optimisation: design variables, the objective, and limits.
 
-`Problem` says what to minimise within which limits, `Designs` computes quantities of points of the design
-space, `Evaluations` turns them into the costs that a search sees.
+A `Variable` is an entry of the case file with bounds in its unit, a `Limit` bounds a quantity, and `Problem`
+says what to minimise by changing what. `parse_variable` and `parse_limit` read them from the words of a
+command line; `tip_reliefs` makes variables of the reliefs of all loaded flanks.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from pathlib import Path
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from femgear.case import text as case_text
+from femgear.case.case import planetary_set
 from femgear.case.sections import Case
-from femgear.errors import CaseError, ContactError, FemgearError, StorageError
-from femgear.study.objectives import STAGES, Quantity
-from femgear.study.variables import Variable, check_variables
-from femgear.study.variants import Journal, Shared, Variant, open_journal
-from femgear.trains.protocol import Progress
+from femgear.case.units import LENGTH, Dimension, to_si
+from femgear.errors import CaseError
+from femgear.gears.kinematics import torques
+from femgear.study.objectives import NUMBER, Quantity, named_quantity
 from femgear.trains.reading import with_values
 
+Vector = Sequence[float] | np.ndarray
+"""Values of the design variables in their units, (n,)."""
 Point = tuple[object, ...]
 """Values of the design variables as the case file holds them; empty for the case as it is."""
-OUTSIDE, _REFUSED = 1e6, 1e9
-"""Costs from which designs lie outside the limits, and of those that cannot be computed."""
+DEFAULT_TOLERANCE = 0.1
+"""Over the range of the variable."""
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+_DIGITS = 9
+_LATEST_START = 0.93
+"""Of a relief, over the height from the pitch circle to the tip: later ones are chamfers."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One design variable.
+
+    Parameters
+    ----------
+    key : str or sequence of str
+        Dotted key of the case file, as `femgear.with_value` takes it; of several all get the same value.
+    low, high : str, float or int
+        Bounds, as the case file would hold them: ``"0 um"`` and ``"40 um"``, or numbers without dimension.
+    tolerance : str or float, optional
+        What the value may be off by when the part is made, with its unit or as ``"10 %"`` of the value; the
+        sensitivity of an optimum is what it costs. A tenth of the range when left out.
+    integer : bool
+        Whole numbers only, as numbers of teeth.
+
+    Raises
+    ------
+    CaseError
+        E-VARIABLE: bounds that are no numbers or in the wrong order; E-UNIT: units that do not match.
+    """
+
+    key: str | Sequence[str]
+    low: str | float
+    high: str | float
+    tolerance: str | float | None = None
+    integer: bool = False
+
+    def __post_init__(self):
+        keys = (self.key,) if isinstance(self.key, str) else tuple(self.key)
+        object.__setattr__(self, "key", keys)
+        if not keys:
+            raise CaseError("a design variable needs a key", code="E-VARIABLE", remedy='"sun.profile_shift"')
+        self._check_units()
+        low, high = self.bounds
+        if not low < high:
+            raise CaseError(
+                "the bounds of a design variable are in the wrong order",
+                code="E-VARIABLE",
+                key=self.name,
+                value=f"{self.low} to {self.high}",
+                limit="low < high",
+            )
+        if self.integer and (self.unit or low != round(low) or high != round(high)):
+            raise CaseError(
+                "bounds of whole numbers are whole numbers",
+                code="E-VARIABLE",
+                key=self.name,
+                value=f"{self.low} to {self.high}",
+            )
+        if not self.tolerance_at(high) > 0:
+            raise CaseError("a tolerance is over 0", code="E-VARIABLE", key=self.name, value=self.tolerance)
+
+    def _check_units(self) -> None:
+        """Refuse bounds of which one has a unit."""
+        (_, first), (_, second) = (split(bound, self.name) for bound in (self.low, self.high))
+        if bool(first) != bool(second):
+            unit = first or second
+            low, high = (
+                bound if has else f"{bound} {unit}" for bound, has in ((self.low, first), (self.high, second))
+            )
+            raise CaseError(
+                "one bound has a unit and the other has none", code="E-UNIT", key=self.name,
+                value=f"{self.low}..{self.high}", limit="the same kind of unit at both bounds",
+                remedy=f'write "{low}..{high}"',
+            )  # fmt: skip
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Dotted keys that get the value."""
+        return tuple(self.key)
+
+    @property
+    def name(self) -> str:
+        """Its keys as one text."""
+        return " = ".join(self.keys)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the lower bound; empty for a number."""
+        return split(self.low, self.name)[1]
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Both bounds in `unit`."""
+        return split(self.low, self.name)[0], self.number(self.high)
+
+    def number(self, value: object) -> float:
+        """A value as the case file holds it, as a number in `unit`.
+
+        Raises
+        ------
+        CaseError
+            E-UNIT: a unit of another dimension, or none.
+        """
+        number, unit = split(value, self.name)
+        if unit == self.unit:
+            return number
+        if not (unit and self.unit):
+            raise CaseError(
+                "values of a design variable have one unit",
+                code="E-UNIT",
+                key=self.name,
+                value=value,
+                limit=f"a number with {self.unit}" if self.unit else "a number without unit",
+            )
+        try:
+            return to_si(str(value), Dimension("a value", self.unit, self.unit, 1.0))
+        except CaseError as error:
+            error.key = self.name
+            raise
+
+    def text(self, number: float) -> str | float | int:
+        """A number in `unit` as the case file holds it, with nine digits."""
+        if self.integer:
+            return round(number)
+        rounded = float(f"{number:.{_DIGITS}g}") + 0.0
+        return f"{rounded:.{_DIGITS}g} {self.unit}" if self.unit else rounded
+
+    def tolerance_at(self, number: float) -> float:
+        """Tolerance in `unit` at a value; 1 of whole numbers."""
+        given, (low, high) = self.tolerance, self.bounds
+        if self.integer:
+            return 1.0
+        if given is None:
+            return DEFAULT_TOLERANCE * (high - low)
+        if isinstance(given, str) and given.strip().endswith("%"):
+            share = split(given.strip()[:-1], self.name)[0] / 100.0
+            # a share of nothing would be no tolerance
+            return share * (abs(number) or high - low)
+        return self.number(given)
+
+
+def split(value: object, key: str) -> tuple[float, str]:
+    """Number and unit of a value as the case file holds it; CaseError (E-VARIABLE) where it is no number."""
+    if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
+        number, unit = float(value), ""
+    else:
+        match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+        number, unit = (float(match[1]), match[2]) if match else (np.nan, "")
+    if not np.isfinite(number):
+        raise CaseError(
+            "not a number with a unit",
+            code="E-VARIABLE",
+            key=key,
+            value=value,
+            limit='as in "40 um", or 0.5 for an entry without dimension',
+        )
+    return number, unit
+
+
+def current(case: Case, variable: Variable) -> float | None:
+    """Value that the case has now, in the unit of the variable; None where its file leaves the entry out."""
+    table: Any = case_text.parse(case.source, case.name)
+    for part in re.findall(r"\[(\d+)\]|([^.\[\]]+)", variable.keys[0]):
+        try:
+            table = table[int(part[0])] if part[0] else table[part[1]]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return variable.number(table)
+
+
+def start_point(case: Case, variables: Sequence[Variable]) -> np.ndarray:
+    """Values that the case has now, within the bounds; the middle for entries that it leaves out."""
+    found = []
+    for variable in variables:
+        low, high = variable.bounds
+        value = current(case, variable)
+        found.append(0.5 * (low + high) if value is None else min(max(value, low), high))
+    return np.array(found)
+
+
+def check_variables(case: Case, variables: Sequence[Variable]) -> None:
+    """Refuse variables that the case file does not know, or whose bounds it refuses.
+
+    Raises
+    ------
+    CaseError
+        E-VARIABLE: none, or one key twice; what `femgear.with_value` refuses.
+    """
+    keys = [key for variable in variables for key in variable.keys]
+    twice = sorted({key for key in keys if keys.count(key) > 1})
+    if not keys or twice:
+        raise CaseError(
+            f"{', '.join(twice)} is given twice" if twice else "an optimisation needs a design variable",
+            code="E-VARIABLE",
+            key=twice[0] if twice else None,
+            limit="each entry of the case file once",
+        )
+    for variable in variables:
+        for bound in variable.bounds:
+            try:
+                with_values(case, dict.fromkeys(variable.keys, variable.text(bound)))
+            except CaseError as error:
+                if error.code == "E-KEY" and error.message.endswith("is not a list"):
+                    # entries of a list can only be varied where the file has them
+                    entry = variable.name.split("[")[0]
+                    error.remedy = f"give the case a table [[{entry}]] for every entry that is varied"
+                raise
 
 
 @dataclass(frozen=True)
@@ -113,260 +320,120 @@ class Problem:
         """Bounds in the units of the variables, (n, 2)."""
         return np.array([variable.bounds for variable in self.variables])
 
-    def point(self, x: Sequence[float]) -> tuple[str | float | int, ...]:
+    def point(self, x: Vector) -> tuple[str | float | int, ...]:
         """Values of the variables as the case file holds them."""
         return tuple(variable.text(float(value)) for variable, value in zip(self.variables, x, strict=True))
 
 
-class Failure(Exception):
-    """A design that cannot be computed; ``error`` holds code, key and message of the refusal."""
+def parse_limit(text: str, **options) -> Limit:
+    """Limit of words such as ``"root stress sun <= 300 MPa"``; options as for `named_quantity`.
 
-    def __init__(self, error: dict):
-        super().__init__(error["message"])
-        self.error = error
-
-
-class Designs:
-    """Quantities of designs; use `open_designs`.
-
-    Attributes
-    ----------
-    case : Case
-    journal : Journal
-    seconds : float
-        What the designs computed now took, all together.
+    Raises
+    ------
+    CaseError
+        E-LIMIT: no such text; E-OBJECTIVE; E-UNIT.
     """
-
-    def __init__(self, case: Case, keys, journal: Journal, *, cache: Path | None, progress: Progress | None):
-        self.case, self.journal = case, journal
-        self.seconds = 0.0
-        self._computed: set[str] = set()
-        self._keys = keys
-        self._shared = Shared(case, cache=cache)
-        self._progress = progress
-        self._last: tuple[str, Variant] | None = None
-
-    @property
-    def computed(self) -> int:
-        """Designs computed now, without those that the journal held."""
-        return len(self._computed)
-
-    @property
-    def failures(self) -> list[tuple[Point, dict]]:
-        """Points that could not be computed, and why."""
-        return [
-            (tuple(json.loads(key)), record["error"])
-            for key, record in self.journal.items()
-            if key.startswith("[") and "error" in record
-        ]
-
-    def at(self, point: Point) -> Case:
-        """The case at a point."""
-        if not point:
-            return self.case
-        pairs = zip(self._keys, point, strict=True)
-        return with_values(self.case, {key: value for keys, value in pairs for key in keys})
-
-    def variant(self, point: Point) -> Variant:
-        """The stages of a point; those of the last one are kept for further questions."""
-        key = json.dumps(point)
-        if self._last is None or self._last[0] != key:
-            self._last = key, Variant(self.at(point), self._shared)
-        return self._last[1]
-
-    def values(self, point: Point, quantities: Sequence[Quantity]) -> dict[str, float]:
-        """Quantities at a point, by name, in SI units.
-
-        Raises
-        ------
-        Failure
-            The design cannot be computed, now or when it was tried before.
-        FemgearError
-            The case as it is cannot be computed.
-        """
-        key = json.dumps(point)
-        record = self.journal.get(key) or {"values": {}}
-        missing = [q for q in quantities if q.name not in record["values"]]
-        # what was known before it failed still holds
-        if missing and "error" not in record:
-            record = self._compute(key, point, missing, record["values"])
-            missing = [q for q in missing if q.name not in record["values"]]
-        if missing:
-            raise Failure(record["error"])
-        return {q.name: record["values"][q.name] for q in quantities}
-
-    def _compute(self, key: str, point: Point, missing: Sequence[Quantity], known: dict) -> dict:
-        """Record of a point with the missing quantities, or with the reason why it has none."""
-        start, found = time.perf_counter(), dict(known)
-        record: dict = {"values": found}
-        try:
-            variant = self.variant(point)
-            for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
-                found[quantity.name] = _finite(quantity, quantity.compute(variant))
-        except StorageError:
-            raise
-        except FemgearError as error:
-            if not point:
-                raise
-            record["error"] = {"code": error.code, "key": error.key, "message": error.message}
-        seconds = time.perf_counter() - start
-        self.seconds += seconds
-        self._computed.add(key)
-        self.journal.add(key, record | {"seconds": round(seconds, 3)})
-        if self._progress is not None:
-            self._progress("designs", self.computed, self.computed + 1)
-        return record
+    match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text, re.DOTALL)
+    if not match:
+        example = '"contact ratio sun-planet >= 1.3" or "root stress sun <= 300 MPa"'
+        raise CaseError("not a limit", code="E-LIMIT", key="--limit", value=text, limit=example)
+    quantity = named_quantity(match[1], **options)
+    if quantity.dimension is NUMBER:
+        bound = _number(match[3])
+        if not isinstance(bound, float):
+            raise CaseError("not a number", code="E-LIMIT", key="--limit", value=text)
+    else:
+        bound = to_si(match[3], quantity.dimension)
+    return Limit(quantity, low=bound) if match[2] == ">=" else Limit(quantity, high=bound)
 
 
-def _finite(quantity: Quantity, value: float) -> float:
-    """The value, refused where it is no number."""
-    if not math.isfinite(value):
-        raise ContactError(f"{quantity.name} is not finite", code="E-FINITE", value=value)
-    return value
+def parse_variable(text: str) -> Variable:
+    """Variable of ``KEY=LOW..HIGH`` or ``KEY=LOW..HIGH +- TOLERANCE``.
+
+    Raises
+    ------
+    CaseError
+        E-VARIABLE, E-UNIT.
+    """
+    match = re.fullmatch(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*(?:\+-\s*(.+?)\s*)?", text, re.DOTALL)
+    if not match:
+        raise CaseError(
+            "not a design variable",
+            code="E-VARIABLE",
+            key="--vary",
+            value=text,
+            limit="KEY=LOW..HIGH or KEY=LOW..HIGH +- TOLERANCE",
+            remedy='--vary "sun.modifications[0].amount=0 um..15 um +- 1 um"',
+        )
+    key, low, high, tolerance = match.groups()
+    low, high = (_number(value) for value in (low, high))
+    return Variable(key, low, high, tolerance=_number(tolerance) if tolerance else None)
 
 
-@contextmanager
-def open_designs(
-    case: Case,
-    keys: Sequence[tuple[str, ...]],
-    *,
-    journal: str | Path | None = None,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-) -> Iterator[Designs]:
-    """Designs of a case, with a journal on disk where one is named.
+def _number(text: str) -> str | float:
+    """A number without unit as a number."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def tip_reliefs(
+    case: Case, *, largest: str | None = None, tolerance: str = "1 um", places: str = "0.1 mm"
+) -> tuple[Case, tuple[Variable, ...]]:
+    """The case with one more linear tip relief on every loaded flank; amounts and starts are the variables.
+
+    Sun and ring have one each, planets one for the flank that touches the sun and one for that which touches
+    the ring. The amounts are zero, so that the case computes as before. Starts lie between the pitch circle
+    and near the tip.
 
     Parameters
     ----------
     case : Case
-    keys : sequence of tuple of str
-        Entries of the case file that every value of a point sets.
-    journal : path-like, optional
-        File of the records; an interrupted search goes on from them.
-    cache : path, optional
-        Folder of generated grids; only those of the case itself are kept.
-    progress : callable, optional
-        Called with (stage, done, total).
+        Its modifications stay.
+    largest : str, optional
+        Largest amount, with its unit; a hundredth of the module when left out.
+    tolerance, places : str
+        Tolerances of amounts and of diameters.
 
     Raises
     ------
-    StorageError
-        See `variants.open_journal`.
+    CaseError
+        E-RANGE: a largest amount that is not over 0 and at most 0.2 modules.
     """
-    with open_journal(journal, case, tuple(" = ".join(names) for names in keys)) as records:
-        yield Designs(case, tuple(keys), records, cache=cache, progress=progress)
+    gears = planetary_set(case)
+    most = 0.01 * case.sun.module if largest is None else to_si(largest, LENGTH)
+    if not 0 < most <= 0.2 * case.sun.module:
+        limit = f"over 0 to 0.2 modules, {0.2e6 * case.sun.module:.6g} um"
+        raise CaseError("not a plausible relief", code="E-RANGE", key="largest", value=largest, limit=limit)
+    back = torques(gears, member=case.operation.input, torque=case.operation.torque).sun < 0
+    sides = ("ring side", "sun side") if back else ("sun side", "ring side")
+    sun, planet, ring = gears.sun, gears.planet, gears.ring
+    ratio = gears.centre_distance / (sun.teeth + planet.teeth)
+    inner = gears.centre_distance / (ring.teeth - planet.teeth)
+    # pitch radii of both meshes
+    flanks = (
+        (sun, "", ratio * sun.teeth),
+        (planet, sides[0], ratio * planet.teeth),
+        (planet, sides[1], inner * planet.teeth),
+        (ring, "", inner * ring.teeth),
+    )
+    variables: list[Variable] = []
+    for gear, side, pitch in flanks:
+        number = len(getattr(case, gear.name).modifications)
+        first, last = pitch, pitch + _LATEST_START * (gear.tip_radius - pitch)
+        low, high = (f"{2e3 * radius:.6g} mm" for radius in sorted((first, last)))
+        table = {"kind": "tip relief", "amount": "0 um", "start_diameter": f"{1e3 * (first + last):.6g} mm"}
+        table |= {"flank": side} if side else {}
+        case = with_values(case, {f"{gear.name}.modifications": [*_tables(case, gear.name), table]})
+        key = f"{gear.name}.modifications[{number}]"
+        variables += [
+            Variable(f"{key}.amount", "0 um", f"{1e6 * most:.6g} um", tolerance=tolerance),
+            Variable(f"{key}.start_diameter", low, high, tolerance=places),
+        ]
+    return case, tuple(variables)
 
 
-class Enough(Exception):
-    """The search has asked for as many designs as it may."""
-
-
-class Evaluations:
-    """Costs of designs as a search sees them; use `evaluations`.
-
-    Attributes
-    ----------
-    problem : Problem
-    designs : Designs
-    best : (x, cost) or None
-        The best point of the objective so far.
-    course : list of float
-        Objective [SI] of every different point of `cost`; NaN outside the limits.
-    """
-
-    def __init__(self, problem: Problem, designs: Designs, *, max_designs: int | None = None):
-        self.problem, self.designs = problem, designs
-        self.best: tuple[np.ndarray, float] | None = None
-        self.course: list[float] = []
-        # a dict keeps their order
-        self._asked: dict[tuple, None] = {}
-        self._most = max_designs
-
-    def towards(self, objective: Quantity) -> Evaluations:
-        """The same designs, counted together, under another objective."""
-        found = Evaluations(replace(self.problem, objective=objective), self.designs, max_designs=self._most)
-        found._asked = self._asked
-        return found
-
-    @property
-    def asked(self) -> int:
-        """Different points that were asked for, whether the journal held them or not."""
-        return len(self._asked)
-
-    @property
-    def asked_points(self) -> list[tuple]:
-        """These points but for the case as it is, in their order."""
-        return [point for point in self._asked if point]
-
-    def values(self, x: Sequence[float] | None, quantities: Sequence[Quantity]) -> dict[str, float]:
-        """Quantities at a point in the units of the variables, or of the case as it is; see `Designs`."""
-        point = () if x is None else self.problem.point(x)
-        self._asked[point] = None
-        return self.designs.values(point, quantities)
-
-    def cost(self, x: Sequence[float]) -> float:
-        """The objective over that of the case; designs outside the limits cost a million and more.
-
-        Limits are looked at first, those from the fewest stages before the others: the objective of a design
-        outside them is not computed (feasible designs before others, by violation: K. Deb, Comput. Methods
-        Appl. Mech. Engrg. 186, 2000, 311-338). What cannot be computed costs a thousand times more.
-
-        Raises
-        ------
-        Enough
-            All designs that the search was given have been asked for.
-        """
-        new = self.count(x)
-        objective, scale = self.problem.objective, self.scale(self.problem.objective)
-        found = self.penalised(x, lambda: self.values(x, [objective])[objective.name] / scale)
-        if new:
-            self.course.append(found * scale if found < OUTSIDE else math.nan)
-        if self.best is None or found < self.best[1]:
-            self.best = np.array(x, float), found
-        return found
-
-    def count(self, x: Sequence[float]) -> bool:
-        """Note that a point is asked for, and say whether it is new; may raise `Enough`."""
-        point = self.problem.point(x)
-        new = point not in self._asked
-        if self._most is not None and new and self.asked >= self._most:
-            raise Enough
-        self._asked[point] = None
-        return new
-
-    def penalised(self, x: Sequence[float], value) -> float:
-        """``value()`` of a design within the limits, and the costs that `cost` names elsewhere."""
-        try:
-            outside = self.violation(x)
-            return min(OUTSIDE + outside, 0.5 * _REFUSED) if outside else value()
-        except Failure:
-            return _REFUSED
-
-    def violation(self, x: Sequence[float]) -> float:
-        """Sum of the violations of the limits, of the first stage that breaks any. May raise `Failure`."""
-        for stage in STAGES:
-            here = [limit for limit in self.problem.limits if limit.quantity.stage == stage]
-            values = self.values(x, [limit.quantity for limit in here]) if here else {}
-            total = sum(limit.violation(values[limit.quantity.name]) for limit in here)
-            if total:
-                return total
-        return 0.0
-
-    def scale(self, quantity: Quantity) -> float:
-        """Value of the case as it is, by which costs are divided; 1 where it is zero."""
-        return abs(self.values(None, [quantity])[quantity.name]) or 1.0
-
-
-@contextmanager
-def evaluations(
-    problem: Problem,
-    *,
-    journal: str | Path | None = None,
-    cache: Path | None = None,
-    max_designs: int | None = None,
-    progress: Progress | None = None,
-) -> Iterator[Evaluations]:
-    """Evaluations of a problem; parameters as for `open_designs`."""
-    keys = [variable.key for variable in problem.variables]
-    with open_designs(problem.case, keys, journal=journal, cache=cache, progress=progress) as designs:
-        yield Evaluations(problem, designs, max_designs=max_designs)
+def _tables(case: Case, gear: str) -> list:
+    """Modifications of a gear as its file holds them."""
+    return case_text.parse(case.source, case.name)[gear].get("modifications", [])

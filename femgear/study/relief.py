@@ -3,7 +3,8 @@
 A relief takes off the tips what the teeth bend under one torque, and the transmission error is then nearly
 constant under that torque (S. L. Harris, "Dynamic loads on the teeth of spur gears", Proc. IMechE 172, 1958).
 `harris_map` computes it over torque, `relief_grid` over amount and length of the relief, `optimise_relief`
-finds the least peak to peak at one torque and says whether it is a minimum.
+finds the least peak to peak at one torque and says whether it is a minimum. All of them start from
+`design_basis`: what the variants of a design share.
 
 Amount, length, pin and pitch errors are parameters of the deviations as well: functions of one number that
 return deviations, for `femgear.study.sensitivity`.
@@ -11,21 +12,27 @@ return deviations, for `femgear.study.sensitivity`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from femgear.case.case import planetary_set, set_deviations
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
+from femgear.gears.kinematics import torques
 from femgear.gears.modifications import FlankForm, TipRelief
 from femgear.threads import one_blas_thread
+from femgear.trains.static.stages import flank_compliances, static_supports
 
 if TYPE_CHECKING:
+    from femgear.case.sections import Case
     from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
 
@@ -37,6 +44,65 @@ SMALLEST_GAIN = 1e-4
 """Gain [um] under which a neighbour counts as no better."""
 Parameter = Callable[[float], SetDeviations]
 """Deviations for a value of one parameter."""
+
+
+@dataclass(frozen=True, eq=False)
+class DesignBasis:
+    """What all variants of a design share.
+
+    Parameters
+    ----------
+    gears : PlanetarySet
+    bodies : Bodies
+        Flank compliances; they serve all mesh cycles.
+    supports : Supports
+        Members whose axes move; by default all are fixed.
+    deviations : SetDeviations, optional
+        That the variants add to; None for ideal gears.
+    """
+
+    gears: PlanetarySet
+    bodies: Bodies
+    supports: Supports = RIGID
+    deviations: SetDeviations | None = None
+
+    def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
+        """The set as it is solved, mirrored under a negative torque, and its planets by number, (N,)."""
+        gears, order, deviations = loaded_image(self.gears, sun_torque, self.deviations)
+        return replace(self, gears=gears, deviations=deviations), order
+
+
+@one_blas_thread()
+def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
+    """Gears, compliances, deviations, and supports as the static problem of a case has them.
+
+    Parameters
+    ----------
+    case : Case
+    cache : path, optional
+        Folder of generated grids.
+
+    Raises
+    ------
+    GeometryError, GridError
+    """
+    gears, deviations = planetary_set(case), set_deviations(case)
+    bodies = flank_compliances(case, gears, cache=cache)[1]
+    return DesignBasis(gears, bodies, static_supports(case), None if deviations.ideal else deviations)
+
+
+def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:
+    """Torque on the sun [N m] under a torque on the input of the case, by default that of the case.
+
+    Raises
+    ------
+    CaseError
+        E-TORQUE: without torque there is nothing to design for.
+    """
+    value = case.operation.torque if torque is None else torque
+    if value == 0:
+        raise CaseError("without torque no tooth bends", code="E-TORQUE", key="operation.torque")
+    return torques(gears, member=case.operation.input, torque=value).sun
 
 
 def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[float, float]:
@@ -110,6 +176,19 @@ def with_tip_relief(
     new = {"sun": TipRelief(amount, sun, power=power), side: TipRelief(amount, planet, power=power)}
     forms = {n: FlankForm((*getattr(found, n).modifications, relief)) for n, relief in new.items()}
     return replace(found, **forms)
+
+
+def relief_snippet(gears: PlanetarySet, *, amount: float, length: float, power: float, back: bool) -> str:
+    """Tables of a case file for the tip relief of `relief.with_tip_relief`, to be pasted at its end."""
+    side = "ring side" if back else "sun side"
+    lines = []
+    for gear, start, flank in zip((gears.sun, gears.planet), relief_starts(gears, length=length), ("", side)):
+        lines += [f"[[{gear.name}.modifications]]", 'kind = "tip relief"']
+        lines += [f'flank = "{flank}"'] if flank else []
+        diameter = 2e3 * math.hypot(start, gear.base_radius)
+        lines += [f'amount = "{amount * 1e6:.3f} um"', f'start_diameter = "{diameter:.5f} mm"']
+        lines += [f"power = {power:g}", ""]
+    return "\n".join(lines)
 
 
 def relief_amount(deviations, planetary_set: PlanetarySet, *, length: float, **options) -> Parameter:
@@ -223,30 +302,27 @@ class HarrisMap:
 
 @one_blas_thread()
 def harris_map(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
+    basis: DesignBasis,
     *,
     torques,
     deviations: Sequence[SetDeviations | None],
     positions: int = 32,
     contact: str = "profile",
-    supports: Supports = RIGID,
     progress: Callable[[int, int], None] | None = None,
 ) -> HarrisMap:
     """Transmission error peak to peak over torque for a list of deviations.
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
-    bodies : Bodies
-        Flank compliances; they serve all mesh cycles.
+    basis : DesignBasis
+        Its deviations are not looked at.
     torques : sequence of float
         On the sun [N m], not zero.
     deviations : sequence of SetDeviations or None
         One a curve; the record spans the common period of each.
     positions : int
         In one mesh period.
-    contact, supports
+    contact : {"profile", "line_of_action"}
         See `contact.cycle.walk_mesh_cycle`.
     progress : callable, optional
         Called with (mesh cycles done, mesh cycles).
@@ -264,20 +340,20 @@ def harris_map(
     torques = np.array(torques, float)
     if not len(torques) or not (np.isfinite(torques).all() and torques.all()):
         raise CaseError("every torque of the map must differ from zero", code="E-TORQUE", value=torques)
-    N = planetary_set.n_planets
+    N = basis.gears.n_planets
     peaks = np.zeros((len(deviations), 2, len(torques)))
     overall, residual = np.zeros((len(deviations), len(torques))), 0.0
     for v, variant in enumerate(deviations):
-        periods = 1 if variant is None else common_period(variant, planetary_set)[0]
+        periods = 1 if variant is None else common_period(variant, basis.gears)[0]
         for t, torque in enumerate(torques):
             cycle = walk_mesh_cycle(
-                planetary_set,
-                bodies,
+                basis.gears,
+                basis.bodies,
                 sun_torque=float(torque),
                 positions=positions,
                 contact=contact,
                 deviations=variant,
-                supports=supports,
+                supports=basis.supports,
                 periods=periods,
             )
             peak = np.ptp(cycle.deflection, axis=1)
@@ -321,30 +397,29 @@ class ReliefGrid:
 
 @one_blas_thread()
 def relief_grid(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
+    basis: DesignBasis,
     *,
     amounts,
     lengths,
     torques,
-    deviations: SetDeviations | None = None,
     power: float = 1.0,
     positions: int = 32,
     contact: str = "profile",
-    supports: Supports = RIGID,
     progress: Callable[[int, int], None] | None = None,
 ) -> ReliefGrid:
     """Transmission error of the sun-planet meshes over amount and length of their tip relief.
 
     Parameters
     ----------
+    basis : DesignBasis
+        The reliefs are added to its deviations.
     amounts : (A,) sequence
         [m]
     lengths : (L,) sequence
         In lengths of two-pair contact.
     torques : (T,) sequence
         On the sun [N m], of one sign.
-    planetary_set, bodies, deviations, power, positions, contact, supports, progress
+    power, positions, contact, progress
         As for `with_tip_relief` and `harris_map`.
 
     Returns
@@ -353,22 +428,14 @@ def relief_grid(
     """
     amounts, lengths, torques = (np.array(a, float) for a in (amounts, lengths, torques))
     back = loads_back(torques)
-    variants = [deviations]
+    variants = [basis.deviations]
     variants += [
-        with_tip_relief(deviations, planetary_set, amount=a, length=length, power=power, back=back)
+        with_tip_relief(basis.deviations, basis.gears, amount=a, length=length, power=power, back=back)
         for a in amounts
         for length in lengths
     ]
-    found = harris_map(
-        planetary_set,
-        bodies,
-        torques=torques,
-        deviations=variants,
-        positions=positions,
-        contact=contact,
-        supports=supports,
-        progress=progress,
-    ).peak_to_peak[:, 0]
+    options = {"positions": positions, "contact": contact, "progress": progress}
+    found = harris_map(basis, torques=torques, deviations=variants, **options).peak_to_peak[:, 0]
     peaks = found[1:].T.reshape(len(torques), len(amounts), len(lengths))
     return ReliefGrid(amounts, lengths, torques, peaks, found[0])
 
@@ -428,16 +495,13 @@ class ReliefOptimum:
 
 @one_blas_thread()
 def optimise_relief(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
+    basis: DesignBasis,
     grid: ReliefGrid,
     *,
     torque: float,
-    deviations: SetDeviations | None = None,
     power: float = 1.0,
     positions: int = 32,
     contact: str = "profile",
-    supports: Supports = RIGID,
     max_evaluations: int = 240,
 ) -> ReliefOptimum:
     """Best relief at one torque, by Nelder and Mead's simplex from the best point of the grid.
@@ -458,7 +522,7 @@ def optimise_relief(
         On the sun [N m].
     max_evaluations : int
         Mesh cycles after which the search is not begun again.
-    planetary_set, bodies, deviations, power, positions, contact, supports
+    basis, power, positions, contact
         As for `relief_grid`.
 
     Returns
@@ -466,19 +530,19 @@ def optimise_relief(
     ReliefOptimum
     """
     t = int(np.abs(grid.torques - torque).argmin())
-    options = {"torques": [torque], "positions": positions, "contact": contact, "supports": supports}
+    options = {"torques": [torque], "positions": positions, "contact": contact}
     known: dict[tuple[float, float], float] = {}
 
     def peak(point) -> float:
         place = float(point[0]), float(point[1])
         if place not in known:
             relief = {"amount": place[0] * 1e-6, "length": place[1], "power": power, "back": torque < 0}
-            variant = with_tip_relief(deviations, planetary_set, **relief)
-            found = harris_map(planetary_set, bodies, deviations=[variant], **options)
+            variant = with_tip_relief(basis.deviations, basis.gears, **relief)
+            found = harris_map(basis, deviations=[variant], **options)
             known[place] = float(found.peak_to_peak[0, 0, 0]) * 1e6
         return known[place]
 
-    unit = two_pair_length(planetary_set)
+    unit = two_pair_length(basis.gears)
     step = np.array([AMOUNT_STEP * 1e6, LENGTH_STEP / unit])
     point, value, around = _descend(peak, *_frame(grid, t), step, lambda: max_evaluations - len(known))
     slopes = _slopes(point, value, around)
@@ -523,7 +587,7 @@ def _descend(peak: Callable, start, bounds, sizes, step, left: Callable[[], int]
             options={"initial_simplex": simplex, "maxfev": max(left(), 3), "xatol": 0.01, "fatol": 1e-3},
         )
         around = {place: peak(place) for place in _neighbours(found.x, bounds, step)}
-        best = min(around, key=around.get)
+        best = min(around, key=around.__getitem__)
         if around[best] >= found.fun - SMALLEST_GAIN or left() <= 0:
             return found.x, float(found.fun), around
         point, size = np.array(best), 2.0 * step
@@ -539,7 +603,7 @@ def _neighbours(point, bounds, step):
             yield float(place[0]), float(place[1])
 
 
-def _slopes(point, value: float, around):
+def _slopes(point, value: float, around) -> tuple[tuple[float, float], tuple[float, float]]:
     """Rises per unit of the first and of the second parameter, (less, more) each; NaN without a neighbour."""
     rises = [[np.nan, np.nan], [np.nan, np.nan]]
     for place, found in around.items():
@@ -547,4 +611,5 @@ def _slopes(point, value: float, around):
         (moved,) = np.nonzero(away)
         if len(moved) == 1:
             rises[moved[0]][int(away[moved[0]] > 0)] = float((found - value) / abs(away[moved[0]]))
-    return [tuple(pair) for pair in rises]
+    (a, b), (c, d) = rises
+    return (a, b), (c, d)

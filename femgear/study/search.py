@@ -1,38 +1,95 @@
-"""Searches for the best design: one objective, or the front between two.
+"""Search for the best design within the bounds and limits of a problem.
 
-`minimise` goes from samples of the design space to a local finish, by descents with derivatives
-(`femgear.study.minimax`) where the objective has them, else by SciPy's optimisers. `pareto_front` finds
-designs of which none is better in both objectives. `describe` and the rows beside it put an optimum into
-words.
+`minimise` goes from samples of the design space to a local finish, by descents with derivatives (`descend`)
+where the objective has them, else by SciPy's optimisers. `describe` and the rows beside it put an optimum
+into words.
+
+A descent of a peak to peak goes by linear programs in a trust region: with ``y(x)`` the transmission error at
+all positions, ``max y - min y`` is the least ``t`` with ``high - low <= t`` and ``low <= y_p <= high``. Every
+step solves that problem for the linearised ``y`` within a box around the point, by SciPy's HiGHS; the box
+shrinks where the linearisation promised too much (K. Madsen, J. Inst. Maths Applics 16, 1975, 321-328:
+minimax by successive linear programs; steps and radii after R. Fletcher, E. Sainz de la Maza, Math. Program.
+43, 1989, 235-256). Most minima are corners: a method that waits for a vanishing gradient finds none.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 
+from femgear.case.case import set_deviations
+from femgear.case.dependencies import FLANK_ENTRIES
 from femgear.case.sections import Case
-from femgear.errors import CaseError, ConvergenceError
-from femgear.study.minimax import descend, has_derivatives
-from femgear.study.objectives import Quantity
-from femgear.study.problem import OUTSIDE, Enough, Evaluations, Failure, Problem, evaluations
-from femgear.study.sensitivity import Tolerance, tolerances
-from femgear.study.variables import start_point
+from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
+from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Tolerance, evaluations, tolerances
+from femgear.study.problem import Point, Problem, Variable, Vector, start_point
+from femgear.study.relief import DesignBasis
+from femgear.study.sensitivity import linearise, sensitivity
 from femgear.threads import one_blas_thread
 from femgear.trains.protocol import Progress
+from femgear.trains.reading import with_values
+from femgear.trains.static.stages import static_supports
 
 Method = Literal["auto", "minimax", "global", "simplex", "powell"]
 METHODS = get_args(Method)
 _HOP = 0.1
 """Standard deviation of a hop, over the range of every variable."""
-_SMALL = 0.01
-"""Share of the sum in the scalar objective; without it points that are better in one alone would tie."""
+_STEP = 1e-4
+"""Half the difference of separations, over the range of the variable: their round-off is 1e-12 of that."""
+_SMALLEST, _LEAST = 1e-4, 1e-5
+"""Box, over the ranges, and gain, over the objective of the case, at which a descent ends."""
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How far a search goes.
+
+    Parameters
+    ----------
+    samples : int, optional
+        Of a Latin hypercube beside the start and the middle of the bounds, five a variable by default; the
+        population of a generation. With 0 descents begin at the start alone.
+    starts : int
+        Descents from the best samples, and as many from hops away from the best end.
+    generations : int
+        Of the differential evolution, at most.
+    max_designs : int, optional
+        Different designs after which the search ends with the best so far.
+    seed : int
+        Of the samples.
+
+    Raises
+    ------
+    CaseError
+        E-RANGE: counts of nothing; one design is the case as it is, no search.
+    """
+
+    samples: int | None = None
+    starts: int = 6
+    generations: int = 30
+    max_designs: int | None = None
+    seed: int = 0
+
+    def __post_init__(self):
+        for name, least in (("samples", 0), ("starts", 1), ("generations", 1), ("max_designs", 2)):
+            check_count(name, getattr(self, name), least)
+
+    def sample_count(self, problem: Problem) -> int:
+        """Samples asked for, or those of the default."""
+        return 5 * len(problem.variables) if self.samples is None else self.samples
+
+
+def check_count(name: str, count: int | None, least: int) -> None:
+    """Refuse (CaseError, E-RANGE) a count under the least one or over a million; None is no count."""
+    if count is not None and not least <= count <= 1_000_000:
+        raise CaseError("not usable", code="E-RANGE", key=name, value=count, limit=f"{least} to 1000000")
 
 
 @dataclass(frozen=True)
@@ -85,7 +142,7 @@ class Optimum:
     def values(self) -> dict[str, str | float | int]:
         """Value of every key as the case file holds it."""
         pairs = zip(self.problem.variables, self.problem.point(self.x), strict=True)
-        return {key: value for variable, value in pairs for key in variable.key}
+        return {key: value for variable, value in pairs for key in variable.keys}
 
     @property
     def at_bounds(self) -> tuple[str, ...]:
@@ -111,12 +168,8 @@ def minimise(
     *,
     method: Method = "auto",
     journal: str | Path | None = None,
-    start: Sequence[float] | None = None,
-    samples: int | None = None,
-    starts: int = 6,
-    generations: int = 30,
-    max_designs: int | None = None,
-    seed: int = 0,
+    start: Vector | None = None,
+    options: SearchOptions | None = None,
     sensitivity: bool = True,
     cache: Path | None = None,
     progress: Progress | None = None,
@@ -130,7 +183,7 @@ def minimise(
     ----------
     problem : Problem
     method : {"auto", "minimax", "global", "simplex", "powell"}
-        ``"minimax"``: descents with derivatives of the contact problem (see `minimax`) from the best of the
+        ``"minimax"``: descents with derivatives of the contact problem (see `descend`) from the best of the
         samples; for transmission errors over deviations of the flanks, where ``"auto"`` takes it.
         ``"global"``: differential evolution, and the simplex of Nelder and Mead from its best point.
         ``"simplex"`` and ``"powell"``: these alone, from the start.
@@ -138,17 +191,8 @@ def minimise(
         File that keeps every design.
     start : (n,) sequence, optional
         In the units of the variables; by default the values of the case, within the bounds.
-    samples : int, optional
-        Of a Latin hypercube beside the start and the middle of the bounds, five a variable by default; the
-        population of a generation. With 0 descents begin at the start alone.
-    starts : int
-        Descents from the best samples, and as many from hops away from the best end.
-    generations : int
-        Of the differential evolution, at most.
-    max_designs : int, optional
-        Different designs after which the search ends with the best so far.
-    seed : int
-        Of the samples.
+    options : SearchOptions, optional
+        Samples, descents and designs at most.
     sensitivity : bool
         Compute what the tolerances of the variables cost.
     cache : path, optional
@@ -163,34 +207,30 @@ def minimise(
     Raises
     ------
     CaseError
-        E-METHOD: no such method, or not for this problem; E-START: a start outside the bounds; E-RANGE:
-        counts.
+        E-METHOD: no such method, or not for this problem; E-START: a start outside the bounds.
     ConvergenceError
         E-INFEASIBLE: no design within the limits was found.
     StorageError
         Of the journal.
     """
-    check_counts(samples=samples, starts=starts, generations=generations, max_designs=max_designs)
-    method = _method(problem, method)
-    x0 = start_at(problem, start)
-    count = 5 * len(problem.variables) if samples is None else samples
-    options = {"journal": journal, "cache": cache, "max_designs": max_designs, "progress": progress}
-    with evaluations(problem, **options) as run:
+    options = options or SearchOptions()
+    method, x0, most = _method(problem, method), start_at(problem, start), options.max_designs
+    with evaluations(problem, journal=journal, cache=cache, max_designs=most, progress=progress) as run:
         before = run.values(None, problem.reported)
         try:
             if method == "minimax":
-                converged, message = _descents(run, x0, count, starts, seed)
+                converged, message = _descents(run, x0, options)
             elif method == "global":
-                converged, message = _evolution(run, x0, count, generations, seed)
+                converged, message = _evolution(run, x0, options)
             else:
                 run.cost(x0)
                 converged, message = polish(run, run.cost, x0, method=method)
         except Enough:
-            converged, message = False, f"ended after {max_designs} designs"
+            converged, message = False, f"ended after {most} designs"
         return _optimum(run, before, sensitivity, (method, message, converged))
 
 
-def _method(problem: Problem, method: str) -> str:
+def _method(problem: Problem, method: Method) -> Method:
     """The method, chosen where that is left to the problem; refused (E-METHOD) where it does not fit."""
     smooth = has_derivatives(problem)
     if method == "auto":
@@ -210,18 +250,19 @@ def _method(problem: Problem, method: str) -> str:
     return method
 
 
-def _descents(run: Evaluations, x0, count: int, starts: int, seed: int) -> tuple[bool, str]:
+def _descents(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple[bool, str]:
     """Descents from the best samples, then from random steps away from the best end (basin hopping).
 
     Corners of a peak to peak are many: a relief that starts beyond one position more is another branch. The
     hops are those of D. J. Wales, J. P. K. Doye, J. Phys. Chem. A 101, 1997, 5111-5116, at temperature zero.
     """
-    points = [x0, *(samples_of(run.problem, count, seed) if count else ())]
+    count, starts = options.sample_count(run.problem), options.starts
+    points = [x0, *(samples_of(run.problem, count, options.seed) if count else ())]
     costs = np.array([run.cost(x) for x in points])
     for i in np.argsort(costs, kind="stable")[:starts]:
         if costs[i] < OUTSIDE:
             descend(run, points[i])
-    (low, high), random = run.problem.bounds.T, np.random.default_rng(seed)
+    (low, high), random = run.problem.bounds.T, np.random.default_rng(options.seed)
     for _ in range(starts if count else 0):
         away = _HOP * (high - low) * random.standard_normal(len(low))
         descend(run, np.clip(run.best[0] + away, low, high))
@@ -230,19 +271,20 @@ def _descents(run: Evaluations, x0, count: int, starts: int, seed: int) -> tuple
     return ended.converged, ended.message
 
 
-def _evolution(run: Evaluations, x0, count: int, generations: int, seed: int) -> tuple[bool, str]:
+def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple[bool, str]:
     """Differential evolution, then the simplex."""
     from scipy.optimize import differential_evolution
 
-    problem = run.problem
+    problem, count = run.problem, options.sample_count(run.problem)
     integral = np.array([variable.integer for variable in problem.variables])
+    population = np.vstack([x0, samples_of(problem, max(count, 5) - 2, options.seed)])
     found = differential_evolution(
         run.cost,
         problem.bounds,
-        init=np.vstack([x0, samples_of(problem, max(count, 5) - 2, seed)]),
-        maxiter=generations,
+        init=population,  # type: ignore[arg-type]  # SciPy takes arrays as well
+        maxiter=options.generations,
         integrality=integral,
-        rng=seed,
+        rng=options.seed,
         polish=False,
         tol=1e-3,
     )
@@ -256,8 +298,8 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, ended) -> Optimu
     problem = run.problem
     x, cost = run.best
     if cost >= OUTSIDE:
-        raise _infeasible(run, limit="; ".join(limit.text for limit in problem.limits) or None)
-    x = _numbers(problem, problem.point(x))
+        raise infeasible(run, limit="; ".join(limit.text for limit in problem.limits) or None)
+    x = numbers(problem, problem.point(x))
     try:
         after = run.values(x, problem.reported)
     except Failure as failure:
@@ -278,216 +320,7 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, ended) -> Optimu
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class ParetoFront:
-    """Designs of which none is better in both objectives, by the first objective ascending.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its objective is the first one.
-    second : Quantity
-    x : (m, n) array
-        In the units of the variables.
-    values : (m, 2) array
-        Both objectives [SI].
-    before : (2,) array
-        Of the case as it is [SI].
-    dominated : (k, 2) array
-        Objectives of the other designs within the limits.
-    designs, failures : int
-    complete : bool
-        Whether the search was not cut short by ``max_designs``.
-    """
-
-    problem: Problem
-    second: Quantity
-    x: np.ndarray
-    values: np.ndarray
-    before: np.ndarray
-    dominated: np.ndarray
-    designs: int
-    failures: int
-    complete: bool
-
-    @property
-    def compromise(self) -> int:
-        """Number of the design whose worse objective, over the span of the front, is the best."""
-        low, high = self.values.min(axis=0), self.values.max(axis=0)
-        return int(((self.values - low) / np.where(high > low, high - low, 1.0)).max(axis=1).argmin())
-
-
-@one_blas_thread()
-def pareto_front(
-    problem: Problem,
-    second: Quantity,
-    *,
-    points: int = 5,
-    start: Sequence[float] | None = None,
-    samples: int | None = None,
-    max_designs: int | None = None,
-    seed: int = 0,
-    journal: str | Path | None = None,
-    cache: Path | None = None,
-    progress: Progress | None = None,
-) -> ParetoFront:
-    """Front between the objective of a problem and a second one.
-
-    Both are minimised alone. Between, the augmented weighted Chebyshev distance to the point of both minima,
-    ``max_i w_i (f_i - f_i*)/span_i + 0.01 sum_i``, is minimised by the simplex of Nelder and Mead from the
-    best design known so far: unlike weighted sums it reaches the hollow parts of a front as well (R. E.
-    Steuer, E.-U. Choo, Math. Program. 26, 1983, 326-344). The front is what no other design computed on the
-    way is better than in both.
-
-    Parameters
-    ----------
-    problem : Problem
-    second : Quantity
-    points : int
-        Weights, the two ends included.
-    start, samples, max_designs, seed, journal, cache, progress
-        As for `minimise`; an optimum of the first objective is a good start.
-
-    Returns
-    -------
-    ParetoFront
-
-    Raises
-    ------
-    CaseError
-        E-OBJECTIVE: twice the same objective; E-RANGE: counts.
-    ConvergenceError
-        E-INFEASIBLE: no design within the limits was found.
-    """
-    if second.name == problem.objective.name:
-        raise CaseError(
-            "a front has two objectives",
-            code="E-OBJECTIVE",
-            key="second",
-            value=second.name,
-            limit=f"another objective than {problem.objective.name}",
-        )
-    check_counts(points=points, samples=samples, max_designs=max_designs)
-    options = {"journal": journal, "cache": cache, "max_designs": max_designs, "progress": progress}
-    with evaluations(problem, **options) as run:
-        both = (problem.objective, second)
-        before = np.array([run.values(None, both)[q.name] for q in both])
-        complete = True
-        try:
-            count = 5 * len(problem.variables) if samples is None else samples
-            _search(run, second, points, [start_at(problem, start), *samples_of(problem, count, seed)])
-        except Enough:
-            complete = False
-        x, values = _known(run, both)
-        if not len(x):
-            raise _infeasible(run)
-        best = non_dominated(values)
-        order = best[np.argsort(values[best, 0], kind="stable")]
-        rest = np.setdiff1d(np.arange(len(values)), best)
-        return ParetoFront(
-            problem=problem, second=second, x=x[order], values=values[order], before=before,
-            dominated=values[rest], designs=run.asked, failures=len(run.designs.failures), complete=complete,
-        )  # fmt: skip
-
-
-def non_dominated(values: np.ndarray) -> np.ndarray:
-    """Row numbers of (m, 2) values that no other row is below in one column and not above in the other."""
-    order = np.lexsort((values[:, 1], values[:, 0]))
-    lowest, kept = np.inf, []
-    for i in order:
-        if values[i, 1] < lowest:
-            lowest = values[i, 1]
-            kept.append(i)
-    return np.array(kept, int)
-
-
-def _search(run: Evaluations, second: Quantity, points: int, places) -> None:
-    """Both ends, and the weights between."""
-    both = (run.problem.objective, second)
-    for x in places:
-        run.cost(x)
-        run.penalised(x, lambda x=x: sum(run.values(x, both).values()))
-    for own in (run, run.towards(second)):
-        end = _end(run, own)
-        if end is not None:
-            run.penalised(end, lambda x=end: sum(run.values(x, both).values()))
-    _, values = _known(run, both)
-    if not len(values):
-        return
-    low, high = values.min(axis=0), values[non_dominated(values)].max(axis=0)
-    span = np.where(high > low, high - low, 1.0)
-
-    def distance(found: np.ndarray, weight: float) -> np.ndarray:
-        scaled = (found - low) / span
-        return (np.array([weight, 1.0 - weight]) * scaled).max(axis=-1) + _SMALL * scaled.sum(axis=-1)
-
-    for weight in np.linspace(0.0, 1.0, points)[1:-1]:
-
-        def cost(x, weight=float(weight)) -> float:
-            run.count(x)
-            names = [quantity.name for quantity in both]
-
-            def value() -> float:
-                found = run.values(x, both)
-                return float(distance(np.array([found[name] for name in names]), weight))
-
-            return run.penalised(x, value)
-
-        x, values = _known(run, both)
-        polish(run, cost, x[distance(values, float(weight)).argmin()], size=0.1, rounds=1)
-
-
-def _end(run: Evaluations, own: Evaluations) -> np.ndarray | None:
-    """Minimum of the objective of ``own`` alone, from the best design known."""
-    x, values = _known(run, (own.problem.objective,))
-    if not len(x):
-        return None
-    start = x[values[:, 0].argmin()]
-    if has_derivatives(own.problem):
-        descend(own, start)
-    else:
-        polish(own, own.cost, start, size=0.1)
-    return start if own.best is None else own.best[0]
-
-
-def _known(run: Evaluations, quantities) -> tuple[np.ndarray, np.ndarray]:
-    """Points within bounds and limits at which all quantities are known, and these, (m, n) and (m, q).
-
-    Only points that this search has asked for: it then repeats itself, whatever else the journal holds.
-    """
-    problem, points, values = run.problem, [], []
-    low, high = problem.bounds.T
-    for point in run.asked_points:
-        known = (run.designs.journal.get(json.dumps(point)) or {}).get("values", {})
-        if any(q.name not in known for q in quantities):
-            continue
-        x = _numbers(problem, point)
-        try:
-            inside = bool(np.all((x >= low) & (x <= high))) and run.violation(x) == 0.0
-        except Failure:
-            continue
-        if inside:
-            points.append(x)
-            values.append([known[q.name] for q in quantities])
-    return np.array(points).reshape(-1, len(low)), np.array(values).reshape(-1, len(quantities))
-
-
-def check_counts(**counts: int | None) -> None:
-    """Refuse counts of nothing: one design is the case as it is, no search.
-
-    Raises
-    ------
-    CaseError
-        E-RANGE.
-    """
-    least = {"samples": 0, "max_designs": 2, "points": 2}
-    for name, count in counts.items():
-        low = least.get(name, 1)
-        if count is not None and not low <= count <= 1_000_000:
-            raise CaseError("not usable", code="E-RANGE", key=name, value=count, limit=f"{low} to 1000000")
-
-
-def start_at(problem: Problem, start: Sequence[float] | None) -> np.ndarray:
+def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
     """A start within the bounds; by default the values of the case. CaseError (E-START) outside them."""
     if start is None:
         return start_point(problem.case, problem.variables)
@@ -531,12 +364,13 @@ def polish(
     rounds : int
         Simplexes one after the other.
     """
-    from scipy.optimize import Bounds, minimize
+    from scipy.optimize import minimize
 
     low, high = run.problem.bounds.T
-    width, unit = high - low, Bounds(np.zeros(len(low)), np.ones(len(low)))
+    width, n = high - low, len(low)
+    unit = [(0.0, 1.0)] * n
     # a point at a bound is one after scaling back and forth as well
-    u, n = np.clip((x0 - low) / width, 0.0, 1.0), len(low)
+    u = np.clip((x0 - low) / width, 0.0, 1.0)
 
     def scaled(v):
         return cost(np.clip(low + width * v, low, high))
@@ -555,12 +389,12 @@ def polish(
     return bool(found.success), str(found.message)
 
 
-def _numbers(problem: Problem, point: Sequence[object]) -> np.ndarray:
+def numbers(problem: Problem, point: Point) -> np.ndarray:
     """Values as the case file holds them, in the units of the variables."""
     return np.array([v.number(text) for v, text in zip(problem.variables, point)])
 
 
-def _infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
+def infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
     """What a search ends with that found no design."""
     return ConvergenceError(
         f"none of {run.asked} designs can be computed and lies within the limits",
@@ -568,6 +402,168 @@ def _infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
         limit=limit,
         remedy="widen limits or bounds, or ask for more samples",
     )
+
+
+@dataclass(frozen=True)
+class Descent:
+    """End of a search.
+
+    Parameters
+    ----------
+    x : (n,) array
+        In the units of the variables.
+    cost : float
+        See `Evaluations.cost`.
+    steps : int
+    converged : bool
+        Whether no step within the smallest box lowers the linearised objective any more.
+    message : str
+    """
+
+    x: np.ndarray
+    cost: float
+    steps: int
+    converged: bool
+    message: str
+
+
+def has_derivatives(problem: Problem) -> bool:
+    """Whether the objective is a transmission error and all variables are deviations of the flanks alone."""
+    case = problem.case
+    sided = problem.objective.signal is not None and not case.static.back_flanks
+    clear = not (case.static.members == "elastic" and case.planet.bearing_clearance)
+    keys = [key for variable in problem.variables for key in variable.keys]
+    deviations = all(re.split(r"[.\[]", key.partition(".")[2])[0] in FLANK_ENTRIES for key in keys)
+    return bool(sided and clear and deviations and not any(v.integer for v in problem.variables))
+
+
+def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15, max_steps: int = 60) -> Descent:
+    """Minimum of a transmission error from a start, by successive linear programs.
+
+    Parameters
+    ----------
+    evaluations : Evaluations
+        Of a problem with `has_derivatives`.
+    start : (n,) sequence
+        In the units of the variables.
+    radius : float
+        Half the first box, over the ranges of the variables.
+    max_steps : int
+
+    Returns
+    -------
+    Descent
+    """
+    problem = evaluations.problem
+    low, high = problem.bounds.T
+    scale = evaluations.scale(problem.objective)
+    x, cost = np.array(start, float), evaluations.cost(start)
+    for step in range(max_steps):
+        try:
+            value, slopes = signals(evaluations, x)
+        except StorageError:
+            raise
+        except FemgearError as error:
+            return Descent(x, cost, step, False, f"no derivatives: {error.message}")
+        while True:
+            move, promised = _linear_program(value / scale, slopes / scale, x, low, high, radius)
+            # the linearisation is that of the same contact problem: its value is the cost
+            gain = float(np.ptp(value, axis=1).max()) / scale - promised
+            if radius < _SMALLEST or gain < _LEAST:
+                ended = "no linearised descent" if gain < _LEAST else "the smallest steps gain nothing"
+                return Descent(x, cost, step, True, ended)
+            # a bound may be missed by rounding
+            trial = np.clip(x + move, low, high)
+            new = evaluations.cost(trial)
+            ratio = (cost - new) / gain
+            if ratio > 0.75:
+                radius = min(2.0 * radius, 0.5)
+            elif ratio < 0.25:
+                radius *= 0.35
+            if ratio > 0.01:
+                x, cost = trial, new
+                break
+    return Descent(x, cost, max_steps, False, f"{max_steps} steps were not enough")
+
+
+def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndarray, float]:
+    """Step within the box, and the largest peak to peak that the linearisation promises there."""
+    from scipy.optimize import linprog
+
+    n, (K, P) = len(x), value.shape
+    width = high - low
+    # unknowns: n moves over their ranges, K highs, K lows, t
+    flat = np.moveaxis(slopes, 0, -1).reshape(K * P, n) * width
+    owner = np.kron(np.eye(K), np.ones((P, 1)))
+    none, zeros = np.zeros((K * P, K)), np.zeros((K * P, 1))
+    A = np.block(
+        [
+            [flat, -owner, none, zeros],
+            [-flat, none, owner, zeros],
+            [np.zeros((K, n)), np.eye(K), -np.eye(K), -np.ones((K, 1))],
+        ]
+    )
+    b = np.concatenate([-value.ravel(), value.ravel(), np.zeros(K)])
+    limits = [(max(-radius, lo), min(radius, hi)) for lo, hi in zip((low - x) / width, (high - x) / width)]
+    cost = np.zeros(n + 2 * K + 1)
+    cost[-1] = 1.0
+    found = linprog(cost, A, b, bounds=[*limits, *[(None, None)] * (2 * K), (0, None)], method="highs")
+    if found.x is None:
+        return np.zeros(n), float(np.ptp(value, axis=1).max())
+    return found.x[:n] * width, float(found.fun)
+
+
+def signals(evaluations: Evaluations, x: Vector) -> tuple[np.ndarray, np.ndarray]:
+    """Transmission error (K, P) at a point and its derivatives (n, K, P) per unit of the variables.
+
+    Kept in the journal. FemgearError: the point cannot be computed.
+    """
+    problem = evaluations.problem
+    key = "derivatives of " + problem.objective.name + " at " + json.dumps(problem.point(x))
+    record = evaluations.designs.journal.get(key)
+    if record is None:
+        value, slopes = _linearised(evaluations, x)
+        record = {"value": value.tolist(), "slopes": slopes.tolist()}
+        evaluations.designs.journal.add(key, record)
+    return np.array(record["value"]), np.array(record["slopes"])
+
+
+def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
+    """As `signals`, from the contact problem at the point."""
+    problem = evaluations.problem
+    variant = evaluations.designs.variant(problem.point(x))
+    case, objective = variant.case, problem.objective
+    static = variant.static(objective.torque)
+    linear = linearise(
+        DesignBasis(static.planetary_set, static.bodies, static_supports(case), set_deviations(case)),
+        sun_torque=static.sun_torque,
+        positions=case.static.positions,
+        periods=static.cycle.periods,
+        contact=case.static.contact,
+    )
+    n, signal = static.planetary_set.n_planets, objective.signal
+    assert signal is not None, "see has_derivatives"
+    value = signal(linear.sun_arc, linear.deflection, n)
+    slopes = []
+    for variable, number in zip(problem.variables, x, strict=True):
+        low, high = variable.bounds
+        step = _STEP * (high - low)
+        inside = min(max(float(number), low + step), high - step)
+        found = sensitivity(linear, _deviations(case, variable), inside, step=step)
+        slopes.append(signal(found.sun_arc, found.deflection, n))
+    if not np.isfinite(slopes).all():
+        raise ContactError("a planet that carries nothing has no derivative", code="E-DERIVATIVE")
+    return value, np.array(slopes)
+
+
+def _deviations(case: Case, variable: Variable):
+    """Deviations of the case for a value of one variable; not rounded as `Variable.text` does."""
+
+    def variant(number: float):
+        text = f"{number!r} {variable.unit}" if variable.unit else number
+        return set_deviations(with_values(case, dict.fromkeys(variable.keys, text)))
+
+    return variant
 
 
 def describe(found: Optimum) -> str:

@@ -16,20 +16,29 @@ every cell (the adjoint of a linear system: M. B. Giles, N. A. Pierce, Flow, Tur
 What these derivatives are not: cells change sides at the rims of the contacts, where pressures vanish, so
 over a finite step the exact function bends away from them. Extremes over positions and planets have kinks,
 see `peak_to_peak_slopes`.
-
-`tolerances` tells what an optimum loses when its variables are off by their tolerances: computed again, not
-by derivatives, which a corner does not have.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.supports import RIGID, Supports
+from femgear.contact.assembly import (
+    ROUGH_STIFFNESS,
+    assemble_contact,
+    cell_centres,
+    cycle_positions,
+    in_windows,
+    mesh_windows,
+    rotation_approach,
+)
+from femgear.contact.flank_pairs import mesh_pairs, separation
+from femgear.contact.pivoting import factor
+from femgear.contact.solve import solve_contact
+from femgear.contact.supports import moving_members
 from femgear.errors import CaseError
 from femgear.gears.deviations import (
     SetDeviations,
@@ -39,17 +48,266 @@ from femgear.gears.deviations import (
     profile_separation,
     tooth_separation,
 )
-from femgear.study.linearised import LinearContact, linear_positions
-from femgear.study.objectives import Quantity
-from femgear.study.problem import Failure
-from femgear.study.relief import pin_error
+from femgear.study.relief import DesignBasis, pin_error
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
-    from femgear.study.problem import Evaluations
-    from femgear.study.variables import Variable
+
+
+@dataclass(frozen=True, eq=False)
+class TouchingCells:
+    """All M loaded cells of the record, position after position, in the numbering of the solved set.
+
+    Parameters
+    ----------
+    at : (M,) int array
+        Which of the positions.
+    mesh : (M,) int array
+    roll_1, roll_2 : (M,) arrays
+        Roll lengths on gear 1 and gear 2 [m].
+    tooth_1, tooth_2 : (M,) int arrays
+        Tooth numbers.
+    weight : (M, 2N) array
+        ``Z = H_AA^-1 J``: load of the cell per unit approach of every mesh [N/m].
+    """
+
+    at: np.ndarray
+    mesh: np.ndarray
+    roll_1: np.ndarray
+    roll_2: np.ndarray
+    tooth_1: np.ndarray
+    tooth_2: np.ndarray
+    weight: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LinearContact:
+    """Solution at P positions, and its linear answer to separations.
+
+    Parameters
+    ----------
+    original, solved : PlanetarySet
+        The set, and its mirror image where the torque is negative.
+    order : (N,) int array
+        Solved planet ``i`` is original planet ``order[i]``.
+    load : float
+        Sum of the sun-planet mesh forces [N].
+    position : (P,) array
+        In mesh periods.
+    solved_position : (P,) array
+        The same in the solved set.
+    sun_arc : (P,) array
+        Transmission error from sun to ring [m].
+    deflection, force : (2N, P) arrays
+        Of every mesh, in the original order [m], [N].
+    touching : TouchingCells
+    arc_response : (P, 2N) array
+        Of the transmission error to ``v = Z^T d gap`` [m/N].
+    deflection_response, force_response : (P, 2N, 2N) arrays
+        Of all meshes of the solved set [m/N], [1].
+    residual : float
+        Largest of the contact problems.
+    """
+
+    original: PlanetarySet
+    solved: PlanetarySet
+    order: np.ndarray
+    load: float
+    position: np.ndarray
+    solved_position: np.ndarray
+    sun_arc: np.ndarray
+    deflection: np.ndarray
+    force: np.ndarray
+    touching: TouchingCells
+    arc_response: np.ndarray
+    deflection_response: np.ndarray
+    force_response: np.ndarray
+    residual: float
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the mirror image was solved."""
+        return self.solved is not self.original
+
+    @property
+    def mesh_rows(self) -> np.ndarray:
+        """Meshes of the solved set in the order of the original, (2N,)."""
+        return original_rows(self.order)
+
+    @property
+    def share(self) -> np.ndarray:
+        """Shares in the sun's torque, (N, P)."""
+        return self.force[: self.original.n_planets] / self.load
+
+
+def original_rows(order) -> np.ndarray:
+    """Meshes of the solved set in the order of the original, (2N,)."""
+    back = np.argsort(order)
+    return np.concatenate([back, back + len(back)])
+
+
+@one_blas_thread()
+def linearise(
+    basis: DesignBasis,
+    *,
+    sun_torque: float,
+    positions: int = 64,
+    periods: int = 1,
+    only=None,
+    contact: str = "profile",
+    cells: int = 36,
+) -> LinearContact:
+    """Contact of all drive flanks and what it answers to small separations of any cell.
+
+    Parameters
+    ----------
+    basis : DesignBasis
+        Gears, flank compliances, supports and deviations.
+    sun_torque : float
+        [N m], not zero; a negative one loads the other flanks.
+    positions, periods : int
+        Positions in a mesh period, and mesh periods in the record.
+    only : sequence of int, optional
+        Numbers of the positions wanted; all of the record when left out.
+    contact, cells
+        As for `contact.cycle.walk_mesh_cycle`.
+
+    Returns
+    -------
+    LinearContact
+
+    Raises
+    ------
+    CaseError
+        E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
+    ContactError
+        As `contact.cycle.walk_mesh_cycle`.
+    """
+    chosen = _chosen(basis, sun_torque, positions * periods, only)
+    solved, order = basis.loaded(sun_torque)
+    position, numbers = cycle_positions(positions, periods=periods), chosen
+    if sun_torque < 0:
+        # the mirror image turns the other way and ends at position zero
+        position, numbers = -position[::-1], len(position) - 1 - chosen
+    load = abs(sun_torque) / solved.gears.sun.base_radius
+    options = {"positions": position, "periods": periods, "contact": contact, "cells": cells}
+    setup, answers = _solve(solved, load, numbers, options)
+    rows = original_rows(order)
+    stacked = {name: np.stack([answer[name] for answer in answers]) for name in answers[0] if name != "cells"}
+    return LinearContact(
+        original=basis.gears,
+        solved=solved.gears,
+        order=order,
+        load=load,
+        position=chosen / positions,
+        solved_position=position[numbers],
+        sun_arc=stacked["sun_arc"],
+        deflection=stacked["deflection"].T[rows],
+        force=stacked["force"].T[rows],
+        touching=_touching(solved.gears, setup, numbers, [answer["cells"] for answer in answers]),
+        arc_response=stacked["arc_response"],
+        deflection_response=stacked["deflection_response"],
+        force_response=stacked["force_response"],
+        residual=float(stacked["residual"].max()),
+    )
+
+
+def _chosen(basis: DesignBasis, sun_torque: float, record: int, only) -> np.ndarray:
+    """Numbers of the positions wanted of a record; what `linearise` cannot represent is refused."""
+    if not (np.isfinite(sun_torque) and sun_torque):
+        raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
+    chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
+    if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
+        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
+    if basis.supports.planet_clearance:
+        raise CaseError(
+            "bearings with clearance have no derivative here",
+            code="E-SUPPORT",
+            key="planet.bearing_clearance",
+            value=basis.supports.planet_clearance,
+            limit="0 m",
+        )
+    return chosen
+
+
+def _solve(solved: DesignBasis, load: float, numbers, options):
+    """Windows wide enough, and the answers of all positions in them."""
+    gears, bodies, N = solved.gears, solved.bodies, solved.gears.n_planets
+    members = moving_members(gears, solved.supports)
+    right = np.zeros(N + 1 + int(members.free.sum()))
+    right[N] = load
+
+    def attempt(share: float, nearest: float):
+        setup = mesh_windows(
+            gears, bodies, share=share, nearest=nearest, deviations=solved.deviations, **options
+        )
+        answers, overflow, outside, previous = [], False, False, None
+        for p in numbers:
+            problem = assemble_contact(setup, bodies, p, members)
+            start = None if previous is None else problem.warm_start(*previous)
+            state = solve_contact(problem.compliance, problem.gap, problem.G, right, start=start)
+            previous = (problem, state.active)
+            answers.append(_answer(problem, state, members))
+            overflow |= problem.touches_window_end(state.active, setup)
+            penetrates = ~setup.near[:, p] & (setup.smallest_gap[:, p] < answers[-1]["deflection"][:, None])
+            outside |= options["contact"] == "profile" and bool(penetrates.any())
+        return (setup, answers), share * (4.0 if overflow else 1.0), nearest * (2.0 if outside else 1.0)
+
+    return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * gears.sun.face_width))
+
+
+def _answer(problem, state, members) -> dict:
+    """Solution of one position and its linear answer to separations of the touching cells."""
+    from scipy.linalg import cho_solve
+
+    N, active = problem.n_planets, np.flatnonzero(state.active)
+    of_mesh = problem.mesh[active, None] == np.arange(2 * N)
+    lower = factor(problem.compliance[np.ix_(active, active)])
+    Z = cho_solve((lower, True), of_mesh.astype(float))
+    K = of_mesh.T @ Z
+    B = np.hstack([rotation_approach(N), members.approach[:, members.free]])
+    # a planet that carries nothing leaves S singular in its own rotation alone
+    motion = np.linalg.pinv(B.T @ K @ B, rcond=1e-10, hermitian=True) @ B.T
+    force = K @ B @ motion - np.eye(2 * N)
+    deflection = B @ motion - members.compliance @ force
+    undetermined = (np.abs(B[:, state.open_motions]) > 0).any(axis=1)
+    deflection[undetermined] = np.nan
+    forces = of_mesh.T @ state.loads[active]
+    return {
+        "sun_arc": state.motions[N],
+        "force": forces,
+        "deflection": B @ state.motions - members.compliance @ forces,
+        "arc_response": motion[N],
+        "deflection_response": deflection,
+        "force_response": force,
+        "residual": state.residual,
+        "cells": (problem.mesh[active], problem.pair[active], problem.cell[active], Z),
+    }
+
+
+def _touching(solved: PlanetarySet, setup, numbers, cells) -> TouchingCells:
+    """Where all loaded cells lie on their teeth."""
+    N = solved.n_planets
+    at = np.repeat(np.arange(len(cells)), [len(c[0]) for c in cells])
+    mesh, pair, cell, weight = (np.concatenate([c[i] for c in cells]) for i in range(4))
+    place = mesh, numbers[at], pair
+    turns = setup.turns[numbers[at]]
+    # with every mesh period the sun's teeth move on by one, those of planets and ring back
+    tooth_1 = setup.tooth[0][mesh, pair] + np.where(mesh < N, -1, 1) * turns
+    tooth_2 = setup.tooth[1][mesh, pair] + turns
+    roll_1, roll_2 = np.zeros((2, len(mesh)))
+    for kind, contact in enumerate(mesh_pairs(solved)):
+        rows = mesh // N == kind
+        here = tuple(index[rows] for index in place)
+        twice = 2.0 * contact.base_radius_1
+        cells_in_window = setup.gap.shape[-1]
+        place_in_window = cell_centres(cells_in_window)[setup.layout[here], cell[rows]]
+        width = setup.cell[mesh[rows]] * cells_in_window
+        arc = setup.roll[0][here][:, 0] ** 2 / twice + place_in_window * width
+        roll_1[rows] = np.sqrt(twice * arc)
+        roll_2[rows] = separation(contact, setup.zeta[here], roll_1[rows])[1]
+    return TouchingCells(at, mesh, roll_1, roll_2, tooth_1, tooth_2, weight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,68 +330,6 @@ class Sensitivity:
     deflection: np.ndarray
     force: np.ndarray
     share: np.ndarray
-
-
-@one_blas_thread()
-def linearise(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
-    *,
-    sun_torque: float,
-    positions: int = 64,
-    periods: int = 1,
-    only=None,
-    contact: str = "profile",
-    cells: int = 36,
-    deviations: SetDeviations | None = None,
-    supports: Supports = RIGID,
-) -> LinearContact:
-    """Contact of all drive flanks and what it answers to small separations of any cell.
-
-    Parameters
-    ----------
-    planetary_set, bodies, contact, cells, deviations, supports
-        As for `contact.cycle.walk_mesh_cycle`.
-    sun_torque : float
-        [N m], not zero; a negative one loads the other flanks.
-    positions, periods : int
-        Positions in a mesh period, and mesh periods in the record.
-    only : sequence of int, optional
-        Numbers of the positions wanted; all of the record when left out.
-
-    Returns
-    -------
-    LinearContact
-
-    Raises
-    ------
-    CaseError
-        E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
-    ContactError
-    """
-    if not (np.isfinite(sun_torque) and sun_torque):
-        raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
-    record = positions * periods
-    chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
-    if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
-        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
-    if supports.planet_clearance:
-        raise CaseError(
-            "bearings with clearance have no derivative here",
-            code="E-SUPPORT",
-            key="planet.bearing_clearance",
-            value=supports.planet_clearance,
-            limit="0 m",
-        )
-    return linear_positions(
-        planetary_set,
-        bodies,
-        sun_torque,
-        chosen,
-        {"positions": positions, "periods": periods, "contact": contact, "cells": cells},
-        deviations,
-        supports,
-    )
 
 
 def sensitivity(
@@ -272,74 +468,3 @@ def _slopes(function, values, change, step):
         raise CaseError("a slope needs a step", code="E-RANGE", value=step, limit="over 0")
     here = function(values)
     return (here - function(values - step * change)) / step, (function(values + step * change) - here) / step
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Quantities with one variable off by its tolerance.
-
-    Parameters
-    ----------
-    variable : Variable
-    tolerance : float
-        In the unit of the variable.
-    less, more : dict
-        Value of every quantity by name [SI] with the variable lower and higher; NaN where that cannot be
-        computed.
-    """
-
-    variable: Variable
-    tolerance: float
-    less: dict[str, float]
-    more: dict[str, float]
-
-    def slope(self, name: str, value: float) -> tuple[float, float]:
-        """Rise of a quantity per unit of the variable towards less and towards more.
-
-        Both are positive at a corner, where a derivative does not exist.
-        """
-        return (self.less[name] - value) / self.tolerance, (self.more[name] - value) / self.tolerance
-
-
-def tolerances(
-    evaluations: Evaluations, x: Sequence[float], quantities: Sequence[Quantity]
-) -> tuple[tuple[Tolerance, ...], dict[str, float]]:
-    """Every variable off by its tolerance, alone; and all of them at once, each to its worse side.
-
-    Parameters
-    ----------
-    evaluations : Evaluations
-    x : (n,) sequence
-        The optimum, in the units of the variables. Points may lie outside the bounds.
-    quantities : sequence of Quantity
-        The first says which side is the worse one.
-
-    Returns
-    -------
-    tuple of Tolerance
-    dict
-        Quantities by name, all variables off at once; NaN where that cannot be computed.
-    """
-    x, found = np.array(x, float), []
-    worse = x.copy()
-    for i, variable in enumerate(evaluations.problem.variables):
-        tolerance = variable.tolerance_at(float(x[i]))
-        sides = []
-        for sign in (-1.0, 1.0):
-            off = x.copy()
-            off[i] += sign * tolerance
-            sides.append(_values(evaluations, off, quantities))
-        found.append(Tolerance(variable, tolerance, *sides))
-        objective = [side[quantities[0].name] for side in sides]
-        # a side that cannot be computed is no place to go
-        if np.isfinite(objective).any():
-            worse[i] += (-tolerance, tolerance)[int(np.nanargmax(objective))]
-    return tuple(found), _values(evaluations, worse, quantities)
-
-
-def _values(evaluations: Evaluations, x, quantities) -> dict[str, float]:
-    """Quantities by name at a point; NaN where it cannot be computed."""
-    try:
-        return evaluations.values(x, quantities)
-    except Failure:
-        return {quantity.name: np.nan for quantity in quantities}

@@ -21,16 +21,15 @@ import numpy as np
 
 from femgear.contact.assembly import ROUGH_STIFFNESS, assemble_contact, in_windows, mesh_windows
 from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.flank_pairs import loaded_image
 from femgear.contact.solve import solve_contact
-from femgear.contact.supports import RIGID, Supports, moving_members
+from femgear.contact.supports import Supports, moving_members
 from femgear.errors import CaseError, ContactError
-from femgear.gears.deviations import SetDeviations, no_deviations
+from femgear.gears.deviations import no_deviations
 from femgear.gears.kinematics import mesh_normals
+from femgear.study.relief import DesignBasis
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
 
 SOFTEST = 1e-10
@@ -73,15 +72,12 @@ class SharingModel:
 
 @one_blas_thread()
 def sharing_model(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
+    basis: DesignBasis,
     *,
     sun_torque: float,
     position: int = 0,
     positions: int = 8,
     contact: str = "profile",
-    supports: Supports = RIGID,
-    deviations: SetDeviations | None = None,
     loads: int = 40,
     progress: Callable[[int, int], None] | None = None,
 ) -> SharingModel:
@@ -89,14 +85,14 @@ def sharing_model(
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
-    bodies : Bodies
+    basis : DesignBasis
+        Gears, flank compliances, supports, and deviations; samples add to the pin errors of these.
     sun_torque : float
         [N m]; the curves reach to where one planet carries all of it.
     position, positions : int
         Number of the position among those of one mesh period.
-    contact, supports, deviations
-        As for `contact.cycle.walk_mesh_cycle`; samples add to the pin errors of the deviations.
+    contact : {"profile", "line_of_action"}
+        As for `contact.cycle.walk_mesh_cycle`.
     loads : int
         Points of a curve.
     progress : callable, optional
@@ -113,6 +109,39 @@ def sharing_model(
         E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
     ContactError
     """
+    _check_request(basis.supports, sun_torque, position, positions)
+    solved, order = basis.loaded(sun_torque)
+    N, load = solved.gears.n_planets, abs(sun_torque) / solved.gears.sun.base_radius
+    # planets open and close at small loads, where a line contact changes most
+    force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
+    at = (-position if sun_torque < 0 else position) / positions
+    deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
+    for k, one in enumerate(force):
+        deflection[:, k], coupling[k] = _paths(solved, max(one, 1e-9 * load), at, contact)
+        if progress is not None:
+            progress(k + 1, len(force))
+    mean = int(np.abs(force - load / N).argmin())
+    between = coupling[mean]
+    change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
+    deflection -= np.outer(between.sum(axis=1), force)
+    members = moving_members(solved.gears, solved.supports)
+    path = members.approach[:N] + members.approach[N:]
+    sprung, free = path[:, ~members.free], path[:, members.free]
+    between = between + (sprung / members.stiffness[~members.free]) @ sprung.T
+    back, mirror = np.argsort(order), np.array([1.0, -1.0 if sun_torque < 0 else 1.0])
+    return SharingModel(
+        load=load,
+        force=force,
+        deflection=deflection[back],
+        coupling=between[np.ix_(back, back)],
+        approach=np.column_stack([np.ones(N), free])[back],
+        pin=(pin_directions(solved.gears) * mirror)[back],
+        coupling_change=float(change),
+    )
+
+
+def _check_request(supports: Supports, sun_torque: float, position: int, positions: int) -> None:
+    """Refuse what `sharing_model` cannot represent."""
     if not (np.isfinite(sun_torque) and sun_torque):
         raise CaseError("without torque there is nothing to share", code="E-TORQUE", value=sun_torque)
     if not 0 <= position < positions:
@@ -126,41 +155,22 @@ def sharing_model(
             limit="0 um",
             remedy='set it to zero, or solve single cases with static.members = "elastic"',
         )
-    solved, order, deviations = loaded_image(planetary_set, sun_torque, deviations)
-    position = -position if sun_torque < 0 else position
-    N = solved.n_planets
-    load = abs(sun_torque) / solved.sun.base_radius
-    # planets open and close at small loads, where a line contact changes most
-    force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
-    place = {"positions": np.array([position / positions]), "contact": contact, "deviations": deviations}
-    deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
-    for k, one in enumerate(force):
-        deflection[:, k], coupling[k] = _paths(solved, bodies, max(one, 1e-9 * load), place)
-        if progress is not None:
-            progress(k + 1, len(force))
-    mean = int(np.abs(force - load / N).argmin())
-    between = coupling[mean]
-    change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
-    deflection -= np.outer(between.sum(axis=1), force)
-    return _placed(
-        solved, order, load, force, deflection, between, supports, float(change), mirrored=sun_torque < 0
-    )
 
 
-def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
+def _paths(solved: DesignBasis, force: float, position: float, contact: str):
     """Path deflections (N,) and compliance between planets (N, N) with the same force in all meshes."""
-    N = s.n_planets
+    gears, bodies, N = solved.gears, solved.bodies, solved.gears.n_planets
+    place = {"positions": np.array([position]), "contact": contact, "deviations": solved.deviations}
 
     def attempt(share: float, nearest: float):
-        setup = mesh_windows(s, bodies, share=share, cells=36, nearest=nearest, **place)
+        setup = mesh_windows(gears, bodies, share=share, cells=36, nearest=nearest, **place)
         # the record of the windows begins at the position
         problem = assemble_contact(setup, bodies, 0)
         mesh = problem.mesh[:, None] == np.arange(2 * N)
         state = solve_contact(problem.H, problem.gap, mesh.astype(float), np.full(2 * N, force))
+        outside = ~setup.near[:, 0] & (setup.smallest_gap[:, 0] < state.motions[:, None])
         overflow = problem.touches_window_end(state.active, setup)
-        gap = setup.smallest_gap[:, 0]
-        outside = ~setup.near[:, 0] & (gap < state.motions[:, None])
-        missed = place["contact"] == "profile" and outside.any()
+        missed = contact == "profile" and outside.any()
         wider = share * (4.0 if overflow else 1.0), nearest * (2.0 if missed else 1.0)
         return (problem, mesh, state), *wider
 
@@ -171,26 +181,6 @@ def _paths(s: PlanetarySet, bodies: Bodies, force: float, place):
     between = compliance.reshape(2, N, 2, N).sum(axis=(0, 2))
     np.fill_diagonal(between, 0.0)
     return state.motions[:N] + state.motions[N:], between
-
-
-def _placed(s, order, load, force, deflection, between, supports, change, *, mirrored) -> SharingModel:
-    """The model with supports and directions, its planets in the original order."""
-    N = s.n_planets
-    members = moving_members(s, supports)
-    path = members.approach[:N] + members.approach[N:]
-    sprung, free = path[:, ~members.free], path[:, members.free]
-    coupling = between + (sprung / members.stiffness[~members.free]) @ sprung.T
-    back = np.argsort(order)
-    pin = pin_directions(s)
-    return SharingModel(
-        load=load,
-        force=force,
-        deflection=deflection[back],
-        coupling=coupling[np.ix_(back, back)],
-        approach=np.column_stack([np.ones(N), free])[back],
-        pin=(pin * np.array([1.0, -1.0]) if mirrored else pin)[back],
-        coupling_change=change,
-    )
 
 
 def pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
@@ -403,16 +393,13 @@ def _residual(model, curves, separation, forces, motions) -> float:
 
 @one_blas_thread()
 def walked_shares(
-    planetary_set: PlanetarySet,
-    bodies: Bodies,
+    basis: DesignBasis,
     pins,
     *,
     sun_torque: float,
     position: int = 0,
     positions: int = 8,
     contact: str = "profile",
-    supports: Supports = RIGID,
-    deviations: SetDeviations | None = None,
 ) -> np.ndarray:
     """Shares (S, N) of a few samples from the whole contact problem, to check `sharing_of_samples`.
 
@@ -420,19 +407,19 @@ def walked_shares(
     ----------
     pins : (S, N, 2) array
         See there.
-    planetary_set, bodies, sun_torque, position, positions, contact, supports, deviations
+    basis, sun_torque, position, positions, contact
         As for `sharing_model`.
     """
-    base = no_deviations(planetary_set) if deviations is None else deviations
+    base = no_deviations(basis.gears) if basis.deviations is None else basis.deviations
     shares = []
     for errors in np.asarray(pins, float):
         cycle = walk_mesh_cycle(
-            planetary_set,
-            bodies,
+            basis.gears,
+            basis.bodies,
             sun_torque=sun_torque,
             positions=positions,
             contact=contact,
-            supports=supports,
+            supports=basis.supports,
             deviations=replace(base, pin_errors=base.pin_errors + errors),
         )
         shares.append(cycle.load_share[:, position])

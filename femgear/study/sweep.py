@@ -14,17 +14,16 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 
 from femgear.case.sections import Case
 from femgear.errors import CaseError
 from femgear.storage.files import storage_errors, write_text
-from femgear.study.names import named_quantity
-from femgear.study.objectives import Quantity
-from femgear.study.problem import Failure, open_designs
-from femgear.study.variables import Variable, split
-from femgear.study.variants import need_elastic_ring
+from femgear.study.designs import Failure, open_designs
+from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
+from femgear.study.problem import Variable, split
 from femgear.threads import one_blas_thread
 from femgear.trains.protocol import Progress
 from femgear.trains.reading import with_value
@@ -187,7 +186,7 @@ def _warn_of_time(left: int, seconds: float) -> None:
     )
 
 
-def parse_over(text: str) -> tuple[str, list[object]]:
+def parse_over(text: str) -> tuple[str, Sequence[object]]:
     """Key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``.
 
     Raises
@@ -211,7 +210,7 @@ def parse_over(text: str) -> tuple[str, list[object]]:
     return key, found
 
 
-def _value(text: str) -> object:
+def _value(text: str) -> str | float | bool:
     """A value of the command line as the case file holds it: whole number, number, truth value or text."""
     text = text.strip()
     if text in ("true", "false"):
@@ -255,7 +254,7 @@ def sweep_into(
     over : sequence of str
         As `parse_over` takes them.
     of : sequence of str
-        Quantities, see `names.NAMES`.
+        Quantities, see `objectives.NAMES`.
     speeds : (str, str), optional
         First and last speed of the input, for mesh forces and housing levels.
     cache, progress
@@ -296,22 +295,30 @@ def sweep_into(
 
 
 def _draw(found: Sweep, counts: Sequence[int], path: Path) -> None:
-    """Curves over the last key, one for every combination of the others, at most twelve of them."""
-    from femgear.report.style import save_figure
-    from femgear.study.figures import sweep_curves
+    """Curves over the last key, one panel a quantity, one curve for every combination of the other keys.
 
-    last = counts[-1]
+    Of at most twelve combinations; a case that cannot be computed leaves a gap.
+    """
+    from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
+
+    last, count = counts[-1], len(found.quantities)
     scale = np.array([quantity.dimension.scale for quantity in found.quantities])
-    curves = (found.values / scale).reshape(-1, last, len(scale))
-    others = [point[:-1] for point in found.points[::last]]
-    names = [
-        ", ".join(f"{key} = {value}" for key, value in zip(found.keys, point, strict=False))
-        for point in others
-    ]
+    curves = (found.values / scale).reshape(-1, last, count)
     x, unit = _axis([point[-1] for point in found.points[:last]])
-    titles = [f"{q.name} [{q.dimension.shown}]".replace("[um]", "[µm]") for q in found.quantities]
-    axis = f"{found.keys[-1]} [{unit}]" if unit else found.keys[-1]
-    save_figure(sweep_curves(x, curves[:12], names=names[:12], axis=axis, quantities=titles), path)
+    columns = min(count, 3)
+    rows = -(-count // columns)
+    figure, axes = new_figure(rows=rows, columns=columns, width=4.4 * columns + 0.6, height=3.6 * rows + 0.6)
+    for q, quantity in enumerate(found.quantities):
+        for k, (point, curve) in enumerate(zip(found.points[::last], curves[:12])):
+            name = ", ".join(f"{key} = {value}" for key, value in zip(found.keys, point[:-1], strict=False))
+            legend = {"label": name} if name else {}
+            axes[q].plot(x, curve[:, q], marker="o", markersize=4, **line_style(k), **legend)
+        title = f"{quantity.name} [{quantity.dimension.shown}]".replace("[um]", "[µm]")
+        label(axes[q], f"{found.keys[-1]} [{unit}]" if unit else found.keys[-1], fill(title, 36))
+    for ax in axes[count:]:
+        ax.set_visible(False)
+    legend_below(figure)
+    save_figure(figure, path)
 
 
 def _axis(values: Sequence[object]) -> tuple[Sequence[object], str]:

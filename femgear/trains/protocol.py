@@ -88,7 +88,7 @@ class Stage:
     needs : callable
         ``(case) -> tuple of str``: stages that must come before.
     check : callable, optional
-        ``(case) -> None``: refuses, before a run, what the stage cannot represent.
+        ``(case)``: refuses, before a run, what the stage cannot represent.
     tables : callable
         ``(Results) -> blocks`` that the page shows beside the numbers.
     """
@@ -101,7 +101,7 @@ class Stage:
     wanted: Callable[[Any], bool] = lambda case: True
     unavailable: Callable[[Any], str] = lambda case: ""
     needs: Callable[[Any], tuple[str, ...]] = lambda case: ()
-    check: Callable[[Any], None] | None = None
+    check: Callable[[Any], object] | None = None
     tables: Callable[[Results], Iterable[Block]] = lambda results: ()
 
 

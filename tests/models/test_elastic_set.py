@@ -21,6 +21,7 @@ from femgear.trains.elastic.model import (
     RADIAL,
     TANGENTIAL,
     BodyData,
+    RigidBodies,
     RingModel,
     ShaftData,
     elastic_set,
@@ -78,9 +79,7 @@ def ring(sector):
 
 
 def make(gears, ring, *, motor=MOTOR, brake=BRAKE, torque=TORQUE):
-    return elastic_set(
-        gears, ring, sun=SUN, carrier=CARRIER, planet=PLANET, motor=motor, brake=brake, sun_torque=torque
-    )
+    return elastic_set(gears, ring, RigidBodies(SUN, CARRIER, PLANET, motor, brake), sun_torque=torque)
 
 
 def place(model, name):
@@ -575,16 +574,14 @@ def test_wave_shares_tell_standing_from_travelling_waves(ring):
 
 def test_highest_mesh_mode_is_not_that_of_a_stiff_bearing():
     """Sun and planets in torsion: the reference set's 14 to 17 kHz, whatever the bearings are."""
-    from femgear.trains.elastic.model import BodyData, highest_mesh_mode
+    from femgear.trains.elastic.model import highest_mesh_mode
 
     gears, stiffness = gear_set(), np.repeat([5e8, 6.8e8], 3)
     found = [
         highest_mesh_mode(
             gears,
             stiffness,
-            sun=BodyData(0.22, 1e-4, 5e7),
-            carrier=BodyData(3.0, 6e-3, 2e8),
-            planet=BodyData(0.355, 2.17e-4, bearing),
+            RigidBodies(SUN, CARRIER, BodyData(0.355, 2.17e-4, bearing)),
             sun_torque=100.0,
         )
         for bearing in (1e7, 3e8, 1e12, 1e15)

@@ -184,7 +184,9 @@ def _wound_up(case: Case) -> Iterator[str]:
     output = next(name for name in MEMBERS if name not in (case.operation.input, case.operation.fixed))
     for name, member in (("motor", case.operation.input), ("brake", output)):
         section = getattr(case, name)
-        angle = 0.0 if section is None else abs(getattr(acting, member)) / section.coupling_stiffness
+        if section is None:
+            continue
+        angle = abs(getattr(acting, member)) / section.coupling_stiffness
         if angle > MOST_WINDING:
             yield (
                 f"[W-COUPLING] {name}.coupling_stiffness: {section.coupling_stiffness:.4g} N m/rad lets the "

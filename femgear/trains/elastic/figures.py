@@ -39,7 +39,6 @@ from femgear.report.style import (
     BLACK,
     BLUE,
     COLOURS,
-    GREY,
     ORANGE,
     SIZE,
     SKY,
@@ -56,6 +55,7 @@ from femgear.report.style import (
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 from femgear.trains.static.figures import PICTURE_FLANK_ELEMENTS, PICTURE_REFINE
+from femgear.trains.static.stages import material_of, ring_foundation
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,19 +75,13 @@ _LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Four
 ACCELERATION = "acceleration [m/s²]"
 
 
-def natural_frequencies(modes: xr.Dataset, *, mesh_frequencies: Sequence[tuple[str, float]] = ()) -> Figure:
+def natural_frequencies(modes: xr.Dataset) -> Figure:
     """Natural frequencies over the nodal diameters of the ring, by kind of mode.
 
     Parameters
     ----------
     modes : xarray.Dataset
         With ``frequency`` [Hz], ``kind`` and ``nodal_diameter``.
-    mesh_frequencies : sequence of (str, float)
-        Legend text and frequency [Hz] of excitations to draw as horizontal lines.
-
-    Returns
-    -------
-    Figure
     """
     figure, (ax,) = new_figure(height=5.0)
     kinds = np.array([str(kind) for kind in modes["kind"].values])
@@ -104,9 +98,6 @@ def natural_frequencies(modes: xr.Dataset, *, mesh_frequencies: Sequence[tuple[s
             markeredgewidth=1.6,
             label=f"{kind} ({np.count_nonzero(rows)})",
         )
-    for i, (text, value) in enumerate(mesh_frequencies):
-        dash = (0, (4, 2 + 2 * i))
-        ax.axhline(value * 1e-3, color=(GREY, ORANGE)[i % 2], linewidth=1.0, linestyle=dash, label=text)
     ticks = np.unique(diameter)
     if len(ticks) <= 25:
         ax.set_xticks(ticks, ["none" if n < 0 else str(n) for n in ticks])
@@ -126,10 +117,6 @@ def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = 
     static : xarray.Dataset, optional
         With ``ste`` (mesh, position) [m], drawn for comparison: thin with the harmonics of the excitation
         alone, so that their cut does not pass for vibration, and faint as a whole.
-
-    Returns
-    -------
-    Figure
     """
     speeds = some_speeds(dynamics.sizes["speed"])
     h = dynamics["harmonic"].values
@@ -168,10 +155,8 @@ def transmission_error_period(dynamics: xr.Dataset, static: xr.Dataset | None = 
     return figure
 
 
-def ring_mean_deflection(
-    dynamics: xr.Dataset, planetary_set: PlanetarySet, *, speed_index: int = 0
-) -> Figure:
-    """Mean radial deflection of the ring's outer surface in the carrier frame, polar.
+def ring_mean_deflection(dynamics: xr.Dataset, planetary_set: PlanetarySet) -> Figure:
+    """Mean radial deflection of the ring's outer surface in the carrier frame at the first speed, polar.
 
     Parameters
     ----------
@@ -179,16 +164,11 @@ def ring_mean_deflection(
         With ``ring_real`` and ``ring_imag`` (speed, harmonic, circumferential) [m].
     planetary_set : PlanetarySet
         Angles of the planets, which are marked.
-    speed_index : int
-
-    Returns
-    -------
-    Figure
     """
     figure, (ax,) = new_figure(width=6.4, height=6.6, polar=True)
     angle = np.linspace(0.0, 2 * np.pi, 721)
     zero = int(np.flatnonzero(dynamics["harmonic"].values == 0)[0])
-    component = harmonics_of(dynamics, "ring")[speed_index, zero]
+    component = harmonics_of(dynamics, "ring")[0, zero]
     radial = (np.exp(1j * np.outer(angle, dynamics["circumferential"].values)) @ component).real * 1e6
     size = np.abs(radial).max(initial=0.0) or 1.0
     ax.plot(angle, np.zeros_like(angle), color="0.45", linewidth=1.2, label="undeformed")
@@ -202,7 +182,7 @@ def ring_mean_deflection(
     ax.set_ylim(-1.2 * size, 1.25 * size)
     ax.set_rlabel_position(_free_angle(planetary_set.planet_angles))
     ax.tick_params(axis="x", pad=14)
-    speed = rpm(dynamics["speed"].values[speed_index])
+    speed = rpm(dynamics["speed"].values[0])
     ax.set_title(f"mean radial deflection [µm] over the angle in the carrier frame, {speed}", fontsize=SIZE)
     legend_below(figure)
     return figure
@@ -216,23 +196,18 @@ def _free_angle(angles) -> float:
     return float(np.degrees(sorted_angles[widest] + gaps[widest] / 2))
 
 
-def strongest_harmonic(housing: xr.Dataset, *, speed_index: int, ring_teeth: int) -> int:
-    """Mesh harmonic whose band holds the strongest line at one speed."""
+def shown_harmonics(housing: xr.Dataset, *, speed_index: int, ring_teeth: int) -> tuple[int, ...]:
+    """The first mesh harmonic, and the one with the strongest line where that is another one."""
     order, amplitude = housing["order"].values, housing["order_amplitude"].values[speed_index]
     audible = order > ring_teeth / 2
-    return max(1, round(float(order[audible][np.argmax(amplitude[audible])]) / ring_teeth))
+    strongest = round(float(order[audible][np.argmax(amplitude[audible])]) / ring_teeth)
+    return tuple(sorted({1, max(1, strongest)}))
 
 
 def band(housing: xr.Dataset, *, speed_index: int, ring_teeth: int, harmonic: int) -> BandAnalysis:
     """Lines, signal, envelope and lobes around one mesh harmonic; see `analyse_band`."""
     spectrum = _spectrum(housing["acceleration"].values[speed_index])
     return analyse_band(spectrum, ring_teeth, harmonic)
-
-
-def shown_harmonics(housing: xr.Dataset, *, speed_index: int, ring_teeth: int) -> tuple[int, ...]:
-    """The first mesh harmonic, and the one with the strongest line where that is another one."""
-    strongest = strongest_harmonic(housing, speed_index=speed_index, ring_teeth=ring_teeth)
-    return tuple(sorted({1, strongest}))
 
 
 def housing_signal(
@@ -248,10 +223,6 @@ def housing_signal(
     ring_teeth : int
     harmonics : sequence of int, optional
         Mesh harmonics of the bands; the first and the one with the strongest line when omitted.
-
-    Returns
-    -------
-    Figure
     """
     if harmonics is None:
         harmonics = shown_harmonics(housing, speed_index=speed_index, ring_teeth=ring_teeth)
@@ -316,10 +287,6 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     ring_teeth : int
     zooms : int
         Number of bands shown enlarged.
-
-    Returns
-    -------
-    Figure
     """
     order = housing["order"].values
     linear, exact = (
@@ -434,10 +401,8 @@ def _labelled(order, amplitude, candidates, *, spacing, limit=12):
     return chosen
 
 
-def modulation_polar(
-    housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int, harmonics: Sequence[int] | None = None
-) -> Figure:
-    """Envelope around mesh harmonics over the angle of the carrier, one polar diagram for each.
+def modulation_polar(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int) -> Figure:
+    """Envelope around the shown mesh harmonics over the angle of the carrier, one polar diagram for each.
 
     Parameters
     ----------
@@ -445,15 +410,8 @@ def modulation_polar(
         With ``acceleration`` (speed, time) [m/s^2].
     speed_index : int
     ring_teeth : int
-    harmonics : sequence of int, optional
-        Mesh harmonics; the first and the one with the strongest line when omitted.
-
-    Returns
-    -------
-    Figure
     """
-    if harmonics is None:
-        harmonics = shown_harmonics(housing, speed_index=speed_index, ring_teeth=ring_teeth)
+    harmonics = shown_harmonics(housing, speed_index=speed_index, ring_teeth=ring_teeth)
     speed = rpm(housing["speed"].values[speed_index])
     figure, axes = new_figure(columns=len(harmonics), width=5.2 * len(harmonics), height=6.2, polar=True)
     for i, (ax, harmonic) in enumerate(zip(axes, harmonics)):
@@ -511,7 +469,7 @@ def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
 def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     """Modes of the toothed ring on its foundation for 0 to 6 nodal diameters, as VTU and picture."""
     from femgear.contact.bodies import active_flank_load, make_sectors
-    from femgear.fe.elasticity import Material, foundation, mass
+    from femgear.fe.elasticity import mass
     from femgear.fe.reduction import cyclic_modes, sector_basis
     from femgear.report.scene import deformed_picture, ring_modes_grid, write_vtu
 
@@ -519,20 +477,15 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     if static is None:
         return []
 
-    gears = static.planetary_set
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    gears, material = static.planetary_set, material_of(case)
     sector = make_sectors(
         gears, material, flank_elements=PICTURE_FLANK_ELEMENTS, refine=PICTURE_REFINE, cache=drawn.cache
     ).ring
-    width = gears.ring.face_width
-    support = foundation(
-        sector.grid, "rim", case.ring.foundation_radial, case.ring.foundation_tangential, thickness=width
-    )
     load = active_flank_load(sector.grid, gears, 1.0)
     basis = sector_basis(
         sector.grid,
-        sector.stiffness + support,
-        mass(sector.grid, material, width),
+        sector.stiffness + ring_foundation(case, sector),
+        mass(sector.grid, material, gears.ring.face_width),
         count=gears.ring.teeth,
         loads=load,
     )

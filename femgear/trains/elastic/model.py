@@ -47,6 +47,26 @@ class ShaftData:
 
 
 @dataclass(frozen=True)
+class RigidBodies:
+    """What turns beside the ring.
+
+    Parameters
+    ----------
+    sun, carrier, planet : BodyData
+        Stiffness is the support of sun and carrier, and the bearing between a planet and the carrier.
+    motor, brake : ShaftData, optional
+        Inertias behind springs at the driven member and at the output; without one, its torque acts on the
+        member itself.
+    """
+
+    sun: BodyData
+    carrier: BodyData
+    planet: BodyData
+    motor: ShaftData | None = None
+    brake: ShaftData | None = None
+
+
+@dataclass(frozen=True)
 class ElasticSet:
     """The system and the places of its parts.
 
@@ -84,12 +104,8 @@ def rigid_dofs(n_planets: int, motor: bool, brake: bool) -> tuple[str, ...]:
 def elastic_set(
     planetary_set: PlanetarySet,
     ring: RingModel,
+    bodies: RigidBodies,
     *,
-    sun: BodyData,
-    carrier: BodyData,
-    planet: BodyData,
-    motor: ShaftData | None,
-    brake: ShaftData | None,
     sun_torque: float,
     driven: str = "sun",
     flexibility=None,
@@ -100,11 +116,7 @@ def elastic_set(
     ----------
     planetary_set : PlanetarySet
     ring : RingModel
-    sun, carrier, planet : BodyData
-        Stiffness is the support of sun and carrier, and the bearing between a planet and the carrier.
-    motor, brake : ShaftData, optional
-        Inertias behind springs at the driven member and at the output; without one, its torque acts on the
-        member itself.
+    bodies : RigidBodies
     sun_torque : float
         Torque on the sun [N m]; its sign tells which flanks carry.
     driven : {"sun", "carrier"}
@@ -112,8 +124,8 @@ def elastic_set(
     flexibility : (2N, 2N) array, optional
         Compliance of the bodies between the meshes, see `body_flexibility` [m/N].
     """
-    motor_shaft, brake_shaft = ("motor", motor), ("brake", brake)
-    names = rigid_dofs(planetary_set.n_planets, motor is not None, brake is not None)
+    motor, brake = ("motor", bodies.motor), ("brake", bodies.brake)
+    names = rigid_dofs(planetary_set.n_planets, bodies.motor is not None, bodies.brake is not None)
     place = {name: i for i, name in enumerate(names)}
     n_rigid = len(names)
     modes = ring.modes
@@ -124,8 +136,8 @@ def elastic_set(
     M, K, W, load = np.zeros(n), np.zeros((n, n)), np.zeros((n, 2 * planetary_set.n_planets)), np.zeros(n)
     M[n_rigid:] = 1.0
     K[range(n_rigid, n), range(n_rigid, n)] = (2 * np.pi * modes.frequency[ring_mode]) ** 2
-    _place_bodies(M, K, place, planetary_set, sun, carrier, planet)
-    shafts = (motor_shaft, brake_shaft) if driven == "sun" else (brake_shaft, motor_shaft)
+    _place_bodies(M, K, place, planetary_set, bodies)
+    shafts = (motor, brake) if driven == "sun" else (brake, motor)
     _place_shafts(M, K, load, place, planetary_set, shafts, sun_torque)
     side = 1.0 if sun_torque >= 0 else -1.0
     rigid = np.zeros_like(W)
@@ -167,8 +179,9 @@ def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.nd
     return ring.norm[ring_mode, None] * np.where(sine, factor.imag, factor.real)
 
 
-def _place_bodies(M, K, place, planetary_set, sun, carrier, planet):
-    for name, body in (("sun", sun), ("carrier", carrier)):
+def _place_bodies(M, K, place, planetary_set, bodies: RigidBodies) -> None:
+    planet = bodies.planet
+    for name, body in (("sun", bodies.sun), ("carrier", bodies.carrier)):
         for axis in ("x", "y"):
             i = place[f"{name}: {axis}"]
             M[i] = body.mass
@@ -219,7 +232,7 @@ def _mesh_directions(W, place, planetary_set, side):
 
 
 def highest_mesh_mode(
-    planetary_set: PlanetarySet, stiffness, *, sun: BodyData, carrier: BodyData, planet: BodyData, sun_torque
+    planetary_set: PlanetarySet, stiffness, bodies: RigidBodies, *, sun_torque: float
 ) -> float:
     """Highest natural frequency of the rigid gears in a rigid ring whose strain is in the meshes [Hz].
 
@@ -230,13 +243,13 @@ def highest_mesh_mode(
     planetary_set : PlanetarySet
     stiffness : (2N,) array
         Mean mesh stiffness [N/m].
-    sun, carrier, planet, sun_torque
-        As for `elastic_set`.
+    bodies, sun_torque
+        As for `elastic_set`; motor and brake are left out.
     """
     names = rigid_dofs(planetary_set.n_planets, False, False)
     place = {name: i for i, name in enumerate(names)}
     M, K, W = np.zeros(len(names)), np.zeros((len(names),) * 2), np.zeros((len(names), len(stiffness)))
-    _place_bodies(M, K, place, planetary_set, sun, carrier, planet)
+    _place_bodies(M, K, place, planetary_set, bodies)
     _mesh_directions(W, place, planetary_set, 1.0 if sun_torque >= 0 else -1.0)
     K += (W * stiffness) @ W.T
     values, shapes = np.linalg.eigh(K / np.sqrt(np.outer(M, M)))
@@ -543,10 +556,12 @@ def ring_model(
         max_frequency=max_frequency,
     )
     compliance = [
-        cyclic_harmonics(
-            condense_sector(grid, matrix, count=ring.teeth, held=held, loads=load, observations=load),
-            diameters,
-        )[:, 0, 0].real
+        np.real(
+            cyclic_harmonics(
+                condense_sector(grid, matrix, count=ring.teeth, held=held, loads=load, observations=load),
+                diameters,
+            )[:, 0, 0]
+        )
         for matrix, held in ((stiffness + foundation, None), (stiffness, "rim"))
     ]
     pitch_radius = ring.base_radius / np.cos(planetary_set.working_pressure_angle_planet_ring)

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 # speeds, and bands at each of them, that are listed
 _FEW = 4
 _FIRST, _STRONGEST = 6, 4
+_HIGHEST = "highest frequency of the excitation"
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,51 @@ class ModesResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc."""
+        from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ring_field
 
-        return modes_dataset(self)
+        modes, model, state, n_max = self.modes, self.model, self.state, self.max_diameter
+        record, supported = "mesh supported_position", "static transmission error of the set on its supports"
+        between = "compliance between the meshes through their bodies"
+        variables = {
+            "frequency": ("mode", modes.frequency, "Hz", "undamped natural frequency"),
+            "damping_ratio": ("mode", modes.damping_ratio, "1", "fraction of critical damping"),
+            "kind": ("mode", list(modes.kind), "1", "kind of mode"),
+            "nodal_diameter": ("mode", modes.nodal_diameter, "1", "dominant nodal diameter of the ring"),
+            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+            "mesh_stiffness": ("mesh", modes.mesh_stiffness, "N/m", "mean mesh stiffness, ring taken out"),
+            "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
+            "supported_ste": (record, state.deflection, "m", supported),
+            "supported_force": (record, state.force, "N", "mesh force of the set on its supports"),
+            "supported_stiffness": (record, state.stiffness, "N/m", "tangent mesh stiffness on the supports"),
+            "flexibility": ("mesh other_mesh", model.system.flexibility, "m/N", between),
+        }
+        coordinates = modes.shape[model.ring_slice].T
+        for name, output in (("ring_shape", RADIAL), ("ring_tangential_shape", TANGENTIAL)):
+            field = ring_field(model, self.ring.modes, coordinates, output, n_max)
+            words = (
+                f"outer {'radial' if output == RADIAL else 'tangential'} displacement, component exp(i n phi)"
+            )
+            for part in ("real", "imag"):
+                variables[f"{name}_{part}"] = ("mode circumferential", getattr(field, part), "kg^-1/2", words)
+        names, diameters = _mesh_names(len(modes.mesh_stiffness) // 2), np.arange(-n_max, n_max + 1)
+        denser = "position in mesh periods, denser near jumps of the stiffness"
+        return dataset(
+            variables,
+            coords={
+                "mode": ("mode", np.arange(len(modes.frequency)), "1", "mode"),
+                "dof": ("dof", list(modes.dofs), "1", "degree of freedom"),
+                "mesh": ("mesh", names, "1", "gear mesh"),
+                "other_mesh": ("other_mesh", names, "1", "gear mesh"),
+                "supported_position": ("supported_position", state.position, "1", denser),
+                "circumferential": ("circumferential", diameters, "1", "signed nodal diameter n"),
+            },
+            attrs={
+                "title": "modal basis with mean mesh stiffnesses",
+                "unknowns": len(model.system.M),
+                "planet_angles": model.planet_angles,
+                "excitation_reach": self.reach,
+            },
+        )
 
 
 @dataclass(frozen=True)
@@ -96,8 +140,44 @@ class DynamicsResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of dynamics.nc."""
-
-        return dynamics_dataset(self)
+        response, lines, field = self.response, "speed mesh harmonic", "speed harmonic circumferential"
+        n_max, harmonics = self.ring_radial.shape[-1] // 2, np.arange(response.force.shape[-1])
+        diameters = np.arange(-n_max, n_max + 1)
+        entries = (
+            ("dte", lines, self.dte, "m", "dynamic transmission error"),
+            ("mesh_force", lines, response.force, "N", "dynamic mesh force"),
+            ("mesh_deflection", lines, response.deflection, "m", "deflection of the mesh spring"),
+            ("ring", field, self.ring_radial, "m", "outer radial displacement of the ring"),
+            (
+                "ring_tangential",
+                field,
+                self.ring_tangential,
+                "m",
+                "outer tangential displacement of the ring",
+            ),
+        )
+        change = "change of the housing level with excitation up to the frequency compared_to"
+        reach = {
+            "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
+            "level_change": ("speed", self.level_change, "dB", change),
+        }
+        return dataset(
+            response_entries(self) | reach | complex_entries(entries),
+            coords={
+                "speed": ("speed", self.input_speed / RPM, "rpm", "speed of the input"),
+                "mesh": ("mesh", list(self.mesh_names), "1", "gear mesh"),
+                "harmonic": ("harmonic", harmonics, "1", "harmonic of the mesh frequency"),
+                "circumferential": ("circumferential", diameters, "1", "signed nodal diameter n"),
+            },
+            attrs={
+                "title": "periodic response by the spectral method",
+                "message": response.message,
+                "compared_to": self.compared_to,
+                "warnings": " ".join(self.warnings),
+                "ring_teeth": self.ring_teeth,
+                "fourier_convention": FOURIER,
+            },
+        )
 
 
 @dataclass(frozen=True)
@@ -119,175 +199,41 @@ class HousingResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of housing.nc."""
+        from femgear.housing.orders import order_level
 
-        return housing_dataset(self)
-
-
-def modes_dataset(result: ModesResult) -> xr.Dataset:
-    """Contents of modes.nc."""
-    from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ring_field
-
-    modes, model, n_max = result.modes, result.model, result.max_diameter
-    coordinates = modes.shape[model.ring_slice].T
-    variables = {
-        "frequency": (("mode",), modes.frequency, "Hz", "undamped natural frequency"),
-        "damping_ratio": (("mode",), modes.damping_ratio, "1", "fraction of critical damping"),
-        "kind": (("mode",), list(modes.kind), "1", "kind of mode"),
-        "nodal_diameter": (("mode",), modes.nodal_diameter, "1", "dominant nodal diameter of the ring"),
-        "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
-        "mesh_stiffness": (("mesh",), modes.mesh_stiffness, "N/m", "mean mesh stiffness, ring taken out"),
-        "mesh_deflection": (
-            ("mesh", "mode"),
-            modes.mesh_deflection,
-            "kg^-1/2",
-            "mesh deflection of the mode",
-        ),
-    }
-    state, record = result.state, ("mesh", "supported_position")
-    variables |= {
-        "supported_ste": (
-            record,
-            state.deflection,
-            "m",
-            "static transmission error of the set on its supports",
-        ),
-        "supported_force": (record, state.force, "N", "mesh force of the set on its supports"),
-        "supported_stiffness": (record, state.stiffness, "N/m", "tangent mesh stiffness on the supports"),
-        "flexibility": (
-            ("mesh", "other_mesh"),
-            model.system.flexibility,
-            "m/N",
-            "compliance between the meshes through their bodies",
-        ),
-    }
-    for name, output in (("ring_shape", RADIAL), ("ring_tangential_shape", TANGENTIAL)):
-        field = ring_field(model, result.ring.modes, coordinates, output, n_max)
-        words = f"outer {'radial' if output == RADIAL else 'tangential'} displacement, component exp(i n phi)"
-        for part in ("real", "imag"):
-            values = getattr(field, part)
-            variables[f"{name}_{part}"] = (("mode", "circumferential"), values, "kg^-1/2", words)
-    n_meshes, diameters = len(modes.mesh_stiffness), np.arange(-n_max, n_max + 1)
-    return dataset(
-        variables,
-        coords={
-            "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
-            "dof": (("dof",), list(modes.dofs), "1", "degree of freedom"),
-            "mesh": (("mesh",), _mesh_names(n_meshes // 2), "1", "gear mesh"),
-            "other_mesh": (("other_mesh",), _mesh_names(n_meshes // 2), "1", "gear mesh"),
-            "supported_position": (
-                ("supported_position",),
-                state.position,
-                "1",
-                "position in mesh periods, denser near jumps of the stiffness",
-            ),
-            "circumferential": (("circumferential",), diameters, "1", "signed nodal diameter n"),
-        },
-        attrs={
-            "title": "modal basis with mean mesh stiffnesses",
-            "unknowns": len(model.system.M),
-            "planet_angles": model.planet_angles,
-            "excitation_reach": result.reach,
-        },
-    )
-
-
-def dynamics_dataset(result: DynamicsResult) -> xr.Dataset:
-    """Contents of dynamics.nc."""
-    response, lines = result.response, ("speed", "mesh", "harmonic")
-    field = ("speed", "harmonic", "circumferential")
-    n_max, harmonics = result.ring_radial.shape[-1] // 2, np.arange(response.force.shape[-1])
-    diameters = np.arange(-n_max, n_max + 1)
-    entries = (
-        ("dte", lines, result.dte, "m", "dynamic transmission error"),
-        ("mesh_force", lines, response.force, "N", "dynamic mesh force"),
-        ("mesh_deflection", lines, response.deflection, "m", "deflection of the mesh spring"),
-        ("ring", field, result.ring_radial, "m", "outer radial displacement of the ring"),
-        ("ring_tangential", field, result.ring_tangential, "m", "outer tangential displacement of the ring"),
-    )
-    reach = {
-        "excitation_limit": (
-            ("speed",),
-            result.excitation_limit,
-            "Hz",
-            "highest frequency of the excitation",
-        ),
-        "level_change": (
-            ("speed",),
-            result.level_change,
-            "dB",
-            "change of the housing level with excitation up to the frequency compared_to",
-        ),
-    }
-    return dataset(
-        response_entries(result) | reach | complex_entries(entries),
-        coords={
-            "speed": (("speed",), result.input_speed / RPM, "rpm", "speed of the input"),
-            "mesh": (("mesh",), list(result.mesh_names), "1", "gear mesh"),
-            "harmonic": (("harmonic",), harmonics, "1", "harmonic of the mesh frequency"),
-            "circumferential": (("circumferential",), diameters, "1", "signed nodal diameter n"),
-        },
-        attrs={
-            "title": "periodic response by the spectral method",
-            "message": response.message,
-            "compared_to": result.compared_to,
-            "warnings": " ".join(result.warnings),
-            "ring_teeth": result.ring_teeth,
-            "fourier_convention": FOURIER,
-        },
-    )
-
-
-def housing_dataset(result: HousingResult) -> xr.Dataset:
-    """Contents of housing.nc."""
-    from femgear.housing.orders import order_level
-
-    signal, speed = result.signal, ("speed",)
-    order = ("speed", "order")
-    variables = {
-        "seconds": (("speed", "time"), signal.seconds, "s", "time"),
-        "acceleration": (
-            ("speed", "time"),
-            signal.acceleration,
-            "m/s^2",
-            "radial acceleration at the sensor",
-        ),
-        "displacement": (("speed", "time"), signal.displacement, "m", "radial displacement at the sensor"),
-        "order_amplitude": (
-            order,
-            np.abs(result.lines.acceleration),
-            "m/s^2",
-            f"acceleration, {result.lines.method}",
-        ),
-        "order_amplitude_exact": (
-            order,
-            np.abs(result.exact.acceleration),
-            "m/s^2",
+        signal, lines, exact = self.signal, self.lines, self.exact
+        heard = np.abs(lines.acceleration), np.abs(exact.acceleration), np.angle(exact.displacement)
+        words = (
+            f"acceleration, {lines.method}",
             "acceleration, exact lines",
-        ),
-        "order_phase_exact": (
-            order,
-            np.angle(result.exact.displacement),
-            "rad",
             "displacement phase, exact lines",
-        ),
-        "excitation_limit": (speed, result.excitation_limit, "Hz", "highest frequency of the excitation"),
-        "level": (speed, order_level(result.lines), "m/s^2", "root mean square of the acceleration"),
-    }
-    return dataset(
-        variables,
-        coords={
-            "speed": (speed, result.input_speed / RPM, "rpm", "speed of the input"),
-            "time": (("time",), signal.revolution, "1", "fraction of one carrier revolution"),
-            "order": (("order",), result.lines.order, "1", "carrier order"),
-        },
-        attrs={
-            "title": "what a sensor fixed on the housing hears",
-            "sensor_angle": result.lines.sensor_angle,
-            "form": result.form,
-            "points": result.points,
-            "ring_teeth": result.lines.z_ring,
-        },
-    )
+        )
+        at_sensor = "radial acceleration at the sensor", "radial displacement at the sensor"
+        variables = {
+            "seconds": ("speed time", signal.seconds, "s", "time"),
+            "acceleration": ("speed time", signal.acceleration, "m/s^2", at_sensor[0]),
+            "displacement": ("speed time", signal.displacement, "m", at_sensor[1]),
+            "order_amplitude": ("speed order", heard[0], "m/s^2", words[0]),
+            "order_amplitude_exact": ("speed order", heard[1], "m/s^2", words[1]),
+            "order_phase_exact": ("speed order", heard[2], "rad", words[2]),
+            "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
+            "level": ("speed", order_level(lines), "m/s^2", "root mean square of the acceleration"),
+        }
+        return dataset(
+            variables,
+            coords={
+                "speed": ("speed", self.input_speed / RPM, "rpm", "speed of the input"),
+                "time": ("time", signal.revolution, "1", "fraction of one carrier revolution"),
+                "order": ("order", lines.order, "1", "carrier order"),
+            },
+            attrs={
+                "title": "what a sensor fixed on the housing hears",
+                "sensor_angle": lines.sensor_angle,
+                "form": self.form,
+                "points": self.points,
+                "ring_teeth": lines.z_ring,
+            },
+        )
 
 
 def describe_housing(data: xr.Dataset) -> Block:

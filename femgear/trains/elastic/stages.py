@@ -14,8 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations
-from femgear.case.dependencies import check_entries, dynamic_entries, modal_entries, static_entries
-from femgear.case.sections import Case
+from femgear.case.dependencies import (
+    Steps,
+    check_entries,
+    dynamic_entries,
+    modal_entries,
+    ring_entries,
+    state_entries,
+    static_entries,
+)
+from femgear.case.sections import CarrierSection, Case, MachineSection, SunSection
 from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.threads import one_blas_thread
 from femgear.trains.elastic.checks import (
@@ -39,19 +47,21 @@ from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import (
     STATIC,
     STRESS,
-    _backlash,
-    _ring_foundation,
-    _supports_of,
+    case_supports,
+    material_of,
+    mesh_backlash,
     response_verdict,
+    ring_foundation,
 )
 
 if TYPE_CHECKING:
+    from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
     from femgear.gears.planetary import PlanetarySet
     from femgear.system.system import Modes, Response
     from femgear.trains.elastic.checks import FrequencyLimit
-    from femgear.trains.elastic.model import ElasticSet, RingModel
+    from femgear.trains.elastic.model import ElasticSet, RigidBodies, RingModel
 
 RECORD = 2**13
 """Positions of the excitation in one mesh period at least."""
@@ -61,7 +71,9 @@ twice a frequency carry the response there."""
 
 
 @one_blas_thread()
-def solve_modes(case: Case, static: StaticResult, *, progress: Progress | None = None) -> ModesResult:
+def solve_modes(
+    case: Case, static: StaticResult, *, progress: Progress | None = None, steps: Steps | None = None
+) -> ModesResult:
     """Modal basis of the set with its elastic ring and mean mesh stiffnesses.
 
     Its loaded state, from which the meshes take stiffness and excitation, is that of the set on its supports
@@ -73,40 +85,67 @@ def solve_modes(case: Case, static: StaticResult, *, progress: Progress | None =
     static : StaticResult
     progress : callable, optional
         Called with (stage, done, total).
+    steps : Steps, optional
+        Compliances, loaded states and ring models of other cases, taken where they are those of this one.
 
     Raises
     ------
     CaseError
         Without torque, or when the ring, which is the housing of this model, is not the fixed member.
     """
-    from femgear.contact.bodies import active_flank_load, with_ring
-    from femgear.fe.elasticity import Material, mass
+    check_entries(static.entries, static_entries(case), "static solution")
+    check_dynamic_case(case, static.planetary_set)
+    steps, entries = steps or Steps(), ring_entries(case)
+    bodies = _ring_states(case, static, steps)
+    state = steps.take(
+        "loaded state",
+        state_entries(case),
+        lambda: state_on_supports(case, bodies, static.sun_torque, progress=progress),
+    )
+    reach, side = excitation_reach(case, state, static.sun_torque), 1.0 if static.sun_torque >= 0 else -1.0
+    ring = steps.take(
+        "ring model",
+        {**entries, "reach": reach, "side": side},
+        lambda: ring_of_case(case, static, reach=reach, side=side),
+    )
+    return modal_basis(case, ring, bodies, state, sun_torque=static.sun_torque, reach=reach)
+
+
+def _ring_states(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
+    """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
+    from femgear.contact.bodies import with_ring
+
+    fixed = case.static.members == "fixed"
+
+    def other() -> Bodies:
+        springs = ring_foundation(case, static.sectors.ring) if fixed else None
+        return with_ring(static.bodies, static.sectors, depth=case.static.depth, ring_foundation=springs)
+
+    found = steps.take("ring compliances", ring_entries(case), other)
+    return (found, static.bodies) if fixed else (static.bodies, found)
+
+
+def ring_of_case(case: Case, static: StaticResult, *, reach: float, side: float) -> RingModel:
+    """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz].
+
+    ``side`` is the sign of the sun's torque.
+    """
+    from femgear.contact.bodies import active_flank_load
+    from femgear.fe.elasticity import mass
     from femgear.trains.elastic.model import ring_model
 
-    check_entries(static.entries, static_entries(case), "static solution")
     gears, sector = static.planetary_set, static.sectors.ring
-    check_dynamic_case(case, gears)
-    side = 1.0 if static.sun_torque >= 0 else -1.0
-    foundation = _ring_foundation(case, sector)
-    springs = foundation if case.static.members == "fixed" else None
-    other = with_ring(static.bodies, static.sectors, depth=case.static.depth, ring_foundation=springs)
-    bodies = (other, static.bodies) if springs is not None else (static.bodies, other)
-    state = state_on_supports(case, bodies, static.sun_torque, progress=progress)
-    reach = excitation_reach(case, state, static.sun_torque)
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-    diameter = max_nodal_diameter(case)
-    ring = ring_model(
+    return ring_model(
         gears,
         sector.grid,
         sector.stiffness,
-        mass(sector.grid, material, gears.ring.face_width),
-        foundation,
+        mass(sector.grid, material_of(case), gears.ring.face_width),
+        ring_foundation(case, sector),
         active_flank_load(sector.grid, gears, side),
-        max_diameter=diameter,
+        max_diameter=max_nodal_diameter(case),
         max_frequency=MODES_ABOVE * reach,
         side=side,
     )
-    return modal_basis(case, ring, bodies, state, sun_torque=static.sun_torque, reach=reach)
 
 
 def state_on_supports(case: Case, bodies, sun_torque: float, *, progress=None) -> LoadedPeriod:
@@ -125,7 +164,7 @@ def state_on_supports(case: Case, bodies, sun_torque: float, *, progress=None) -
         contact=case.static.contact,
         deviations=None if deviations.ideal else deviations,
         # the bearings of the dynamic model are linear
-        supports=replace(_supports_of(case), planet_clearance=0.0),
+        supports=replace(case_supports(case), planet_clearance=0.0),
         progress=None if progress is None else lambda done, total: progress("modes", done, total),
     )
 
@@ -136,7 +175,7 @@ def excitation_reach(case: Case, state: LoadedPeriod, sun_torque: float) -> floa
     from femgear.trains.elastic.model import highest_mesh_mode
 
     gears, stiffness = planetary_set(case), state.resampled("held_stiffness", RECORD).mean(axis=1)
-    mesh_mode = highest_mesh_mode(gears, stiffness, **_bodies_of(case), sun_torque=sun_torque)
+    mesh_mode = highest_mesh_mode(gears, stiffness, rigid_bodies(case), sun_torque=sun_torque)
     return highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
 
 
@@ -159,17 +198,18 @@ def modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, sun
     # equal planets are equal to rounding when their phases are among the positions
     record = gears.n_planets * -(-RECORD // gears.n_planets)
     excitation = mesh_excitation(
-        *(state.resampled(name, record) for name in ("held_stiffness", "deflection", "force")),
+        state.resampled("held_stiffness", record),
+        state.resampled("deflection", record),
+        state.resampled("force", record),
         held,
         ring_compliance=compliance,
         flexibility=flexibility,
-        backlash=_backlash(gears),
+        backlash=mesh_backlash(gears),
     )
     model = elastic_set(
         gears,
         ring,
-        **_bodies_of(case),
-        **_shafts_of(case),
+        rigid_bodies(case),
         sun_torque=sun_torque,
         driven=case.operation.input,
         flexibility=flexibility,
@@ -241,6 +281,21 @@ def solve_dynamics(
         compared_to=compared_to,
         entries=dynamic_entries(case),
     )
+
+
+@one_blas_thread()
+def solve_response(case: Case, modes: ModesResult) -> Response:
+    """Periodic response at the speeds of the case, without stability and fields of `solve_dynamics`.
+
+    Raises
+    ------
+    CaseError
+        E-CRITICAL-SPEED, as there.
+    """
+    found = turning_speeds(case, planetary_set(case))
+    check_rim_speed(modes.ring.modes, [s.carrier for s in found])
+    frequency = np.array([s.mesh_frequency for s in found])
+    return periodic_response(case, modes, frequency, modes.reach, given=case.dynamics.mesh_harmonics)[1]
 
 
 def turning_speeds(case: Case, gears: PlanetarySet) -> tuple[Speeds, ...]:
@@ -402,25 +457,21 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     )
 
 
-def _bodies_of(case: Case) -> dict:
-    """Rigid bodies of the case as the elastic model takes them."""
-    from femgear.trains.elastic.model import BodyData
+def rigid_bodies(case: Case) -> RigidBodies:
+    """Rigid bodies of a case, with motor and brake where it has them."""
+    from femgear.trains.elastic.model import BodyData, RigidBodies, ShaftData
 
-    return {
-        "sun": BodyData(case.sun.mass, case.sun.inertia, case.sun.support_stiffness),
-        "carrier": BodyData(case.carrier.mass, case.carrier.inertia, case.carrier.support_stiffness),
-        "planet": BodyData(case.planet.mass, case.planet.inertia, case.planet.bearing_stiffness),
-    }
+    def supported(section: SunSection | CarrierSection) -> BodyData:
+        # given, or found from the shaft by the reader of the case
+        assert section.support_stiffness is not None
+        return BodyData(section.mass, section.inertia, section.support_stiffness)
 
-
-def _shafts_of(case: Case) -> dict:
-    """Motor and brake of the case as the elastic model takes them."""
-    from femgear.trains.elastic.model import ShaftData
-
-    def shaft(section):
+    def shaft(section: MachineSection | None) -> ShaftData | None:
         return None if section is None else ShaftData(section.inertia, section.coupling_stiffness)
 
-    return {"motor": shaft(case.motor), "brake": shaft(case.brake)}
+    planet = BodyData(case.planet.mass, case.planet.inertia, case.planet.bearing_stiffness)
+    ends = shaft(case.motor), shaft(case.brake)
+    return RigidBodies(supported(case.sun), supported(case.carrier), planet, *ends)
 
 
 def _named(modes: Modes, model: ElasticSet) -> Modes:

@@ -14,21 +14,20 @@ By what they show:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations
 from femgear.gears.modifications import form_deviation
-from femgear.gears.phasing import MODES, MeshPhasing, PhasingTable, phase_factors, phasing_table
+from femgear.gears.phasing import MeshPhasing, PhasingTable, phase_factors, phasing_table
 from femgear.report.style import (
     BLACK,
     BLUE,
     COLOURS,
-    DASHES,
     GREY,
     ORANGE,
     SIZE,
@@ -42,6 +41,7 @@ from femgear.report.style import (
     periodic,
 )
 from femgear.trains.protocol import Drawn, Figures
+from femgear.trains.static.stages import material_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +59,6 @@ CRITICAL_SLOPE = {False: 30.0, True: 60.0}
 KINDS = ("sun-planet", "planet-ring")
 
 _CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 121))
-_MARKS = {"rotational": ("o", BLUE), "translational": ("^", VERMILION), "planet": ("s", BLACK)}
 
 # pictures need no converged stresses: a sector of some thousand nodes keeps the files small
 PICTURE_FLANK_ELEMENTS = 6
@@ -73,10 +72,6 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     ----------
     static : xarray.Dataset
         With ``ste`` (mesh, position) and ``ste_overall`` (planet, position) [m].
-
-    Returns
-    -------
-    Figure
     """
     figure, (left, right) = new_figure(columns=2, width=9.5, sharex=True)
     names = static["mesh"].values
@@ -106,10 +101,6 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
         With ``mesh_stiffness`` and ``mesh_stiffness_secant`` (mesh, position) [N/m].
     face_width : float, optional
         [m]; adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
-
-    Returns
-    -------
-    Figure
     """
     lines = distinct_lines(static["mesh"].values, static["mesh_stiffness"])
     # two families of curves that differ from planet to planet would cover one another
@@ -144,10 +135,6 @@ def load_sharing(static: xr.Dataset) -> Figure:
     ----------
     static : xarray.Dataset
         With ``load_share`` (planet, position) [1].
-
-    Returns
-    -------
-    Figure
     """
     figure, (ax,) = new_figure(height=3.8)
     position, share = periodic(static["position"], static["load_share"] * 100)
@@ -178,10 +165,6 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     ----------
     static : xarray.Dataset
         With ``tooth_load`` (mesh, tooth, position) and ``mesh_force`` (mesh, position) [N].
-
-    Returns
-    -------
-    Figure
     """
     figure, axes = new_figure(columns=2, width=9.5, sharey=True)
     names = [str(name) for name in static["mesh"].values]
@@ -219,10 +202,6 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
     stress : xarray.Dataset
         With ``root_tension`` and ``root_compression`` [Pa] and ``root_path`` [1] (mesh, gear, step); where
         it has ``iso_root_stress`` [Pa] (mesh, gear), the nominal stress is drawn too.
-
-    Returns
-    -------
-    Figure
     """
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharex=True, sharey=True)
     for ax, (title, row, _) in zip(axes, _four_gears(stress)):
@@ -250,10 +229,6 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
     stress : xarray.Dataset
         With ``root_profile`` (mesh, gear, root, point) [Pa], ``root_arc`` [m] and ``root_slope`` [rad]
         (mesh, gear, point).
-
-    Returns
-    -------
-    Figure
     """
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
     for ax, (title, row, internal) in zip(axes, _four_gears(stress)):
@@ -286,10 +261,6 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
         With ``pressure_distribution`` [Pa] (mesh, pair, cell, position), ``pressure_offset`` (mesh, cell),
         ``pressure_centre`` and ``pressure_path`` (mesh, pair, position) [m], ``contact_pressure`` [Pa] (mesh,
         position) and ``iso_contact_stress`` [Pa] (mesh).
-
-    Returns
-    -------
-    Figure
     """
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6)
     top = float(stress["contact_pressure"].max()) * 1e-6 or 1.0
@@ -324,7 +295,9 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
     highest = float(stress["pressure_distribution"].max()) * 1e-6
     if highest > top:
         text = f"up to {highest:.0f} MPa where a tip edge carries, cut here: no limit as cells shrink"
-        figure.legends[0].set_title(text, prop={"size": SIZE - 1})
+        from matplotlib.font_manager import FontProperties
+
+        figure.legends[0].set_title(text, prop=FontProperties(size=SIZE - 1))
     return figure
 
 
@@ -348,10 +321,6 @@ def load_spectrum(stress: xr.Dataset) -> Figure:
     stress : xarray.Dataset
         With ``load_time_share`` and ``load_cycle_share`` (mesh, load_bin) [1], ``load_bin_low`` and
         ``load_bin_high`` (load_bin) [N], ``load_cycles`` (mesh, gear) [1].
-
-    Returns
-    -------
-    Figure
     """
     figure, axes = new_figure(columns=2, width=9.5, sharex=True, sharey=True)
     edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
@@ -380,10 +349,6 @@ def planet_bending(stress: xr.Dataset) -> Figure:
     ----------
     stress : xarray.Dataset
         With ``planet_root_stress`` [Pa] (mesh, turn).
-
-    Returns
-    -------
-    Figure
     """
     figure, (ax,) = new_figure()
     values = stress["planet_root_stress"].values * 1e-6
@@ -461,6 +426,22 @@ def has_pitches(deviations: SetDeviations) -> bool:
     return any(p.any() for p in (d.sun_pitch, d.planet_pitch, d.planet_ring_side_pitch, d.ring_pitch))
 
 
+def _four_flanks(draw: Callable[[int, Any], str]) -> Figure:
+    """Deviations of the flanks of sun, planets (twice) and ring, drawn one each on common axes.
+
+    ``draw`` is called with the number of the flank and its axes, and returns the title.
+    """
+    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
+    for number, ax in enumerate(axes):
+        label(ax, title=draw(number, ax))
+    for ax in axes[::2]:
+        label(ax, y="deviation [µm], material positive")
+    low, high = axes[0].get_ylim()
+    axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
+    legend_below(figure, columns=5)
+    return figure
+
+
 def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
     """Profiles of the four kinds of loaded flanks over the roll angle, positive with more material.
 
@@ -482,24 +463,19 @@ def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Fig
         ("planet, ring side", d.planet_ring_side, s.planet),
         ("ring", d.ring, s.ring),
     )
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
-    for ax, (name, form, gear), ends in zip(axes, flanks, active):
+
+    def draw(number: int, ax) -> str:
+        name, form, gear = flanks[number]
         roll = _stations(form, gear)
         ax.plot(_degrees(gear, roll), -1e6 * form_deviation(form, gear, roll), color=BLUE, label="profile")
         ax.axhline(0.0, color=BLACK, linewidth=0.8, label="involute")
-        ax.axvspan(*_degrees(gear, np.array(ends)), color="0.93", label="meets the mate")
-        for place, roll_length, dash in (
-            ("form circle", gear.form_roll, ":"),
-            ("tip circle", gear.tip_roll, "--"),
-        ):
-            ax.axvline(float(_degrees(gear, roll_length)), color=GREY, linestyle=dash, label=place)
-        label(ax, "roll angle [deg]", title=name)
-    for ax in axes[::2]:
-        label(ax, y="deviation [µm], material positive")
-    low, high = axes[0].get_ylim()
-    axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
-    legend_below(figure, columns=5)
-    return figure
+        ax.axvspan(*_degrees(gear, np.array(active[number])), color="0.93", label="meets the mate")
+        for place, end, dash in (("form circle", gear.form_roll, ":"), ("tip circle", gear.tip_roll, "--")):
+            ax.axvline(float(_degrees(gear, end)), color=GREY, linestyle=dash, label=place)
+        label(ax, "roll angle [deg]")
+        return name
+
+    return _four_flanks(draw)
 
 
 def pitch_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
@@ -522,19 +498,17 @@ def pitch_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figur
         ("planets, ring side", [(f"planet {n + 1}", d.planet_ring_side_pitch[n]) for n in range(N)]),
         ("ring", [("ring", d.ring_pitch)]),
     )
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
-    for ax, (title, lines) in zip(axes, rows):
+
+    def draw(number: int, ax) -> str:
+        title, lines = rows[number]
         for i, (name, values) in enumerate(lines):
             # sun, ring and planets differ in the common legend
             style = line_style(i if len(lines) > 1 else N + (title == "ring"))
             ax.step(np.arange(len(values)), -1e6 * values, where="mid", label=name, **style)
-        label(ax, "tooth number [1]", title=title)
-    for ax in axes[::2]:
-        label(ax, y="deviation [µm], material positive")
-    low, high = axes[0].get_ylim()
-    axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
-    legend_below(figure, columns=5)
-    return figure
+        label(ax, "tooth number [1]")
+        return title
+
+    return _four_flanks(draw)
 
 
 def active_rolls(planetary_set: PlanetarySet) -> tuple[tuple[float, float], ...]:
@@ -578,10 +552,6 @@ def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 
     phasing : MeshPhasing
     harmonics : sequence of int
         A hand upwards has phase zero; phase grows counter-clockwise.
-
-    Returns
-    -------
-    Figure
     """
     table, factors = phasing_table(phasing, list(harmonics)), phase_factors(phasing, list(harmonics))
     columns = min(4, len(harmonics))
@@ -594,7 +564,7 @@ def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 
         ax.set_axis_off()
         ax.set_aspect("equal")
     for h, (ax, row) in enumerate(zip(axes, factors)):
-        ax.plot(_CIRCLE.real, _CIRCLE.imag, color="0.85", linewidth=1.0)
+        ax.plot(*_xy(_CIRCLE), color="0.85", linewidth=1.0)
         for n, centre in enumerate(centres):
             ax.plot(*_xy(centre + dial * _CIRCLE), color=GREY, linewidth=1.0)
             number = centre * (1.0 + 1.35 * dial)
@@ -619,112 +589,6 @@ def _verdict(table: PhasingTable, row: int) -> str:
         if size > 1e-9
     ]
     return "\n".join(left) or "nothing on\nsun and ring"
-
-
-def resultant_chart(tables: Mapping[str, PhasingTable]) -> Figure:
-    """Resultants that are left and kinds of modes excited, harmonic by harmonic, one picture a set.
-
-    The counterpart of Fig. 4 of A. Kahraman (J. Mech. Des. 116, 1994, 713-720); the area of a mark is the
-    share of the mesh forces.
-
-    Parameters
-    ----------
-    tables : mapping of str to PhasingTable
-        Titles and sets.
-
-    Returns
-    -------
-    Figure
-    """
-    count = len(tables)
-    columns = min(4, count)
-    rows = -(-count // columns)
-    tall = max(len(table.harmonics) for table in tables.values())
-    figure, axes = new_figure(
-        rows=rows, columns=columns, width=3.0 * columns, height=(0.42 * tall + 1.9) * rows + 0.4
-    )
-    names = ("torque, thrust", "lateral force, tilting", *(f"{name} modes" for name in MODES))
-    for ax in axes[count:]:
-        ax.set_visible(False)
-    for ax, (title, table) in zip(axes, tables.items()):
-        shares = np.column_stack(
-            [table.members[..., 0].max(axis=1), table.members[..., 1].max(axis=1), table.modes]
-        )
-        for column, values in enumerate(shares.T):
-            marker, colour = ("D", GREY) if column < 2 else _MARKS[MODES[column - 2]]
-            there = np.flatnonzero(values > 1e-9)
-            place = np.full(len(there), column)
-            ax.scatter(
-                place, table.harmonics[there], s=130 * values[there], color=colour, marker=marker, zorder=3
-            )
-            text = "resultant" if column < 2 else names[column]
-            ax.plot([], [], marker, color=colour, label=text)
-        ax.axvline(1.5, color="0.6", linewidth=1.0)
-        ax.set_xticks(range(5), names, rotation=40, ha="right", fontsize=SIZE - 2)
-        ax.set_yticks(table.harmonics)
-        ax.set_xlim(-0.6, 4.6)
-        ax.set_ylim(table.harmonics[-1] + 0.6, table.harmonics[0] - 0.6)
-        label(ax, y="harmonic of the mesh frequency [1]", title=title)
-    legend_below(figure, columns=4)
-    return figure
-
-
-def mesh_force_spectra(
-    frequency,
-    forces: Mapping[str, np.ndarray],
-    *,
-    modes: Mapping[str, np.ndarray] | None = None,
-    meshes: Sequence[str] = ("sun-planet 1",),
-) -> Figure:
-    """Mesh forces over the frequency of each harmonic, one picture a set.
-
-    The counterpart of Fig. 6 of A. Kahraman (J. Mech. Des. 116, 1994, 713-720).
-
-    Parameters
-    ----------
-    frequency : (F,) array
-        Of the harmonic itself, h times the mesh frequency [Hz].
-    forces : mapping of str to (H, F, n) array
-        Titles, and amplitudes [N] of harmonics 1 to H at the meshes drawn.
-    modes : mapping of str to (m,) array, optional
-        Natural frequencies [Hz] by kind, for marks along the axis.
-    meshes : sequence of str
-        Names of the n meshes; the second and further ones are drawn where they differ from the first.
-
-    Returns
-    -------
-    Figure
-    """
-    columns = 2 if len(forces) > 1 else 1
-    rows = -(-len(forces) // columns)
-    figure, axes = new_figure(
-        rows=rows, columns=columns, width=5.4 * columns, height=3.3 * rows + 0.8, sharex=True, sharey=True
-    )
-    hertz, top = np.asarray(frequency) * 1e-3, max(np.abs(f).max() for f in forces.values())
-    for ax in axes[len(forces) :]:
-        ax.set_visible(False)
-    for ax, (title, force) in zip(axes, forces.items()):
-        size = np.abs(force)
-        for h in range(len(size)):
-            for j, name in enumerate(meshes):
-                if j and np.abs(size[h, :, j] - size[h, :, 0]).max() < 1e-6 * top:
-                    continue
-                # wide below narrow: lines that coincide are all seen
-                text = f"harmonic {h + 1}, {name}"
-                ax.plot(hertz, size[h, :, j], DASHES[j % 4], color=COLOURS[h % 7], label=text,
-                        linewidth=4.5 - 1.2 * min(h, 3), zorder=2 + h)  # fmt: skip
-        for kind, values in (modes or {}).items():
-            marker, colour = _MARKS.get(kind, ("x", GREY))
-            ax.plot(np.asarray(values) * 1e-3, np.full(len(values), -0.05 * top), marker, color=colour,
-                    markersize=5, label=f"{kind} modes", clip_on=False)  # fmt: skip
-        ax.set_ylim(-0.09 * top, 1.05 * top)
-        label(ax, title=title)
-    for ax in axes[-columns:]:
-        label(ax, x="frequency of the harmonic [kHz]")
-    for ax in axes[::columns]:
-        label(ax, y="mesh force [N]")
-    legend_below(figure, columns=4)
-    return figure
 
 
 def _xy(points):
@@ -773,7 +637,6 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     from femgear.contact.cycle import walk_mesh_cycle
     from femgear.contact.flank_pairs import mirrored_set
     from femgear.contact.tooth_loads import deformed_set
-    from femgear.fe.elasticity import Material
     from femgear.fe.grid import copy_nodes, rotated_copies
     from femgear.report.scene import assemble_set, deformed_picture, placed, write_vtu
 
@@ -787,9 +650,12 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         cycle = walk_mesh_cycle(
             gears, static.bodies, sun_torque=-static.sun_torque, positions=1, contact=case.static.contact
         )
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
     sectors = make_sectors(
-        gears, material, flank_elements=PICTURE_FLANK_ELEMENTS, refine=PICTURE_REFINE, cache=drawn.cache
+        gears,
+        material_of(case),
+        flank_elements=PICTURE_FLANK_ELEMENTS,
+        refine=PICTURE_REFINE,
+        cache=drawn.cache,
     )
     bodies = []
     for body in deformed_set(gears, sectors, cycle):

@@ -15,7 +15,7 @@ from femgear.case.dependencies import Entries
 from femgear.contact.root_stress import BACK, LOADED, RootCycle
 from femgear.report.tables import Block
 from femgear.storage.dataset import dataset
-from femgear.trains.static.checks import static_warnings
+from femgear.trains.static.description import static_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,8 +54,44 @@ class StaticResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of static.nc."""
-
-        return static_dataset(self)
+        cycle, gears = self.cycle, self.planetary_set
+        bodies = self.bodies.sun, self.bodies.planet, self.bodies.ring
+        variables = {
+            name: (dims, getattr(cycle, _ATTRIBUTES.get(name, name)), unit, words)
+            for name, (dims, unit, words) in CYCLE_VARIABLES.items()
+        }
+        teeth, planets = cycle.tooth_load.shape[1], gears.n_planets
+        return dataset(
+            variables,
+            coords={
+                "mesh": ("mesh", list(gears.mesh_names), "1", "gear mesh"),
+                "position": ("position", cycle.position, "1", "position in mesh periods"),
+                "planet": ("planet", np.arange(1, planets + 1), "1", "planet"),
+                "axis": ("axis", ["x", "y"], "1", "axis of the frame of the carrier"),
+                "member": ("member", list(cycle.member_names), "1", "moving member and direction"),
+                "tooth": ("tooth", np.arange(teeth), "1", "tooth pair in the order of the path"),
+            },
+            attrs={
+                "title": "static transmission error, load sharing and mesh stiffness",
+                "contact_ratio_sun_planet": gears.contact_ratio_sun_planet,
+                "contact_ratio_planet_ring": gears.contact_ratio_planet_ring,
+                "working_pressure_angle_sun_planet": gears.working_pressure_angle_sun_planet,
+                "working_pressure_angle_planet_ring": gears.working_pressure_angle_planet_ring,
+                "mesh_phases": np.asarray(gears.mesh_phases),
+                "planet_angles": np.asarray(gears.planet_angles),
+                "centre_distance": gears.centre_distance,
+                "face_width": gears.sun.face_width,
+                "teeth": np.array([gears.sun.teeth, gears.planet.teeth, gears.ring.teeth]),
+                "sun_torque": self.sun_torque,
+                "contact": cycle.contact,
+                "mesh_periods": cycle.periods,
+                "period": self.period_message,
+                "pressure_cells": cycle.unknowns,
+                "unknowns": np.array([body.unknowns for body in bodies]),
+                "message": cycle.message,
+                "warnings": " ".join(self.warnings),
+            },
+        )
 
 
 @dataclass(frozen=True)
@@ -117,127 +153,64 @@ class StressResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of stress.nc."""
-
-        return stress_dataset(self)
-
-
-def static_dataset(result: StaticResult) -> xr.Dataset:
-    """Contents of static.nc."""
-    cycle, gears = result.cycle, result.planetary_set
-    mesh_position = ("mesh", "position")
-    teeth = cycle.tooth_load.shape[1]
-    variables = {
-        "ste": (mesh_position, cycle.deflection, "m", "static transmission error of the mesh"),
-        "ste_overall": (
-            ("planet", "position"),
-            cycle.overall_deflection,
-            "m",
-            "static transmission error from sun to ring",
-        ),
-        "mesh_force": (mesh_position, cycle.force, "N", "mesh force along the line of action"),
-        "back_force": (mesh_position, cycle.back_force, "N", "force on the back flanks of the mesh"),
-        "member_motion": (
-            ("member", "position"),
-            cycle.member_motion,
-            "m",
-            "displacement of the axis of a member that moves",
-        ),
-        "bearing_force": (
-            ("planet", "axis", "position"),
-            cycle.bearing_force,
-            "N",
-            "force of the pin on the planet in the frame of the carrier",
-        ),
-        "mesh_stiffness": (mesh_position, cycle.stiffness, "N/m", "tangent mesh stiffness"),
-        "mesh_stiffness_secant": (mesh_position, cycle.secant_stiffness, "N/m", "secant mesh stiffness"),
-        "tooth_load": (("mesh", "tooth", "position"), cycle.tooth_load, "N", "load of a tooth pair"),
-        "back_tooth_load": (
-            ("mesh", "tooth", "position"),
-            cycle.back_tooth_load,
-            "N",
-            "load of a tooth pair on its back flanks",
-        ),
-        "load_share": (("planet", "position"), cycle.load_share, "1", "share of the planet in the torque"),
-        "max_pressure": (
-            mesh_position,
-            cycle.max_pressure,
-            "Pa",
-            "largest contact pressure away from flank ends",
-        ),
-        "edge_contact": (
-            mesh_position,
-            cycle.edge_contact,
-            "1",
-            "whether a contact reaches the end of a flank",
-        ),
-        "residual": (("position",), cycle.residual, "1", "residual of contact conditions and equilibrium"),
-        "iterations": (("position",), cycle.iterations, "1", "steps of the active set"),
-    }
-    return dataset(
-        variables,
-        coords={
-            "mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh"),
-            "position": (("position",), cycle.position, "1", "position in mesh periods"),
-            "planet": (("planet",), np.arange(1, gears.n_planets + 1), "1", "planet"),
-            "axis": (("axis",), ["x", "y"], "1", "axis of the frame of the carrier"),
-            "member": (("member",), list(cycle.member_names), "1", "moving member and direction"),
-            "tooth": (("tooth",), np.arange(teeth), "1", "tooth pair in the order of the path"),
-        },
-        attrs={
-            "title": "static transmission error, load sharing and mesh stiffness",
-            "contact_ratio_sun_planet": gears.contact_ratio_sun_planet,
-            "contact_ratio_planet_ring": gears.contact_ratio_planet_ring,
-            "working_pressure_angle_sun_planet": gears.working_pressure_angle_sun_planet,
-            "working_pressure_angle_planet_ring": gears.working_pressure_angle_planet_ring,
-            "mesh_phases": np.asarray(gears.mesh_phases),
-            "planet_angles": np.asarray(gears.planet_angles),
-            "centre_distance": gears.centre_distance,
-            "face_width": gears.sun.face_width,
-            "teeth": np.array([gears.sun.teeth, gears.planet.teeth, gears.ring.teeth]),
-            "sun_torque": result.sun_torque,
-            "contact": cycle.contact,
+        cycle, edges, names = self.cycle, self.spectrum.edges, self.planetary_set.mesh_names
+        variables = {
+            **_root_entries(self.roots, names),
+            **_worst_entries(self),
+            **_range_entries(self),
+            **_pressure_entries(cycle),
+            **_load_entries(self.spectrum),
+            **_nominal_entries(self),
+        }
+        coords = _root_coordinates(names) | {
+            "position": ("position", cycle.position, "1", "position in mesh periods"),
+            "load_bin": ("load_bin", 0.5 * (edges[1:] + edges[:-1]), "N", "middle of the load class"),
+        }
+        if "planet_root_stress" in variables:
+            n = variables["planet_root_stress"][1].shape[1]
+            words = "turns of the planet against the carrier since the pitch point with the sun"
+            coords["turn"] = ("turn", (np.arange(n) - n // 4) / n, "1", words)
+        attributes = {
+            "title": "root stresses, contact pressures and load spectra",
+            "sun_torque": self.sun_torque,
             "mesh_periods": cycle.periods,
-            "period": result.period_message,
-            "pressure_cells": cycle.unknowns,
-            "unknowns": np.array(
-                [b.unknowns for b in (result.bodies.sun, result.bodies.planet, result.bodies.ring)]
-            ),
-            "message": cycle.message,
-            "warnings": " ".join(result.warnings),
-        },
-    )
+            "repeats": int(self.closes),
+            "load_counting": COUNTING,
+            "iso": self.nominal.message,
+        }
+        return dataset(variables, coords, attributes)
 
 
-def stress_dataset(result: StressResult) -> xr.Dataset:
-    """Contents of stress.nc: `root_stress_dataset`, and the rest of a `StressResult`."""
-    cycle, edges = result.cycle, result.spectrum.edges
-    entries = {
-        **_worst_entries(result),
-        **_range_entries(result),
-        **_pressure_entries(cycle),
-        **_load_entries(result.spectrum),
-        **_nominal_entries(result),
-    }
-    data = root_stress_dataset(result.roots, result.planetary_set.mesh_names)
-    data = data.assign({name: _variable(*entry) for name, entry in entries.items()})
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    coordinates = {
-        "position": _variable(("position",), cycle.position, "1", "position in mesh periods"),
-        "load_bin": _variable(("load_bin",), middle, "N", "middle of the load class"),
-    }
-    if "turn" in data.dims:
-        n = data.sizes["turn"]
-        words = "turns of the planet against the carrier since the pitch point with the sun"
-        coordinates["turn"] = _variable(("turn",), (np.arange(n) - n // 4) / n, "1", words)
-    attributes = {
-        "title": "root stresses, contact pressures and load spectra",
-        "sun_torque": result.sun_torque,
-        "mesh_periods": cycle.periods,
-        "repeats": int(result.closes),
-        "load_counting": COUNTING,
-        "iso": result.nominal.message,
-    }
-    return data.assign_coords(coordinates).assign_attrs(attributes)
+CYCLE_VARIABLES = {
+    "ste": ("mesh position", "m", "static transmission error of the mesh"),
+    "ste_overall": ("planet position", "m", "static transmission error from sun to ring"),
+    "mesh_force": ("mesh position", "N", "mesh force along the line of action"),
+    "back_force": ("mesh position", "N", "force on the back flanks of the mesh"),
+    "member_motion": ("member position", "m", "displacement of the axis of a member that moves"),
+    "bearing_force": (
+        "planet axis position",
+        "N",
+        "force of the pin on the planet in the frame of the carrier",
+    ),
+    "mesh_stiffness": ("mesh position", "N/m", "tangent mesh stiffness"),
+    "mesh_stiffness_secant": ("mesh position", "N/m", "secant mesh stiffness"),
+    "tooth_load": ("mesh tooth position", "N", "load of a tooth pair"),
+    "back_tooth_load": ("mesh tooth position", "N", "load of a tooth pair on its back flanks"),
+    "load_share": ("planet position", "1", "share of the planet in the torque"),
+    "max_pressure": ("mesh position", "Pa", "largest contact pressure away from flank ends"),
+    "edge_contact": ("mesh position", "1", "whether a contact reaches the end of a flank"),
+    "residual": ("position", "1", "residual of contact conditions and equilibrium"),
+    "iterations": ("position", "1", "steps of the active set"),
+}
+"""Variables of static.nc: dimensions, unit, and what they are."""
+_ATTRIBUTES = {
+    "ste": "deflection",
+    "ste_overall": "overall_deflection",
+    "mesh_force": "force",
+    "mesh_stiffness": "stiffness",
+    "mesh_stiffness_secant": "secant_stiffness",
+}
+"""Attributes of the mesh cycle whose variables have another name."""
 
 
 def root_stress_dataset(roots: tuple[RootCycle, ...], mesh_names) -> xr.Dataset:
@@ -259,9 +232,21 @@ def root_stress_dataset(roots: tuple[RootCycle, ...], mesh_names) -> xr.Dataset:
         is largest, with ``root_arc`` [m] and ``root_slope`` [rad] (mesh, gear, point). The tooth is the one
         with the largest stress. Points that a root does not have are NaN.
     """
-    import xarray as xr
+    title = {"title": "root stresses over the mesh cycle"}
+    return dataset(_root_entries(roots, mesh_names), _root_coordinates(mesh_names), title)
 
-    variables = {
+
+def _root_coordinates(mesh_names) -> dict:
+    return {
+        "mesh": ("mesh", list(mesh_names), "1", "gear mesh"),
+        "gear": ("gear", ["first", "second"], "1", "gear of the mesh"),
+        "root": ("root", ["loaded", "back"], "1", "flank above the root"),
+    }
+
+
+def _root_entries(roots: tuple[RootCycle, ...], mesh_names) -> dict:
+    """Stresses of both roots of one tooth of every gear in every mesh."""
+    words = {
         "root_tension": ("mesh gear step", "Pa", "largest stress in the root of the loaded flank"),
         "root_compression": ("mesh gear step", "Pa", "lowest stress in the root of the back flank"),
         "root_path": ("mesh gear step", "1", "path from the pitch point in base pitches"),
@@ -272,37 +257,27 @@ def root_stress_dataset(roots: tuple[RootCycle, ...], mesh_names) -> xr.Dataset:
     }
     points = max(len(root.arc) for root in roots)
     rows = [_row(root, points) for root in roots]
-    data = {}
-    for name, (dims, units, words) in variables.items():
+    entries = {}
+    for name, (dims, units, text) in words.items():
         values = np.array([row[name] for row in rows])
-        values = values.reshape(len(mesh_names), 2, *values.shape[1:])
-        data[name] = (tuple(dims.split()), values, {"units": units, "long_name": words})
-    return xr.Dataset(
-        data,
-        coords={
-            "mesh": ("mesh", list(mesh_names), {"units": "1", "long_name": "gear mesh"}),
-            "gear": ("gear", ["first", "second"], {"units": "1", "long_name": "gear of the mesh"}),
-            "root": ("root", ["loaded", "back"], {"units": "1", "long_name": "flank above the root"}),
-        },
-        attrs={"title": "root stresses over the mesh cycle"},
-    )
+        entries[name] = (dims, values.reshape(len(mesh_names), 2, *values.shape[1:]), units, text)
+    return entries
 
 
 def _load_entries(spectrum: LoadSpectrum) -> dict:
     """Load classes, and how often the teeth of every mesh are in them."""
-    by_class = ("mesh", "load_bin")
     words = {
         "time": "share of the time under load that a tooth spends in the load class",
         "cycle": "share of the load cycles whose largest load lies in the load class",
         "cycles": "load cycles of this flank of a tooth per turn of the gear against the carrier",
     }
     return {
-        "load_bin_low": (("load_bin",), spectrum.edges[:-1], "N", "lower limit of the load class"),
-        "load_bin_high": (("load_bin",), spectrum.edges[1:], "N", "upper limit of the load class"),
-        "load_time_share": (by_class, spectrum.time, "1", words["time"]),
-        "load_cycle_share": (by_class, spectrum.engagements, "1", words["cycle"]),
-        "load_cycles": (("mesh", "gear"), spectrum.cycles, "1", words["cycles"]),
-        "loaded_contact_ratio": (("mesh",), spectrum.duration, "1", "mesh periods a tooth pair is loaded"),
+        "load_bin_low": ("load_bin", spectrum.edges[:-1], "N", "lower limit of the load class"),
+        "load_bin_high": ("load_bin", spectrum.edges[1:], "N", "upper limit of the load class"),
+        "load_time_share": ("mesh load_bin", spectrum.time, "1", words["time"]),
+        "load_cycle_share": ("mesh load_bin", spectrum.engagements, "1", words["cycle"]),
+        "load_cycles": ("mesh gear", spectrum.cycles, "1", words["cycles"]),
+        "loaded_contact_ratio": ("mesh", spectrum.duration, "1", "mesh periods a tooth pair is loaded"),
     }
 
 
@@ -311,18 +286,9 @@ def _nominal_entries(result: StressResult) -> dict:
     nominal, N = result.nominal, result.planetary_set.n_planets
     contact, root = np.repeat(nominal.contact, N), np.repeat(nominal.root, N, axis=0)
     return {
-        "iso_contact_stress": (("mesh",), contact, "Pa", "nominal contact stress sigma_H0, ISO 6336-2"),
-        "iso_root_stress": (
-            ("mesh", "gear"),
-            root,
-            "Pa",
-            "nominal root stress sigma_F0, ISO 6336-3 method B",
-        ),
+        "iso_contact_stress": ("mesh", contact, "Pa", "nominal contact stress sigma_H0, ISO 6336-2"),
+        "iso_root_stress": ("mesh gear", root, "Pa", "nominal root stress sigma_F0, ISO 6336-3 method B"),
     }
-
-
-def _variable(dims, values, units, long_name):
-    return dims, np.asarray(values), {"units": units, "long_name": long_name}
 
 
 def _worst_entries(result: StressResult) -> dict:
@@ -344,69 +310,54 @@ def _worst_entries(result: StressResult) -> dict:
         "root_worst_position": ("1", "its position in mesh periods"),
         "root_worst_path": ("1", "its path from the pitch point in base pitches"),
     }
-    return {name: (("mesh", "gear"), values[..., i], *words[name]) for i, name in enumerate(words)}
+    return {name: ("mesh gear", values[..., i], *words[name]) for i, name in enumerate(words)}
 
 
 def _range_entries(result: StressResult) -> dict:
     """Stress ranges over a turn, of single teeth where they differ, and the history of the planets' roots."""
-    ranges, by_gear = result.ranges, ("mesh", "gear")
+    ranges = result.ranges
 
     def table(values):
         values = np.array(values)
         return values.reshape(-1, 2, *values.shape[1:])
 
-    arcs = [root.arc[one.point] for root, one in zip(result.roots, ranges, strict=True)]
+    high, low = (table([getattr(one, name) for one in ranges]) for name in ("maximum", "minimum"))
+    arcs = table([root.arc[one.point] for root, one in zip(result.roots, ranges, strict=True)])
+    highest = "largest stress over a turn at the point of the root with the widest range"
     entries = {
-        "root_range_maximum": (
-            by_gear,
-            table([one.maximum for one in ranges]),
-            "Pa",
-            "largest stress over a turn at the point of the root with the widest range",
-        ),
-        "root_range_minimum": (
-            by_gear,
-            table([one.minimum for one in ranges]),
-            "Pa",
-            "smallest stress there",
-        ),
-        "root_range_arc": (by_gear, table(arcs), "m", "arc length of that point from the end of the flank"),
+        "root_range_maximum": ("mesh gear", high, "Pa", highest),
+        "root_range_minimum": ("mesh gear", low, "Pa", "smallest stress there"),
+        "root_range_arc": ("mesh gear", arcs, "m", "arc length of that point from the end of the flank"),
     }
     planets = [one.history for one in ranges if one.kind == "planet"]
     if planets[0] is not None:
         words = "stress over a turn at the point of the planet's root with the widest range"
-        entries["planet_root_stress"] = (("mesh", "turn"), np.array(planets), "Pa", words)
+        entries["planet_root_stress"] = ("mesh turn", np.array(planets), "Pa", words)
     if result.cycle.periods > 1:
         longest = max(len(one.tooth_maximum) for one in ranges)
         for name, words in (("maximum", "largest"), ("minimum", "smallest")):
             rows = [getattr(one, f"tooth_{name}") for one in ranges]
             padded = [np.pad(row, (0, longest - len(row)), constant_values=np.nan) for row in rows]
             long_name = f"{words} stress of every tooth at the point of its root with the widest range"
-            entries[f"tooth_root_{name}"] = (("mesh", "gear", "tooth"), table(padded), "Pa", long_name)
+            entries[f"tooth_root_{name}"] = ("mesh gear tooth", table(padded), "Pa", long_name)
     return entries
 
 
-def _pressure_entries(cycle) -> dict:
+def _pressure_entries(cycle: MeshCycle) -> dict:
     """Largest pressures, and the distributions where the cycle has them."""
     largest = "largest contact pressure away from flank ends"
-    entries = {"contact_pressure": (("mesh", "position"), cycle.max_pressure, "Pa", largest)}
+    entries = {"contact_pressure": ("mesh position", cycle.max_pressure, "Pa", largest)}
     if cycle.pressure is None:
         return entries
-    by_pair = ("mesh", "pair", "position")
+    pressure = "contact pressure in the cells of a tooth pair"
+    offset = "place of a cell along the common tangent from the middle of its window"
+    centre = "middle of the window from the path point"
+    path = "path of the tooth pair from the pitch point"
     return entries | {
-        "pressure_distribution": (
-            ("mesh", "pair", "cell", "position"),
-            cycle.pressure,
-            "Pa",
-            "contact pressure in the cells of a tooth pair",
-        ),
-        "pressure_offset": (
-            ("mesh", "cell"),
-            cycle.pressure_offset,
-            "m",
-            "place of a cell along the common tangent from the middle of its window",
-        ),
-        "pressure_centre": (by_pair, cycle.pressure_centre, "m", "middle of the window from the path point"),
-        "pressure_path": (by_pair, cycle.path, "m", "path of the tooth pair from the pitch point"),
+        "pressure_distribution": ("mesh pair cell position", cycle.pressure, "Pa", pressure),
+        "pressure_offset": ("mesh cell", cycle.pressure_offset, "m", offset),
+        "pressure_centre": ("mesh pair position", cycle.pressure_centre, "m", centre),
+        "pressure_path": ("mesh pair position", cycle.path, "m", path),
     }
 
 

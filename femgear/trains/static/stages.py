@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations
-from femgear.case.dependencies import check_entries, static_entries
+from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
 from femgear.case.sections import Case
 from femgear.contact.root_stress import root_ranges
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
 from femgear.errors import GeometryError
 from femgear.threads import one_blas_thread
 from femgear.trains.protocol import Progress, Stage
-from femgear.trains.static.checks import check_motions
+from femgear.trains.static.description import check_motions
 from femgear.trains.static.results import (
     NominalStresses,
     StaticResult,
@@ -32,8 +32,11 @@ from femgear.trains.static.results import (
 )
 
 if TYPE_CHECKING:
+    from femgear.contact.bodies import Bodies, Sector, Sectors
     from femgear.contact.cycle import MeshCycle
     from femgear.contact.root_stress import RootStresses
+    from femgear.contact.supports import Supports
+    from femgear.fe.elasticity import Material
     from femgear.gears.planetary import PlanetarySet
 
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
@@ -44,7 +47,9 @@ UNLIMITED = 10**12
 
 
 @one_blas_thread()
-def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | None = None) -> StaticResult:
+def solve_static(
+    case: Case, *, cache: Path | None = None, progress: Progress | None = None, steps: Steps | None = None
+) -> StaticResult:
     """Static transmission error, load sharing and mesh stiffness over one mesh period.
 
     Parameters
@@ -54,22 +59,22 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
         Folder of generated grids.
     progress : callable, optional
         Called with (stage, done, total).
+    steps : Steps, optional
+        Flank compliances of other cases, taken where they are those of this one.
 
     Raises
     ------
     GeometryError, GridError, ContactError
     """
-    from femgear.contact.bodies import make_bodies, make_sectors
     from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-    from femgear.fe.elasticity import Material
     from femgear.gears.deviations import common_period
     from femgear.gears.kinematics import torques
 
     gears, deviations = planetary_set(case), set_deviations(case)
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-    sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
-    foundation = _ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
-    bodies = make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
+    steps = steps or Steps()
+    sectors, bodies = steps.take(
+        "flank compliances", compliance_entries(case), lambda: flank_compliances(case, gears, cache=cache)
+    )
     sun_torque = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
     cycle = walk_mesh_cycle(
@@ -80,7 +85,7 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
         contact=case.static.contact,
         # thickness errors separate the back flanks alone
         deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
-        supports=_supports(case),
+        supports=static_supports(case),
         periods=periods,
         options=CycleOptions(
             both_flanks=case.static.back_flanks,
@@ -90,6 +95,27 @@ def solve_static(case: Case, *, cache: Path | None = None, progress: Progress | 
     )
     check_motions(cycle, gears.sun.module)
     return StaticResult(gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message)
+
+
+def flank_compliances(
+    case: Case, gears: PlanetarySet, *, cache: Path | None = None
+) -> tuple[Sectors, Bodies]:
+    """Sector grids of all gears and their flank compliances, the ring held or on its foundation.
+
+    Parameters
+    ----------
+    case : Case
+    gears : PlanetarySet
+        Of that case.
+    cache : path, optional
+        Folder of generated grids.
+    """
+    from femgear.contact.bodies import make_bodies, make_sectors
+
+    material = material_of(case)
+    sectors = make_sectors(gears, material, flank_elements=case.static.flank_elements, cache=cache)
+    foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
+    return sectors, make_bodies(sectors, material, depth=case.static.depth, ring_foundation=foundation)
 
 
 @one_blas_thread()
@@ -185,23 +211,30 @@ def nominal_stresses(
     return NominalStresses(contact, root, "; ".join(dict.fromkeys(messages)))
 
 
-def _ring_foundation(case: Case, sector):
-    """Elastic foundation of one sector of the ring [N/m]."""
+def material_of(case: Case) -> Material:
+    """Material of the gears of a case."""
+    from femgear.fe.elasticity import Material
+
+    return Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+
+
+def ring_foundation(case: Case, sector: Sector):
+    """Elastic foundation of one sector of the ring, a sparse matrix [N/m]."""
     from femgear.fe.elasticity import foundation
 
     ring, width = case.ring, sector.gear.face_width
     return foundation(sector.grid, "rim", ring.foundation_radial, ring.foundation_tangential, thickness=width)
 
 
-def _supports(case: Case):
-    """Supports of the static problem: rigid, or those of the case's bodies."""
+def static_supports(case: Case) -> Supports:
+    """Supports of the static problem: rigid, or those of the bodies of the case."""
     from femgear.contact.supports import RIGID
 
-    return RIGID if case.static.members == "fixed" else _supports_of(case)
+    return RIGID if case.static.members == "fixed" else case_supports(case)
 
 
-def _supports_of(case: Case):
-    """Supports of the case's bodies."""
+def case_supports(case: Case) -> Supports:
+    """Supports of sun, carrier and planets with the stiffnesses and the bearing clearance of the case."""
     from femgear.contact.supports import Supports
 
     return Supports(
@@ -212,7 +245,8 @@ def _supports_of(case: Case):
     )
 
 
-def _backlash(gears: PlanetarySet) -> np.ndarray:
+def mesh_backlash(gears: PlanetarySet) -> np.ndarray:
+    """Normal backlash of all 2N meshes [m]."""
     n = gears.n_planets
     return np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], n)
 
@@ -224,18 +258,15 @@ def _influences(case: Case, static: StaticResult) -> RootStresses:
     solved again.
     """
     from femgear.contact.root_stress import RootStresses, observed_root_stress, root_stress
-    from femgear.fe.elasticity import Material, foundation
 
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
     sectors, bodies = static.sectors, static.bodies
-    pairs = (sectors.sun, bodies.sun), (sectors.planet, bodies.planet)
-    sun, planet = (observed_root_stress(sector.gear, flank.root) for sector, flank in pairs)
-    grid, gear = sectors.ring.grid, sectors.ring.gear
-    held, support = "rim", None
-    if case.static.members == "elastic":
-        stiffness = case.ring.foundation_radial, case.ring.foundation_tangential
-        held, support = None, foundation(grid, "rim", *stiffness, thickness=gear.face_width)
-    return RootStresses(sun, planet, root_stress(grid, gear, material, held=held, support=support))
+    assert bodies.sun.root is not None and bodies.planet.root is not None
+    sun = observed_root_stress(sectors.sun.gear, bodies.sun.root)
+    planet = observed_root_stress(sectors.planet.gear, bodies.planet.root)
+    elastic, ring = case.static.members == "elastic", sectors.ring
+    held, support = (None, ring_foundation(case, ring)) if elastic else ("rim", None)
+    material = material_of(case)
+    return RootStresses(sun, planet, root_stress(ring.grid, ring.gear, material, held=held, support=support))
 
 
 def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):

@@ -1,0 +1,368 @@
+"""Designs of a case, each computed once and kept in a journal, and what they cost in a search.
+
+`Designs` computes quantities of points of the design space, `Evaluations` turns them into the costs that a
+search sees, and `tolerances` tells what an optimum loses when its variables are off by their tolerances.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from femgear import __version__
+from femgear.case.dependencies import Steps, compliance_entries
+from femgear.case.sections import Case
+from femgear.errors import ContactError, FemgearError, StorageError
+from femgear.storage.journal import Journal, open_journal
+from femgear.study.objectives import STAGES, Quantity, Variant
+from femgear.study.problem import Point, Problem, Variable, Vector
+from femgear.trains.protocol import Progress
+from femgear.trains.reading import to_toml, with_values
+
+OUTSIDE, _REFUSED = 1e6, 1e9
+"""Costs from which designs lie outside the limits, and of those that cannot be computed."""
+
+
+class Failure(Exception):
+    """A design that cannot be computed; ``error`` holds code, key and message of the refusal."""
+
+    def __init__(self, error: dict):
+        super().__init__(error["message"])
+        self.error = error
+
+
+class Designs:
+    """Quantities of designs; use `open_designs`.
+
+    Attributes
+    ----------
+    case : Case
+    journal : Journal
+    seconds : float
+        What the designs computed now took, all together.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        keys,
+        journal: Journal,
+        *,
+        cache: Path | None = None,
+        progress: Progress | None = None,
+    ):
+        self.case, self.journal = case, journal
+        self.seconds = 0.0
+        self._computed: set[str] = set()
+        self._keys, self._cache, self._progress = keys, cache, progress
+        self._steps, self._own = Steps(), compliance_entries(case)
+        self._last: tuple[str, Variant] | None = None
+
+    @property
+    def computed(self) -> int:
+        """Designs computed now, without those that the journal held."""
+        return len(self._computed)
+
+    @property
+    def failures(self) -> list[tuple[Point, dict]]:
+        """Points that could not be computed, and why."""
+        return [
+            (tuple(json.loads(key)), record["error"])
+            for key, record in self.journal.items()
+            if key.startswith("[") and "error" in record
+        ]
+
+    def at(self, point: Point) -> Case:
+        """The case at a point."""
+        if not point:
+            return self.case
+        pairs = zip(self._keys, point, strict=True)
+        return with_values(self.case, {key: value for keys, value in pairs for key in keys})
+
+    def variant(self, point: Point) -> Variant:
+        """The stages of a point; those of the last one are kept for further questions."""
+        key = json.dumps(point)
+        if self._last is None or self._last[0] != key:
+            case = self.at(point)
+            # grids of other geometries would fill the folder
+            cache = self._cache if compliance_entries(case) == self._own else None
+            self._last = key, Variant(case, self._steps, cache)
+        return self._last[1]
+
+    def values(self, point: Point, quantities: Sequence[Quantity]) -> dict[str, float]:
+        """Quantities at a point, by name, in SI units.
+
+        Raises
+        ------
+        Failure
+            The design cannot be computed, now or when it was tried before.
+        FemgearError
+            The case as it is cannot be computed.
+        """
+        key = json.dumps(point)
+        record = self.journal.get(key) or {"values": {}}
+        missing = [q for q in quantities if q.name not in record["values"]]
+        # what was known before it failed still holds
+        if missing and "error" not in record:
+            record = self._compute(key, point, missing, record["values"])
+            missing = [q for q in missing if q.name not in record["values"]]
+        if missing:
+            raise Failure(record["error"])
+        return {q.name: record["values"][q.name] for q in quantities}
+
+    def _compute(self, key: str, point: Point, missing: Sequence[Quantity], known: dict) -> dict:
+        """Record of a point with the missing quantities, or with the reason why it has none."""
+        start, found = time.perf_counter(), dict(known)
+        record: dict = {"values": found}
+        try:
+            variant = self.variant(point)
+            for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
+                found[quantity.name] = _finite(quantity, quantity.compute(variant))
+        except StorageError:
+            raise
+        except FemgearError as error:
+            if not point:
+                raise
+            record["error"] = {"code": error.code, "key": error.key, "message": error.message}
+        seconds = time.perf_counter() - start
+        self.seconds += seconds
+        self._computed.add(key)
+        self.journal.add(key, record | {"seconds": round(seconds, 3)})
+        if self._progress is not None:
+            self._progress("designs", self.computed, self.computed + 1)
+        return record
+
+
+def _finite(quantity: Quantity, value: float) -> float:
+    """The value, refused where it is no number."""
+    if not math.isfinite(value):
+        raise ContactError(f"{quantity.name} is not finite", code="E-FINITE", value=value)
+    return value
+
+
+@contextmanager
+def open_designs(
+    case: Case,
+    keys: Sequence[tuple[str, ...]],
+    *,
+    journal: str | Path | None = None,
+    cache: Path | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Designs]:
+    """Designs of a case, with a journal on disk where one is named.
+
+    Parameters
+    ----------
+    case : Case
+    keys : sequence of tuple of str
+        Entries of the case file that every value of a point sets.
+    journal : path-like, optional
+        File of the records; an interrupted search goes on from them.
+    cache : path, optional
+        Folder of generated grids; only those of the case itself are kept.
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    StorageError
+        See `femgear.storage.journal.open_journal`.
+    """
+    fingerprint = hashlib.sha256(to_toml(case).encode()).hexdigest()
+    names = tuple(" = ".join(entries) for entries in keys)
+    with open_journal(journal, version=__version__, case=fingerprint, keys=names) as records:
+        yield Designs(case, tuple(keys), records, cache=cache, progress=progress)
+
+
+class Enough(Exception):
+    """The search has asked for as many designs as it may."""
+
+
+class Evaluations:
+    """Costs of designs as a search sees them; use `evaluations`.
+
+    Attributes
+    ----------
+    problem : Problem
+    designs : Designs
+    best : (x, cost)
+        The best point of the objective so far; infinite cost before any.
+    course : list of float
+        Objective [SI] of every different point of `cost`; NaN outside the limits.
+    """
+
+    def __init__(self, problem: Problem, designs: Designs, *, max_designs: int | None = None):
+        self.problem, self.designs = problem, designs
+        self.best = np.full(len(problem.variables), np.nan), np.inf
+        self.course: list[float] = []
+        # a dict keeps their order
+        self._asked: dict[tuple, None] = {}
+        self._most = max_designs
+
+    def towards(self, objective: Quantity) -> Evaluations:
+        """The same designs, counted together, under another objective."""
+        found = Evaluations(replace(self.problem, objective=objective), self.designs, max_designs=self._most)
+        found._asked = self._asked
+        return found
+
+    @property
+    def asked(self) -> int:
+        """Different points that were asked for, whether the journal held them or not."""
+        return len(self._asked)
+
+    @property
+    def asked_points(self) -> list[tuple]:
+        """These points but for the case as it is, in their order."""
+        return [point for point in self._asked if point]
+
+    def values(self, x: Vector | None, quantities: Sequence[Quantity]) -> dict[str, float]:
+        """Quantities at a point in the units of the variables, or of the case as it is; see `Designs`."""
+        point = () if x is None else self.problem.point(x)
+        self._asked[point] = None
+        return self.designs.values(point, quantities)
+
+    def cost(self, x: Vector) -> float:
+        """The objective over that of the case; designs outside the limits cost a million and more.
+
+        Limits are looked at first, those from the fewest stages before the others: the objective of a design
+        outside them is not computed (feasible designs before others, by violation: K. Deb, Comput. Methods
+        Appl. Mech. Engrg. 186, 2000, 311-338). What cannot be computed costs a thousand times more.
+
+        Raises
+        ------
+        Enough
+            All designs that the search was given have been asked for.
+        """
+        new = self.count(x)
+        objective, scale = self.problem.objective, self.scale(self.problem.objective)
+        found = self.penalised(x, lambda: self.values(x, [objective])[objective.name] / scale)
+        if new:
+            self.course.append(found * scale if found < OUTSIDE else math.nan)
+        if found < self.best[1]:
+            self.best = np.array(x, float), found
+        return found
+
+    def count(self, x: Vector) -> bool:
+        """Note that a point is asked for, and say whether it is new; may raise `Enough`."""
+        point = self.problem.point(x)
+        new = point not in self._asked
+        if self._most is not None and new and self.asked >= self._most:
+            raise Enough
+        self._asked[point] = None
+        return new
+
+    def penalised(self, x: Vector, value) -> float:
+        """``value()`` of a design within the limits, and the costs that `cost` names elsewhere."""
+        try:
+            outside = self.violation(x)
+            return min(OUTSIDE + outside, 0.5 * _REFUSED) if outside else value()
+        except Failure:
+            return _REFUSED
+
+    def violation(self, x: Vector) -> float:
+        """Sum of the violations of the limits, of the first stage that breaks any. May raise `Failure`."""
+        for stage in STAGES:
+            here = [limit for limit in self.problem.limits if limit.quantity.stage == stage]
+            values = self.values(x, [limit.quantity for limit in here]) if here else {}
+            total = sum(limit.violation(values[limit.quantity.name]) for limit in here)
+            if total:
+                return total
+        return 0.0
+
+    def scale(self, quantity: Quantity) -> float:
+        """Value of the case as it is, by which costs are divided; 1 where it is zero."""
+        return abs(self.values(None, [quantity])[quantity.name]) or 1.0
+
+
+@contextmanager
+def evaluations(
+    problem: Problem,
+    *,
+    journal: str | Path | None = None,
+    cache: Path | None = None,
+    max_designs: int | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Evaluations]:
+    """Evaluations of a problem; parameters as for `open_designs`."""
+    keys = [variable.keys for variable in problem.variables]
+    with open_designs(problem.case, keys, journal=journal, cache=cache, progress=progress) as designs:
+        yield Evaluations(problem, designs, max_designs=max_designs)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Quantities with one variable off by its tolerance.
+
+    Parameters
+    ----------
+    variable : Variable
+    tolerance : float
+        In the unit of the variable.
+    less, more : dict
+        Value of every quantity by name [SI] with the variable lower and higher; NaN where that cannot be
+        computed.
+    """
+
+    variable: Variable
+    tolerance: float
+    less: dict[str, float]
+    more: dict[str, float]
+
+    def slope(self, name: str, value: float) -> tuple[float, float]:
+        """Rise of a quantity per unit of the variable towards less and towards more.
+
+        Both are positive at a corner, where a derivative does not exist.
+        """
+        return (self.less[name] - value) / self.tolerance, (self.more[name] - value) / self.tolerance
+
+
+def tolerances(
+    evaluations: Evaluations, x: Vector, quantities: Sequence[Quantity]
+) -> tuple[tuple[Tolerance, ...], dict[str, float]]:
+    """Every variable off by its tolerance, alone; and all of them at once, each to its worse side.
+
+    Parameters
+    ----------
+    evaluations : Evaluations
+    x : (n,) sequence
+        The optimum, in the units of the variables. Points may lie outside the bounds.
+    quantities : sequence of Quantity
+        The first says which side is the worse one.
+
+    Returns
+    -------
+    tuple of Tolerance
+    dict
+        Quantities by name, all variables off at once; NaN where that cannot be computed.
+    """
+    x, found = np.array(x, float), []
+    worse = x.copy()
+    for i, variable in enumerate(evaluations.problem.variables):
+        tolerance = variable.tolerance_at(float(x[i]))
+        sides = []
+        for sign in (-1.0, 1.0):
+            off = x.copy()
+            off[i] += sign * tolerance
+            sides.append(_values(evaluations, off, quantities))
+        found.append(Tolerance(variable, tolerance, *sides))
+        objective = [side[quantities[0].name] for side in sides]
+        # a side that cannot be computed is no place to go
+        if np.isfinite(objective).any():
+            worse[i] += (-tolerance, tolerance)[int(np.nanargmax(objective))]
+    return tuple(found), _values(evaluations, worse, quantities)
+
+
+def _values(evaluations: Evaluations, x, quantities) -> dict[str, float]:
+    """Quantities by name at a point; NaN where it cannot be computed."""
+    try:
+        return evaluations.values(x, quantities)
+    except Failure:
+        return {quantity.name: np.nan for quantity in quantities}

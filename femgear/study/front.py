@@ -1,0 +1,224 @@
+"""Fronts between two objectives: designs of which none is better in both."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.study.designs import Enough, Evaluations, Failure, evaluations
+from femgear.study.objectives import Quantity
+from femgear.study.problem import Problem, Vector
+from femgear.study.search import (
+    SearchOptions,
+    check_count,
+    descend,
+    has_derivatives,
+    infeasible,
+    numbers,
+    polish,
+    samples_of,
+    start_at,
+)
+from femgear.threads import one_blas_thread
+from femgear.trains.protocol import Progress
+
+_SMALL = 0.01
+"""Share of the sum in the scalar objective; without it points that are better in one alone would tie."""
+
+
+@dataclass(frozen=True)
+class ParetoFront:
+    """Designs of which none is better in both objectives, by the first objective ascending.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its objective is the first one.
+    second : Quantity
+    x : (m, n) array
+        In the units of the variables.
+    values : (m, 2) array
+        Both objectives [SI].
+    before : (2,) array
+        Of the case as it is [SI].
+    dominated : (k, 2) array
+        Objectives of the other designs within the limits.
+    designs, failures : int
+    complete : bool
+        Whether the search was not cut short by ``max_designs``.
+    """
+
+    problem: Problem
+    second: Quantity
+    x: np.ndarray
+    values: np.ndarray
+    before: np.ndarray
+    dominated: np.ndarray
+    designs: int
+    failures: int
+    complete: bool
+
+    @property
+    def compromise(self) -> int:
+        """Number of the design whose worse objective, over the span of the front, is the best."""
+        low, high = self.values.min(axis=0), self.values.max(axis=0)
+        return int(((self.values - low) / np.where(high > low, high - low, 1.0)).max(axis=1).argmin())
+
+
+@one_blas_thread()
+def pareto_front(
+    problem: Problem,
+    second: Quantity,
+    *,
+    points: int = 5,
+    start: Vector | None = None,
+    options: SearchOptions | None = None,
+    journal: str | Path | None = None,
+    cache: Path | None = None,
+    progress: Progress | None = None,
+) -> ParetoFront:
+    """Front between the objective of a problem and a second one.
+
+    Both are minimised alone. Between, the augmented weighted Chebyshev distance to the point of both minima,
+    ``max_i w_i (f_i - f_i*)/span_i + 0.01 sum_i``, is minimised by the simplex of Nelder and Mead from the
+    best design known so far: unlike weighted sums it reaches the hollow parts of a front as well (R. E.
+    Steuer, E.-U. Choo, Math. Program. 26, 1983, 326-344). The front is what no other design computed on the
+    way is better than in both.
+
+    Parameters
+    ----------
+    problem : Problem
+    second : Quantity
+    points : int
+        Weights, the two ends included.
+    start, options, journal, cache, progress
+        As for `minimise`; an optimum of the first objective is a good start. Of the options samples, seed and
+        designs at most are taken.
+
+    Returns
+    -------
+    ParetoFront
+
+    Raises
+    ------
+    CaseError
+        E-OBJECTIVE: twice the same objective; E-RANGE: points.
+    ConvergenceError
+        E-INFEASIBLE: no design within the limits was found.
+    """
+    if second.name == problem.objective.name:
+        raise CaseError(
+            "a front has two objectives",
+            code="E-OBJECTIVE",
+            key="second",
+            value=second.name,
+            limit=f"another objective than {problem.objective.name}",
+        )
+    check_count("points", points, 2)
+    options = options or SearchOptions()
+    most = options.max_designs
+    with evaluations(problem, journal=journal, cache=cache, max_designs=most, progress=progress) as run:
+        both = (problem.objective, second)
+        before = np.array([run.values(None, both)[q.name] for q in both])
+        complete = True
+        try:
+            spread = samples_of(problem, options.sample_count(problem), options.seed)
+            _search(run, second, points, [start_at(problem, start), *spread])
+        except Enough:
+            complete = False
+        x, values = _known(run, both)
+        if not len(x):
+            raise infeasible(run)
+        best = non_dominated(values)
+        order = best[np.argsort(values[best, 0], kind="stable")]
+        rest = np.setdiff1d(np.arange(len(values)), best)
+        return ParetoFront(
+            problem=problem, second=second, x=x[order], values=values[order], before=before,
+            dominated=values[rest], designs=run.asked, failures=len(run.designs.failures), complete=complete,
+        )  # fmt: skip
+
+
+def non_dominated(values: np.ndarray) -> np.ndarray:
+    """Row numbers of (m, 2) values that no other row is below in one column and not above in the other."""
+    order = np.lexsort((values[:, 1], values[:, 0]))
+    lowest, kept = np.inf, []
+    for i in order:
+        if values[i, 1] < lowest:
+            lowest = values[i, 1]
+            kept.append(i)
+    return np.array(kept, int)
+
+
+def _search(run: Evaluations, second: Quantity, points: int, places) -> None:
+    """Both ends, and the weights between."""
+    both = (run.problem.objective, second)
+    for x in places:
+        run.cost(x)
+        run.penalised(x, lambda x=x: sum(run.values(x, both).values()))
+    for own in (run, run.towards(second)):
+        end = _end(run, own)
+        if end is not None:
+            run.penalised(end, lambda x=end: sum(run.values(x, both).values()))
+    _, values = _known(run, both)
+    if not len(values):
+        return
+    low, high = values.min(axis=0), values[non_dominated(values)].max(axis=0)
+    span = np.where(high > low, high - low, 1.0)
+
+    def distance(found: np.ndarray, weight: float) -> np.ndarray:
+        scaled = (found - low) / span
+        return (np.array([weight, 1.0 - weight]) * scaled).max(axis=-1) + _SMALL * scaled.sum(axis=-1)
+
+    for weight in np.linspace(0.0, 1.0, points)[1:-1]:
+
+        def cost(x, weight=float(weight)) -> float:
+            run.count(x)
+            names = [quantity.name for quantity in both]
+
+            def value() -> float:
+                found = run.values(x, both)
+                return float(distance(np.array([found[name] for name in names]), weight))
+
+            return run.penalised(x, value)
+
+        x, values = _known(run, both)
+        polish(run, cost, x[distance(values, float(weight)).argmin()], size=0.1, rounds=1)
+
+
+def _end(run: Evaluations, own: Evaluations) -> np.ndarray | None:
+    """Minimum of the objective of ``own`` alone, from the best design known."""
+    x, values = _known(run, (own.problem.objective,))
+    if not len(x):
+        return None
+    start = x[values[:, 0].argmin()]
+    if has_derivatives(own.problem):
+        descend(own, start)
+    else:
+        polish(own, own.cost, start, size=0.1)
+    return own.best[0] if np.isfinite(own.best[1]) else start
+
+
+def _known(run: Evaluations, quantities) -> tuple[np.ndarray, np.ndarray]:
+    """Points within bounds and limits at which all quantities are known, and these, (m, n) and (m, q).
+
+    Only points that this search has asked for: it then repeats itself, whatever else the journal holds.
+    """
+    problem, points, values = run.problem, [], []
+    low, high = problem.bounds.T
+    for point in run.asked_points:
+        known = (run.designs.journal.get(json.dumps(point)) or {}).get("values", {})
+        if any(q.name not in known for q in quantities):
+            continue
+        x = numbers(problem, point)
+        try:
+            inside = bool(np.all((x >= low) & (x <= high))) and run.violation(x) == 0.0
+        except Failure:
+            continue
+        if inside:
+            points.append(x)
+            values.append([known[q.name] for q in quantities])
+    return np.array(points).reshape(-1, len(low)), np.array(values).reshape(-1, len(quantities))
