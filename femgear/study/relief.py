@@ -22,7 +22,7 @@ import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations
 from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.flank_pairs import mesh_pairs
+from femgear.contact.flank_pairs import loaded_image, mesh_pairs
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
