@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from published.iso6336_stiffness import mesh_stiffness_method_b
 from validation.helical import PHASINGS, TABLE_4
 
 from femgear import cli
 from femgear.case import text as case_text
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError
+from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.run import grid_cache, run_case
 from femgear.storage.results import run_folder
 from femgear.system.system import MeshExcitation

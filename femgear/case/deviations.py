@@ -18,12 +18,12 @@ MOST_POINTS = 2000
 ROUNDING = 0.05e-6
 """What the sum of the pitch deviations may miss zero by for every tooth [m]: tenths of micrometres."""
 
-Deviation = Quantity(LENGTH, -0.02, 0.02)
-Amplitude = Quantity(LENGTH, 0.0, 0.02)
-Phase = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
-Diameter = Quantity(LENGTH, 1e-4, 20.0)
-RollAngle = Quantity(ANGLE, 0.0, 4 * math.pi)
-RollLength = Quantity(LENGTH, 0.0, 10.0)
+Deviation = Annotated[float, Quantity(LENGTH, -0.02, 0.02)]
+Amplitude = Annotated[float, Quantity(LENGTH, 0.0, 0.02)]
+Phase = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
+Diameter = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
+RollAngle = Annotated[float, Quantity(ANGLE, 0.0, 4 * math.pi)]
+RollLength = Annotated[float, Quantity(LENGTH, 0.0, 10.0)]
 Points = Field(max_length=MOST_POINTS)
 
 _MEASURED = ("file", "roll_angles", "diameters", "deviations")
@@ -46,7 +46,7 @@ class ModificationSection(Section):
     end_roll_angle: RollAngle | None = None
     end_roll_length: RollLength | None = None
     shape: Literal["linear", "parabolic"] | None = None
-    power: Number(0.1, 20.0) | None = None
+    power: Annotated[float, Number(0.1, 20.0)] | None = None
     file: Annotated[str, Field(max_length=1000)] | None = None
     roll_angles: Annotated[tuple[RollAngle, ...], Points] | None = None
     diameters: Annotated[tuple[Diameter, ...], Points] | None = None
@@ -135,13 +135,13 @@ class GearErrors(CarrierErrors):
 class IndividualPlanet(GearErrors):
     """Errors of one planet, in place of those that all planets have."""
 
-    planet: Count(1, 1000)
+    planet: Annotated[int, Count(1, 1000)]
 
 
 class OvalitySection(Section):
     """Out-of-roundness of the ring, ``amplitude cos(nodal_diameter (angle - phase))`` outwards."""
 
-    nodal_diameter: Count(1, 1000)
+    nodal_diameter: Annotated[int, Count(1, 1000)]
     amplitude: Amplitude
     phase: Phase = 0.0
     inextensional: StrictBool = False
@@ -156,6 +156,6 @@ class RingErrors(GearErrors):
 class PinError(Section):
     """Displacement of the axis of one planet: radial outwards, tangential counter-clockwise positive."""
 
-    planet: Count(1, 1000)
+    planet: Annotated[int, Count(1, 1000)]
     radial: Deviation = 0.0
     tangential: Deviation = 0.0

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError, core_schema
 
 from femgear.case.text import found, shown
 from femgear.case.units import ANGLE, Dimension, to_si
@@ -19,8 +21,22 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = False) -> Any:
-    """Type of a quantity given with its unit, an SI float in the model.
+@dataclass(frozen=True, eq=False)
+class Reader:
+    """How an entry is read and checked, and what the JSON schema says of it; stands in `Annotated`."""
+
+    read: Callable[[object], object]
+    schema: dict[str, Any]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        return dict(self.schema)
+
+
+def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = False) -> Reader:
+    """Reader of a quantity given with its unit, an SI float in the model.
 
     Parameters
     ----------
@@ -56,7 +72,7 @@ def Quantity(dimension: Dimension, low: float, high: float, *, open_low: bool = 
         return number
 
     schema = {"type": "string", "description": f"{dimension.name} with its unit, {limit}"}
-    return Annotated[float, BeforeValidator(convert), WithJsonSchema(schema)]
+    return Reader(convert, schema)
 
 
 def _as_text(value: float, low: float, high: float, dimension: Dimension) -> str:
@@ -90,8 +106,8 @@ def _factor_hint(number: float, low: float, high: float, dimension: Dimension, t
 
 def Number(
     low: float, high: float, *, open_low: bool = False, open_high: bool = False, note: str = ""
-) -> Any:
-    """Type of a plain number (integer or float, no text, no boolean) within a window.
+) -> Reader:
+    """Reader of a plain number (integer or float, no text, no boolean) within a window.
 
     Parameters
     ----------
@@ -121,25 +137,26 @@ def Number(
         return float(value)
 
     schema = {"type": "number", "description": f"{limit}{'; ' + note if note else ''}"}
-    return Annotated[float, BeforeValidator(convert), WithJsonSchema(schema)]
+    return Reader(convert, schema)
 
 
+PAIR, TRIPLE = (Field(min_length=count, max_length=count) for count in (2, 3))
+"""Of lists with so many entries, in `Annotated`."""
 RIGID = "rigid"
 
 
-def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> Any:
-    """Type of a stiffness that may be the text ``"rigid"``, infinite in the model."""
-    convert = Quantity(dimension, low, high).__metadata__[0].func
+def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> Reader:
+    """Reader of a stiffness that may be the text ``"rigid"``, infinite in the model."""
+    stiffness = Quantity(dimension, low, high)
 
-    def rigid_too(value: object) -> float:
-        return math.inf if value == RIGID else convert(value)
+    def rigid_too(value: object) -> object:
+        return math.inf if value == RIGID else stiffness.read(value)
 
-    schema = Field(json_schema_extra={"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
-    return Annotated[float, BeforeValidator(rigid_too), schema]
+    return Reader(rigid_too, {"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
 
 
-def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Any:
-    """Type of a whole number within a window; 27.0, "27" and true are refused.
+def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Reader:
+    """Reader of a whole number within a window; 27.0, "27" and true are refused.
 
     Parameters
     ----------
@@ -168,12 +185,7 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False) -> Any:
         return number
 
     schema = {"type": "integer", "minimum": -high if signed else low, "maximum": high}
-    return Annotated[int, BeforeValidator(convert), WithJsonSchema(schema)]
-
-
-def Several(kind: Any, count: int) -> Any:
-    """Type of a list of so many entries of one kind."""
-    return Annotated[tuple[kind, ...], Field(min_length=count, max_length=count)]
+    return Reader(convert, schema)
 
 
 def _one_line(value: object) -> str:

@@ -49,12 +49,12 @@ CODE = "E-PUBLISHED"
 _MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
 
 Member = Literal["sun", "ring", "carrier"]
-Radius = Quantity(LENGTH, 1e-4, 10.0)
-Mass = Quantity(MASS, 1e-6, 1e6)
-Inertia = Quantity(INERTIA, 1e-12, 1e8)
-Stiffness = Quantity(STIFFNESS, 1.0, 1e15)
-Shift = Number(-5.0, 5.0)
-_Speed = Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)
+Radius = Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
+Mass = Annotated[float, Quantity(MASS, 1e-6, 1e6)]
+Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
+Stiffness = Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
+Shift = Annotated[float, Number(-5.0, 5.0)]
+_Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM)]
 
 
 class SetSection(Section):
@@ -65,42 +65,45 @@ class SetSection(Section):
     mesh on the reference circles: half of it is taken from the tooth thickness of every gear.
     """
 
-    planets: Count(1, 1000)
-    centre_distance: Quantity(LENGTH, 1e-3, 10.0) | None = None
-    face_width: Quantity(LENGTH, 1e-4, 5.0)
-    planet_angles: tuple[Quantity(ANGLE, -2 * math.pi, 2 * math.pi), ...] | None = None
-    backlash: Quantity(LENGTH, 0.0, 0.01) = 0.0
+    planets: Annotated[int, Count(1, 1000)]
+    centre_distance: Annotated[float, Quantity(LENGTH, 1e-3, 10.0)] | None = None
+    face_width: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
+    planet_angles: tuple[Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)], ...] | None = None
+    backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.01)] = 0.0
     pin_errors: Annotated[tuple[PinError, ...], Field(max_length=1000)] = ()
 
 
 class RackSection(Section):
     """Basic rack, in modules; the default is ISO 53 profile C."""
 
-    addendum: Number(0.1, 3.0) = 1.0
-    dedendum: Number(0.1, 3.0) = 1.25
-    root_radius: Number(0.0, 1.0) = 0.25
+    addendum: Annotated[float, Number(0.1, 3.0)] = 1.0
+    dedendum: Annotated[float, Number(0.1, 3.0)] = 1.25
+    root_radius: Annotated[float, Number(0.0, 1.0)] = 0.25
 
 
 class MaterialSection(Section):
     """Isotropic elastic material of all gears."""
 
-    youngs_modulus: Quantity(MODULUS, 1e9, 1e12)
-    poisson_ratio: Number(
-        -1.0,
-        0.5,
-        open_low=True,
-        open_high=True,
-        note="0.5 is incompressible, beyond it no material is stable",
-    )
-    density: Quantity(DENSITY, 100.0, 25000.0)
+    youngs_modulus: Annotated[float, Quantity(MODULUS, 1e9, 1e12)]
+    poisson_ratio: Annotated[
+        float,
+        Number(
+            -1.0,
+            0.5,
+            open_low=True,
+            open_high=True,
+            note="0.5 is incompressible, beyond it no material is stable",
+        ),
+    ]
+    density: Annotated[float, Quantity(DENSITY, 100.0, 25000.0)]
 
 
 class ShaftPart(Section):
     """One part of a stepped shaft of the material of the gears."""
 
-    length: Quantity(LENGTH, 1e-4, 10.0)
-    outer_diameter: Quantity(LENGTH, 1e-4, 5.0)
-    inner_diameter: Quantity(LENGTH, 0.0, 5.0) = 0.0
+    length: Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
+    outer_diameter: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
+    inner_diameter: Annotated[float, Quantity(LENGTH, 0.0, 5.0)] = 0.0
 
 
 _Shaft = Annotated[tuple[ShaftPart, ...], Field(max_length=50)]
@@ -109,14 +112,14 @@ _Shaft = Annotated[tuple[ShaftPart, ...], Field(max_length=50)]
 class SunSection(Section):
     """The sun, and with it the module and the pressure angle of the set."""
 
-    teeth: Count(5, 5000, note=_MANY_TEETH)
-    module: Quantity(LENGTH, 5e-5, 0.1)
-    pressure_angle: Quantity(ANGLE, math.radians(5), math.radians(45))
+    teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
+    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.1)]
+    pressure_angle: Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
     profile_shift: Shift | None = None
     bore_radius: Radius
     mass: Mass
     inertia: Inertia
-    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15) | None = None
+    support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)] | None = None
     support_shaft: _Shaft = ()
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
@@ -128,13 +131,13 @@ class SunSection(Section):
 class PlanetSection(Section):
     """One of the equal planets."""
 
-    teeth: Count(5, 5000, note=_MANY_TEETH)
+    teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
     profile_shift: Shift = 0.0
     bore_radius: Radius
     mass: Mass
     inertia: Inertia
     bearing_stiffness: Stiffness
-    bearing_clearance: Quantity(LENGTH, 0.0, 0.002) = 0.0
+    bearing_clearance: Annotated[float, Quantity(LENGTH, 0.0, 0.002)] = 0.0
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
@@ -146,13 +149,13 @@ class PlanetSection(Section):
 class RingSection(Section):
     """The internal gear; a positive profile shift moves its flanks outwards, to larger radii."""
 
-    teeth: Count(10, 5000, note=_MANY_TEETH, signed=True)
+    teeth: Annotated[int, Count(10, 5000, note=_MANY_TEETH, signed=True)]
     profile_shift: Shift | None = None
     outer_radius: Radius
-    cutter_teeth: Count(5, 1000) | None = None
+    cutter_teeth: Annotated[int, Count(5, 1000)] | None = None
     cutter_profile_shift: Shift = 0.0
-    foundation_radial: Quantity(FOUNDATION, 0.0, 1e20)
-    foundation_tangential: Quantity(FOUNDATION, 0.0, 1e20)
+    foundation_radial: Annotated[float, Quantity(FOUNDATION, 0.0, 1e20)]
+    foundation_tangential: Annotated[float, Quantity(FOUNDATION, 0.0, 1e20)]
     tip_diameter: Radius | None = None
     root_diameter: Radius | None = None
     rack: RackSection | None = None
@@ -165,7 +168,7 @@ class CarrierSection(Section):
 
     mass: Mass
     inertia: Inertia
-    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15) | None = None
+    support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)] | None = None
     support_shaft: _Shaft = ()
     errors: CarrierErrors | None = None
 
@@ -174,7 +177,7 @@ class MachineSection(Section):
     """A rotor behind a torsional coupling; without it the member turns freely under its torque."""
 
     inertia: Inertia
-    coupling_stiffness: Quantity(TORSION, 1e-3, 1e15)
+    coupling_stiffness: Annotated[float, Quantity(TORSION, 1e-3, 1e15)]
 
 
 def _speed_range(value: object) -> object:
@@ -194,7 +197,7 @@ class _SpeedRange(Section):
 
     start: _Speed = Field(alias="from")
     to: _Speed
-    count: Count(2, 100_000)
+    count: Annotated[int, Count(2, 100_000)]
 
 
 class OperationSection(Section):
@@ -202,21 +205,21 @@ class OperationSection(Section):
 
     input: Member
     fixed: Member
-    torque: Quantity(TORQUE, -1e9, 1e9)
+    torque: Annotated[float, Quantity(TORQUE, -1e9, 1e9)]
     speeds: Annotated[tuple[_Speed, ...], BeforeValidator(_speed_range), Field(max_length=100_000)]
 
 
 class StaticSection(Section):
     """Positions over one mesh period, contact search and grid."""
 
-    positions: Count(8, 4096) = 64
+    positions: Annotated[int, Count(8, 4096)] = 64
     contact: Literal["profile", "line_of_action"] = "profile"
-    flank_elements: Count(4, 200) = 24
+    flank_elements: Annotated[int, Count(4, 200)] = 24
     members: Literal["fixed", "elastic"] = "fixed"
     back_flanks: StrictBool = False
     stresses: StrictBool = True
-    longest_record: Count(1, 4096) = 256
-    depth: Quantity(LENGTH, 1e-6, 0.1) | None = None
+    longest_record: Annotated[int, Count(1, 4096)] = 256
+    depth: Annotated[float, Quantity(LENGTH, 1e-6, 0.1)] | None = None
 
 
 class DynamicsSection(Section):
@@ -226,20 +229,20 @@ class DynamicsSection(Section):
     where neither is given it reaches so far that the level of the housing no longer changes.
     """
 
-    damping_ratio: Number(0.0, 1.0, open_high=True) = 0.05
-    up_to: Quantity(FREQUENCY, 10.0, 200e3) | None = None
-    mesh_harmonics: Count(1, 512) | None = None
-    response_harmonics: Count(1, 1000) | None = None
-    tolerance: Number(1e-14, 1e-2) = 1e-6
+    damping_ratio: Annotated[float, Number(0.0, 1.0, open_high=True)] = 0.05
+    up_to: Annotated[float, Quantity(FREQUENCY, 10.0, 200e3)] | None = None
+    mesh_harmonics: Annotated[int, Count(1, 512)] | None = None
+    response_harmonics: Annotated[int, Count(1, 1000)] | None = None
+    tolerance: Annotated[float, Number(1e-14, 1e-2)] = 1e-6
 
 
 class PublishedLines(Section):
     """Lines and lobes around a mesh harmonic that somebody published; the report compares them."""
 
     speed: _Speed
-    harmonic: Count(1, 1000)
-    orders: Annotated[tuple[Count(0, 10_000_000), ...], Field(min_length=1, max_length=20)]
-    lobes: Count(0, 10_000) | None = None
+    harmonic: Annotated[int, Count(1, 1000)]
+    orders: Annotated[tuple[Annotated[int, Count(0, 10_000_000)], ...], Field(min_length=1, max_length=20)]
+    lobes: Annotated[int, Count(0, 10_000)] | None = None
     source: Title
 
 
@@ -251,8 +254,8 @@ class HousingSection(Section):
     """
 
     form: Literal["exact", "linear"] = "exact"
-    points: Count(3, 100_000) = 54
-    sensor_angle: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = 0.0
+    points: Annotated[int, Count(3, 100_000)] = 54
+    sensor_angle: Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)] = 0.0
     published: tuple[PublishedLines, ...] = ()
 
 
@@ -263,7 +266,7 @@ class Case(Section, ReadCase):
     ``notices`` what was read in a way that deserves to be said.
     """
 
-    format: Count(1, 2**31) = FORMAT
+    format: Annotated[int, Count(1, 2**31)] = FORMAT
     title: Title
     set: SetSection
     rack: RackSection = RackSection()
@@ -328,8 +331,8 @@ class RigidCase(Case):
 class MeshStiffnessSection(Section):
     """Constant stiffness of every mesh, in place of the static solution's."""
 
-    sun_planet: Quantity(STIFFNESS, 1e3, 1e13)
-    planet_ring: Quantity(STIFFNESS, 1e3, 1e13)
+    sun_planet: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
+    planet_ring: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
 
 
 def output_member(case: Case) -> str:

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from published.iso6336_stiffness import mesh_stiffness_method_b
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
@@ -12,6 +11,7 @@ from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.solve import mesh_tangent_matrix, solve_contact, tangent_stiffness
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear
+from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 
 STEEL = Material(206e9, 0.3, 7850.0)

@@ -3,14 +3,14 @@
 import math
 
 import pytest
-from published.iso6336_stiffness import (
+
+from femgear.errors import GeometryError
+from femgear.gears.iso6336 import (
     basic_rack_factor,
     blank_factor,
     mesh_stiffness_method_b,
     theoretical_single_stiffness,
 )
-
-from femgear.errors import GeometryError
 
 
 def test_internal_gear_is_the_limit_of_many_teeth():

@@ -1,6 +1,6 @@
 """Case file of the oscillator: ``model = "oscillator"``."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -14,9 +14,9 @@ class OscillatorSection(BaseModel):
     """A mass on a spring."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    mass: Quantity(MASS, 1e-3, 1e3)
-    stiffness: Quantity(STIFFNESS, 1.0, 1e12)
-    damping_ratio: Number(0.0, 1.0) = 0.02
+    mass: Annotated[float, Quantity(MASS, 1e-3, 1e3)]
+    stiffness: Annotated[float, Quantity(STIFFNESS, 1.0, 1e12)]
+    damping_ratio: Annotated[float, Number(0.0, 1.0)] = 0.02
 
 
 class OscillatorCase(ReadCase):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from published.iso6336_stiffness import mesh_stiffness_method_b, theoretical_single_stiffness
-
+from femgear.gears.iso6336 import mesh_stiffness_method_b, theoretical_single_stiffness
 from validation.planetary import KISSSOFT, nrel_set
 from validation.rows import REPEATED, Row, printed, within
 

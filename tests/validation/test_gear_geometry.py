@@ -7,12 +7,12 @@ planetary stage 2 (github.com/gfsReboucas/Drivetrain, @NREL_5MW/stage_02.rtf).
 import math
 
 import pytest
-from published.iso6336_stiffness import mesh_stiffness_method_b, theoretical_single_stiffness
 
 from femgear.errors import GeometryError
 from femgear.gears import profile as iv
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear, tooth_thickness
+from femgear.gears.iso6336 import mesh_stiffness_method_b, theoretical_single_stiffness
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import (
     PlanetarySet,

@@ -14,13 +14,21 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, ValidationError, ValidationInfo, field_validator
 
-from femgear.case.fields import Count, Number, Quantity, Section, Title, described, refuse
-from femgear.case.fields import StiffnessOrRigid as Stiffness
+from femgear.case.fields import (
+    Count,
+    Number,
+    Quantity,
+    Section,
+    StiffnessOrRigid,
+    Title,
+    described,
+    refuse,
+)
 from femgear.case.problems import combine, translate
 from femgear.case.tables import Columns, embed_points, read_columns
 from femgear.case.text import ReadCase, text_with_points
@@ -99,18 +107,18 @@ def _reference(value: object) -> str:
 
 Name = Annotated[str, BeforeValidator(_name)]
 Reference = Annotated[str, BeforeValidator(_reference)]
-Mass = Quantity(MASS, 1e-6, 1e8)
-Inertia = Quantity(INERTIA, 1e-12, 1e11)
-Radius = Quantity(LENGTH, 1e-4, 100.0)
-Length = Quantity(LENGTH, 1e-4, 1e3)
-Offset = Quantity(LENGTH, -100.0, 100.0)
-Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
-PressureAngle = Quantity(ANGLE, math.radians(5), math.radians(45))
-Teeth = Count(4, 5000)
-Joint = Stiffness(TORSION, 1e-3, 1e15)
-Torque = Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)
-Time = Quantity(TIME, 0.0, LATEST)
-Frequency = Quantity(FREQUENCY, 1e-3, 1e7)
+Mass = Annotated[float, Quantity(MASS, 1e-6, 1e8)]
+Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e11)]
+Radius = Annotated[float, Quantity(LENGTH, 1e-4, 100.0)]
+Length = Annotated[float, Quantity(LENGTH, 1e-4, 1e3)]
+Offset = Annotated[float, Quantity(LENGTH, -100.0, 100.0)]
+Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
+PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
+Teeth = Annotated[int, Count(4, 5000)]
+Joint = Annotated[float, StiffnessOrRigid(TORSION, 1e-3, 1e15)]
+Torque = Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
+Time = Annotated[float, Quantity(TIME, 0.0, LATEST)]
+Frequency = Annotated[float, Quantity(FREQUENCY, 1e-3, 1e7)]
 
 
 def _two(value: object) -> object:
@@ -124,9 +132,8 @@ def _two(value: object) -> object:
     return value
 
 
-def Pair(kind: Any) -> Any:
-    """Type of two entries, of the first and the second body."""
-    return Annotated[tuple[kind, ...], BeforeValidator(_two)]
+BOTH = BeforeValidator(_two)
+"""Of entries of the first and the second body, in `Annotated`."""
 
 
 def _driver(value: str | None, ends) -> str | None:
@@ -145,50 +152,50 @@ class BodySection(Section):
     name: Name
     inertia: Inertia
     mass: Mass
-    transverse_inertia: Quantity(INERTIA, 0.0, 1e11) = 0.0
+    transverse_inertia: Annotated[float, Quantity(INERTIA, 0.0, 1e11)] = 0.0
     tilts: StrictBool = True
 
 
 class ShaftSection(Section):
     """A shaft between two bodies: springs of its joint, or a round section."""
 
-    between: Pair(Reference)
+    between: Annotated[tuple[Reference, ...], BOTH]
     length: Length
     bending: Joint | None = None
     torsion: Joint | None = None
-    shear: Stiffness(STIFFNESS, 1.0, 1e15) | None = None
-    shear_ratio: Number(0.0, 100.0) = 0.0
+    shear: Annotated[float, StiffnessOrRigid(STIFFNESS, 1.0, 1e15)] | None = None
+    shear_ratio: Annotated[float, Number(0.0, 100.0)] = 0.0
     outer_diameter: Radius | None = None
-    inner_diameter: Quantity(LENGTH, 0.0, 100.0) = 0.0
-    youngs_modulus: Quantity(MODULUS, 1e6, 1e12) = 2.06e11
-    poisson_ratio: Number(0.0, 0.5, open_high=True) = 0.3
-    density: Quantity(DENSITY, 0.0, 25000.0) = 7850.0
-    elements: Count(0, 100) = 0
+    inner_diameter: Annotated[float, Quantity(LENGTH, 0.0, 100.0)] = 0.0
+    youngs_modulus: Annotated[float, Quantity(MODULUS, 1e6, 1e12)] = 2.06e11
+    poisson_ratio: Annotated[float, Number(0.0, 0.5, open_high=True)] = 0.3
+    density: Annotated[float, Quantity(DENSITY, 0.0, 25000.0)] = 7850.0
+    elements: Annotated[int, Count(0, 100)] = 0
 
 
 class MeshSection(Section):
     """Rectangular mesh stiffness by the number of tooth pairs in contact."""
 
-    stiffness: Quantity(STIFFNESS, 1e3, 1e13)
-    contact_ratio: Number(1.0, 20.0)
-    low_share: Number(0.0, 1.0, open_low=True) | None = None
-    phase: Number(-1000.0, 1000.0) = 0.0
-    backlash: Quantity(LENGTH, 0.0, 0.05) | None = None
+    stiffness: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
+    contact_ratio: Annotated[float, Number(1.0, 20.0)]
+    low_share: Annotated[float, Number(0.0, 1.0, open_low=True)] | None = None
+    phase: Annotated[float, Number(-1000.0, 1000.0)] = 0.0
+    backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.05)] | None = None
 
 
 class ParallelSection(Section):
     """Two external gears; sizes by pitch radii, base radii, or the transverse module."""
 
-    between: Pair(Reference)
-    teeth: Pair(Teeth)
-    radii: Pair(Radius) | None = None
-    base_radii: Pair(Radius) | None = None
-    module: Quantity(LENGTH, 5e-5, 0.5) | None = None
+    between: Annotated[tuple[Reference, ...], BOTH]
+    teeth: Annotated[tuple[Teeth, ...], BOTH]
+    radii: Annotated[tuple[Radius, ...], BOTH] | None = None
+    base_radii: Annotated[tuple[Radius, ...], BOTH] | None = None
+    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.5)] | None = None
     mesh: MeshSection
     pressure_angle: PressureAngle = math.radians(20.0)
-    helix_angle: Quantity(ANGLE, -math.radians(60), math.radians(60)) = 0.0
+    helix_angle: Annotated[float, Quantity(ANGLE, -math.radians(60), math.radians(60))] = 0.0
     direction: Angle = 0.0
-    offsets: Pair(Offset) = (0.0, 0.0)
+    offsets: Annotated[tuple[Offset, ...], BOTH] = (0.0, 0.0)
     driver: Reference | None = None
 
     @field_validator("driver")
@@ -209,13 +216,13 @@ class PlanetarySection(Section):
     planet_radius: Radius | None = None
     sun_base_radius: Radius | None = None
     planet_base_radius: Radius | None = None
-    module: Quantity(LENGTH, 5e-5, 0.5) | None = None
-    planets: Count(1, 24) = 3
+    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.5)] | None = None
+    planets: Annotated[int, Count(1, 24)] = 3
     planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
     planet_mass: Mass
     planet_inertia: Inertia
-    planet_transverse_inertia: Quantity(INERTIA, 0.0, 1e11) = 0.0
-    planet_bearing: Stiffness(STIFFNESS, 1.0, 1e15) = math.inf
+    planet_transverse_inertia: Annotated[float, Quantity(INERTIA, 0.0, 1e11)] = 0.0
+    planet_bearing: Annotated[float, StiffnessOrRigid(STIFFNESS, 1.0, 1e15)] = math.inf
     sun_mesh: MeshSection
     ring_mesh: MeshSection
     pressure_angle: PressureAngle = math.radians(20.0)
@@ -231,17 +238,17 @@ class BearingSection(Section):
     """Bearing in the housing, of a body or of a station inside a shaft of several elements."""
 
     body: Reference | None = None
-    shaft: Pair(Reference) | None = None
-    station: Count(1, 99) | None = None
-    radial: Stiffness(STIFFNESS, 0.0, 1e15) = 0.0
-    tilt: Stiffness(TORSION, 0.0, 1e15) = 0.0
+    shaft: Annotated[tuple[Reference, ...], BOTH] | None = None
+    station: Annotated[int, Count(1, 99)] | None = None
+    radial: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, 1e15)] = 0.0
+    tilt: Annotated[float, StiffnessOrRigid(TORSION, 0.0, 1e15)] = 0.0
     offset: Offset = 0.0
 
 
 class GravitySection(Section):
     """Weight of all bodies along -y."""
 
-    acceleration: Quantity(ACCELERATION, 0.0, 1e3) = 9.80665
+    acceleration: Annotated[float, Quantity(ACCELERATION, 0.0, 1e3)] = 9.80665
 
 
 class TorqueSection(Section):
@@ -252,29 +259,29 @@ class TorqueSection(Section):
     file: Title | None = None
     times: Annotated[tuple[Time, ...], Field(min_length=1, max_length=MOST_POINTS)] | None = None
     torques: Annotated[tuple[Torque, ...], Field(min_length=1, max_length=MOST_POINTS)] | None = None
-    share: Number(0.0, 10.0) | None = None
+    share: Annotated[float, Number(0.0, 10.0)] | None = None
 
 
 class OperationSection(Section):
     """Speed of the first body at the start, and the torques."""
 
-    speed: Quantity(SPEED, 1e-3 * SPEED.scale, 1e6 * SPEED.scale)
+    speed: Annotated[float, Quantity(SPEED, 1e-3 * SPEED.scale, 1e6 * SPEED.scale)]
     torque: Annotated[tuple[TorqueSection, ...], Field(max_length=MOST_PARTS)] = ()
 
 
 class SimulationSection(Section):
     """Integration in time, what is kept of it, and its spectra."""
 
-    duration: Quantity(TIME, 1e-3, 1e5)
-    rate: Quantity(FREQUENCY, 10.0, FASTEST_RATE) = 20_000.0
-    record: Quantity(FREQUENCY, 1.0, FASTEST_RATE) | None = None
+    duration: Annotated[float, Quantity(TIME, 1e-3, 1e5)]
+    rate: Annotated[float, Quantity(FREQUENCY, 10.0, FASTEST_RATE)] = 20_000.0
+    record: Annotated[float, Quantity(FREQUENCY, 1.0, FASTEST_RATE)] | None = None
     start: Literal["static", "zero"] = "static"
-    harmonics: Count(1, 200) = 15
-    damping_ratio: Number(0.0, 1.0, open_high=True) = 0.0
+    harmonics: Annotated[int, Count(1, 200)] = 15
+    damping_ratio: Annotated[float, Number(0.0, 1.0, open_high=True)] = 0.0
     turning: StrictBool = True
     torsional: StrictBool = False
     contact_loss: StrictBool = False
-    modes: Count(0, 24) = 4
+    modes: Annotated[int, Count(0, 24)] = 4
     settle: Time | None = None
     resolution: Frequency | None = None
 
@@ -286,7 +293,7 @@ class DrivetrainCase(Section, ReadCase):
     deserves to be said.
     """
 
-    format: Count(1, 2**31) = FORMAT
+    format: Annotated[int, Count(1, 2**31)] = FORMAT
     model: Literal[MODEL]
     title: Title
     body: Annotated[tuple[BodySection, ...], Field(min_length=1, max_length=MOST_PARTS)]

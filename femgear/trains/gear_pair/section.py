@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from femgear.case.fields import Count, Number, Quantity, Section, Several, Title
+from femgear.case.fields import PAIR, Count, Number, Quantity, Section, Title
 from femgear.case.problems import checked_case
 from femgear.case.sections import FORMAT, Inertia, Mass, Radius, Stiffness
 from femgear.case.text import ReadCase
@@ -17,41 +17,45 @@ from femgear.case.units import ANGLE, LENGTH, STIFFNESS, TORQUE
 from femgear.errors import CaseError
 from femgear.trains.gear_pair.model import ImpactPair, PairBearings, PairScales, pair_scales
 
-Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
-Ratio = Number(1e-3, 100.0)
-Steps = Count(20, 10_000)
+Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
+Ratio = Annotated[float, Number(1e-3, 100.0)]
+Steps = Annotated[int, Count(20, 10_000)]
 _MOST_WAVES = 50
 
 
 class GearsSection(Section):
     """The driving and the driven gear: two entries of each."""
 
-    teeth: Several(Count(4, 5000), 2)
-    inertia: Several(Inertia, 2)
-    base_radii: Several(Radius, 2)
-    eccentricity: Several(Quantity(LENGTH, 0.0, 0.01), 2) = (0.0, 0.0)
-    eccentricity_angles: Several(Angle, 2) = (0.0, 0.0)
-    mass: Several(Mass, 2) | None = None
-    bearing_stiffness: Several(Stiffness, 2) | None = None
-    bearing_damping_ratio: Number(0.0, 1.0, open_high=True) = 0.0
+    teeth: Annotated[tuple[Annotated[int, Count(4, 5000)], ...], PAIR]
+    inertia: Annotated[tuple[Inertia, ...], PAIR]
+    base_radii: Annotated[tuple[Radius, ...], PAIR]
+    eccentricity: Annotated[tuple[Annotated[float, Quantity(LENGTH, 0.0, 0.01)], ...], PAIR] = (0.0, 0.0)
+    eccentricity_angles: Annotated[tuple[Angle, ...], PAIR] = (0.0, 0.0)
+    mass: Annotated[tuple[Mass, ...], PAIR] | None = None
+    bearing_stiffness: Annotated[tuple[Stiffness, ...], PAIR] | None = None
+    bearing_damping_ratio: Annotated[float, Number(0.0, 1.0, open_high=True)] = 0.0
 
 
 class MeshSection(Section):
     """Mesh stiffness, backlash, damping, tooth error; waves are harmonics of the tooth frequency, from 1."""
 
-    stiffness: Quantity(STIFFNESS, 1e3, 1e13)
-    stiffness_waves: Annotated[tuple[Number(-1.0, 1.0), ...], Field(max_length=_MOST_WAVES)] = ()
+    stiffness: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
+    stiffness_waves: Annotated[
+        tuple[Annotated[float, Number(-1.0, 1.0)], ...], Field(max_length=_MOST_WAVES)
+    ] = ()
     stiffness_angles: Annotated[tuple[Angle, ...], Field(max_length=_MOST_WAVES)] = ()
-    backlash: Quantity(LENGTH, 1e-7, 0.05)
-    damping_ratio: Number(0.0, 1.0, open_high=True)
-    error: Annotated[tuple[Quantity(LENGTH, -1e-3, 1e-3), ...], Field(max_length=_MOST_WAVES)] = ()
+    backlash: Annotated[float, Quantity(LENGTH, 1e-7, 0.05)]
+    damping_ratio: Annotated[float, Number(0.0, 1.0, open_high=True)]
+    error: Annotated[
+        tuple[Annotated[float, Quantity(LENGTH, -1e-3, 1e-3)], ...], Field(max_length=_MOST_WAVES)
+    ] = ()
     error_angles: Annotated[tuple[Angle, ...], Field(max_length=_MOST_WAVES)] = ()
 
 
 class OperationSection(Section):
     """Torque on the driving gear; a positive one presses the drive flanks together."""
 
-    torque: Quantity(TORQUE, -1e9, 1e9)
+    torque: Annotated[float, Quantity(TORQUE, -1e9, 1e9)]
 
 
 class ResponseSection(Section):
@@ -59,8 +63,8 @@ class ResponseSection(Section):
 
     start: Ratio = Field(default=3.5, alias="from")
     to: Ratio = 0.1
-    harmonics: Count(1, 100) = 12
-    largest_step: Number(1e-4, 1.0) = 0.02
+    harmonics: Annotated[int, Count(1, 100)] = 12
+    largest_step: Annotated[float, Number(1e-4, 1.0)] = 0.02
 
 
 class RatioRange(Section):
@@ -68,7 +72,7 @@ class RatioRange(Section):
 
     start: Ratio = Field(alias="from")
     to: Ratio
-    count: Count(2, 10_000)
+    count: Annotated[int, Count(2, 10_000)]
 
 
 class SweepSection(Section):
@@ -76,14 +80,14 @@ class SweepSection(Section):
 
     ranges: Annotated[tuple[RatioRange, ...], Field(min_length=1, max_length=20)]
     steps: Steps = 100
-    most_periods: Count(5, 100_000) = 300
+    most_periods: Annotated[int, Count(5, 100_000)] = 300
 
 
 class ChaosSection(RatioRange):
     """Lyapunov exponents over the ratio, each from the end of the motion before, and sections."""
 
-    points: Count(8, 100_000) = 100
-    skip: Count(0, 100_000) = 60
+    points: Annotated[int, Count(8, 100_000)] = 100
+    skip: Annotated[int, Count(0, 100_000)] = 60
     steps: Steps = 100
     sections: Annotated[tuple[Ratio, ...], Field(max_length=6)] = ()
 
@@ -94,7 +98,7 @@ class GearPairCase(Section, ReadCase):
     The fields carry the names of the case file; ``source`` is the text that gives this case.
     """
 
-    format: Count(1, 2**31) = FORMAT
+    format: Annotated[int, Count(1, 2**31)] = FORMAT
     model: Literal["gear_pair"]
     title: Title
     gears: GearsSection

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Literal
+from typing import Annotated, Literal
 
 from femgear.case.fields import Count, Quantity, Section
 from femgear.case.sections import MeshStiffnessSection, RigidCase
@@ -26,9 +26,9 @@ _SECONDS = 2.7e-7
 _LONG = 60.0
 
 # stiffer supports are lost in the rounding of those that mesh springs feel
-Stiffness = Quantity(STIFFNESS, 0.0, 1e14)
-Turning = Quantity(TORSION, 0.0, 1e13)
-Diametral = Quantity(INERTIA, 1e-12, 1e8)
+Stiffness = Annotated[float, Quantity(STIFFNESS, 0.0, 1e14)]
+Turning = Annotated[float, Quantity(TORSION, 0.0, 1e13)]
+Diametral = Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
 
 
 class _Supported(Section):
@@ -55,7 +55,7 @@ class HelicalPlanetSection(_Supported):
 class HelicalRingSection(_Supported):
     """The ring as a rigid body on its support in the housing."""
 
-    mass: Quantity(MASS, 1e-6, 1e6)
+    mass: Annotated[float, Quantity(MASS, 1e-6, 1e6)]
     inertia: Diametral
     support_stiffness: Stiffness
 
@@ -67,9 +67,9 @@ class HelicalSection(Section):
     run solves the set of Kahraman in place of the elastic ring.
     """
 
-    helix_angle: Quantity(ANGLE, 0.0, LARGEST_HELIX)
+    helix_angle: Annotated[float, Quantity(ANGLE, 0.0, LARGEST_HELIX)]
     hand: Literal["right", "left"] = "right"
-    slices: Count(1, MOST_SLICES) = 1
+    slices: Annotated[int, Count(1, MOST_SLICES)] = 1
     contact_points: Literal["pitch_point", "base_circles"] = "pitch_point"
     section: Literal["normal", "transverse"] = "normal"
     mesh_stiffness: MeshStiffnessSection | None = None

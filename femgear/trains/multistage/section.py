@@ -11,15 +11,15 @@ import re
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from published.iso6336_stiffness import mesh_stiffness_method_b
 from pydantic import BeforeValidator, Field
 
 from femgear.case.fields import (
+    PAIR,
+    TRIPLE,
     Count,
     Number,
     Quantity,
     Section,
-    Several,
     StiffnessOrRigid,
     Title,
     described,
@@ -32,6 +32,7 @@ from femgear.case.units import ANGLE, LENGTH, SPEED, STIFFNESS, TORQUE, TORSION
 from femgear.errors import CaseError, FemgearError
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
+from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, planar_from_set
@@ -71,11 +72,11 @@ def _member(value: object) -> str:
 
 
 MemberName = Annotated[str, BeforeValidator(_member)]
-Length = Quantity(LENGTH, 1e-4, 20.0)
-Speed = Quantity(SPEED, 1e-3 * _RPM, 1e6 * _RPM)
-Angle = Quantity(ANGLE, -2 * math.pi, 2 * math.pi)
-PressureAngle = Quantity(ANGLE, math.radians(5), math.radians(45))
-Teeth = Count(4, 5000)
+Length = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
+Speed = Annotated[float, Quantity(SPEED, 1e-3 * _RPM, 1e6 * _RPM)]
+Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
+PressureAngle = Annotated[float, Quantity(ANGLE, math.radians(5), math.radians(45))]
+Teeth = Annotated[int, Count(4, 5000)]
 
 
 class BodySection(Section):
@@ -83,8 +84,8 @@ class BodySection(Section):
 
     mass: Mass
     inertia: Inertia
-    support_stiffness: StiffnessOrRigid(STIFFNESS, 0.0, 1e15) = 0.0
-    torsional_stiffness: StiffnessOrRigid(TORSION, 0.0, 1e15) = 0.0
+    support_stiffness: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, 1e15)] = 0.0
+    torsional_stiffness: Annotated[float, StiffnessOrRigid(TORSION, 0.0, 1e15)] = 0.0
 
 
 class PlanetSection(Section):
@@ -92,18 +93,18 @@ class PlanetSection(Section):
 
     mass: Mass
     inertia: Inertia
-    bearing_stiffness: StiffnessOrRigid(STIFFNESS, 1.0, 1e15)
+    bearing_stiffness: Annotated[float, StiffnessOrRigid(STIFFNESS, 1.0, 1e15)]
 
 
 class GearsSection(Section):
     """Gears of a stage: sun, planet, ring; mesh phases, contact ratios and stiffness follow from them."""
 
-    teeth: Several(Teeth, 3)
-    module: Quantity(LENGTH, 5e-5, 0.5)
-    face_width: Quantity(LENGTH, 1e-4, 5.0)
+    teeth: Annotated[tuple[Teeth, ...], TRIPLE]
+    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.5)]
+    face_width: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)]
     pressure_angle: PressureAngle = math.radians(20.0)
-    profile_shifts: Several(Number(-5.0, 5.0), 3) = (0.0, 0.0, 0.0)
-    addendum: Several(Number(0.1, 3.0), 3) = (1.0, 1.0, 1.0)
+    profile_shifts: Annotated[tuple[Annotated[float, Number(-5.0, 5.0)], ...], TRIPLE] = (0.0, 0.0, 0.0)
+    addendum: Annotated[tuple[Annotated[float, Number(0.1, 3.0)], ...], TRIPLE] = (1.0, 1.0, 1.0)
     mesh_stiffness: MeshStiffnessSection | None = None
 
 
@@ -113,14 +114,14 @@ class RadiiSection(Section):
     sun: Radius
     planet: Radius
     pressure_angle: PressureAngle = math.radians(20.0)
-    teeth: Several(Teeth, 3) | None = None
+    teeth: Annotated[tuple[Teeth, ...], TRIPLE] | None = None
     mesh_stiffness: MeshStiffnessSection
 
 
 class StageSection(Section):
     """A planetary set."""
 
-    planets: Count(1, 24) = 3
+    planets: Annotated[int, Count(1, 24)] = 3
     planet_angles: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=24)] | None = None
     gears: GearsSection | None = None
     radii: RadiiSection | None = None
@@ -140,18 +141,18 @@ class StageSection(Section):
 class CouplingSection(Section):
     """A shaft between members of two stages: springs, or a solid round section of steel."""
 
-    between: Several(MemberName, 2)
+    between: Annotated[tuple[MemberName, ...], PAIR]
     diameter: Length | None = None
     length: Length | None = None
-    torsional: StiffnessOrRigid(TORSION, 1e-3, STIFFEST["torsional"]) | None = None
-    lateral: StiffnessOrRigid(STIFFNESS, 0.0, STIFFEST["lateral"]) | None = None
+    torsional: Annotated[float, StiffnessOrRigid(TORSION, 1e-3, STIFFEST["torsional"])] | None = None
+    lateral: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, STIFFEST["lateral"])] | None = None
 
 
 class OperationSection(Section):
     """Speed of and torque on the input, and where input and output are."""
 
     speed: Speed
-    torque: Quantity(TORQUE, -1e9, 1e9)
+    torque: Annotated[float, Quantity(TORQUE, -1e9, 1e9)]
     input: MemberName = "stage 1 sun"
     output: MemberName | None = None
 
@@ -161,10 +162,10 @@ class ResponseSection(Section):
 
     lowest: Speed
     highest: Speed
-    points: Count(2, 20_000) = 341
-    harmonics: Count(1, 20) = 3
-    damping_ratio: Number(0.0, 1.0, open_low=True, open_high=True) = 0.03
-    balance_points: Count(0, 200) = 0
+    points: Annotated[int, Count(2, 20_000)] = 341
+    harmonics: Annotated[int, Count(1, 20)] = 3
+    damping_ratio: Annotated[float, Number(0.0, 1.0, open_low=True, open_high=True)] = 0.03
+    balance_points: Annotated[int, Count(0, 200)] = 0
 
 
 class MultistageCase(Section, ReadCase):
@@ -173,7 +174,7 @@ class MultistageCase(Section, ReadCase):
     The fields carry the names of the case file; ``source`` is the text that gives this case.
     """
 
-    format: Count(1, 2**31) = FORMAT
+    format: Annotated[int, Count(1, 2**31)] = FORMAT
     model: Literal["multistage"]
     title: Title
     stage: Annotated[tuple[StageSection, ...], Field(min_length=1, max_length=20)]

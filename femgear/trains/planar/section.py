@@ -29,10 +29,10 @@ from femgear.trains.rigid import (
 SMOOTHING = 0.3e-6
 """Length over which tooth contact sets in [m], of the examples of NREL/CP-5000-55355."""
 
-Frequency = Quantity(FREQUENCY, 0.01, 1e5)
-Clearance = Quantity(LENGTH, 0.0, 0.01)
-Torsion = Quantity(TORSION, 0.0, 1e15)
-Ratio = Number(0.0, 1.0, open_high=True)
+Frequency = Annotated[float, Quantity(FREQUENCY, 0.01, 1e5)]
+Clearance = Annotated[float, Quantity(LENGTH, 0.0, 0.01)]
+Torsion = Annotated[float, Quantity(TORSION, 0.0, 1e15)]
+Ratio = Annotated[float, Number(0.0, 1.0, open_high=True)]
 
 FIGURES = (
     "mode_shapes",
@@ -70,9 +70,9 @@ def _some(values: tuple) -> tuple:
 class PlanarRingSection(Section):
     """The ring as a rigid body on its support in the housing."""
 
-    mass: Quantity(MASS, 1e-6, 1e6)
-    inertia: Quantity(INERTIA, 1e-12, 1e8)
-    support_stiffness: Quantity(STIFFNESS, 0.0, 1e15)
+    mass: Annotated[float, Quantity(MASS, 1e-6, 1e6)]
+    inertia: Annotated[float, Quantity(INERTIA, 1e-12, 1e8)]
+    support_stiffness: Annotated[float, Quantity(STIFFNESS, 0.0, 1e15)]
 
 
 class TorsionSection(Section):
@@ -86,7 +86,7 @@ class TorsionSection(Section):
 class CarrierBearingSection(Section):
     """A bearing of the carrier beside its support."""
 
-    stiffness: Quantity(STIFFNESS, 1.0, 1e15)
+    stiffness: Annotated[float, Quantity(STIFFNESS, 1.0, 1e15)]
     clearance: Clearance = 0.0
     on: Literal["ring", "housing"] = "housing"
 
@@ -94,8 +94,8 @@ class CarrierBearingSection(Section):
 class GravitySection(Section):
     """Weight of all bodies; its direction counts from the x axis when the carrier's phase is zero."""
 
-    acceleration: Quantity(ACCELERATION, 1e-3, 1e3) = 9.80665
-    direction: Quantity(ANGLE, -2 * math.pi, 2 * math.pi) = -0.5 * math.pi
+    acceleration: Annotated[float, Quantity(ACCELERATION, 1e-3, 1e3)] = 9.80665
+    direction: Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)] = -0.5 * math.pi
 
 
 class BranchSection(Section):
@@ -103,16 +103,16 @@ class BranchSection(Section):
 
     start: Frequency = Field(alias="from")
     to: Frequency
-    harmonics: Count(1, 60) = 9
+    harmonics: Annotated[int, Count(1, 60)] = 9
     stability: StrictBool = True
-    points: Count(10, 5000) = 600
+    points: Annotated[int, Count(10, 5000)] = 600
 
 
 class ResponseSection(Section):
     """Responses to weight and mesh frequency together at the speeds of the operation."""
 
-    carrier_harmonics: Count(1, 500) = 3
-    side_bands: Count(0, 100) = 3
+    carrier_harmonics: Annotated[int, Count(1, 500)] = 3
+    side_bands: Annotated[int, Count(0, 100)] = 3
 
 
 class PlanarPublished(Section):
@@ -146,7 +146,7 @@ class PlanarSection(Section):
 
     mesh_stiffness: MeshStiffnessSection | None = None
     line_backlash: Clearance | None = None
-    smoothing: Quantity(LENGTH, 0.0, 1e-3) = SMOOTHING
+    smoothing: Annotated[float, Quantity(LENGTH, 0.0, 1e-3)] = SMOOTHING
     back_flanks: StrictBool = False
     damping_ratios: Annotated[tuple[Ratio, ...], AfterValidator(_some), Field(max_length=1000)] | None = None
     gyroscopic: StrictBool = False
