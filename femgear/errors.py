@@ -8,6 +8,94 @@ from __future__ import annotations
 
 import numpy as np
 
+CODES = {
+    "E-ARGUMENTS": "The command line cannot be understood.",
+    "E-ASSEMBLY": "Tooth numbers, centre distance and planet angles do not fit each other.",
+    "E-BACKLASH": "Flanks overlap, or have less play than what is asked of them needs.",
+    "E-BEARING": "A bearing has values or springs that no model can have.",
+    "E-CASE": "The case file has several mistakes, or one that has no code of its own.",
+    "E-CHOICE": "The value is none of the choices.",
+    "E-CLEARANCE": "The tip of a gear runs into the root of its mate.",
+    "E-COAXIAL": "Sun, planet and ring have no common centre distance.",
+    "E-CONTACT": "The contact problem has no trustworthy solution.",
+    "E-CONTACT-COMPLIANCE": "A compliance is not that of an elastic body.",
+    "E-CONTACT-OPEN": "A mesh carries no load where the method needs one.",
+    "E-CONTACT-RATIO": "The contact ratio of a mesh is below one.",
+    "E-CONVERGENCE": "An iteration did not reach its tolerance.",
+    "E-COUNT": "A list has not as many entries as it must have.",
+    "E-CUTTER": "The tool of a gear cannot make it.",
+    "E-DAMPING": "A damping is negative, is given twice, or has a form that the method cannot carry.",
+    "E-DISK-FULL": "The disk has no room for the results.",
+    "E-DIVERGED": "The motion grows beyond all bounds.",
+    "E-DRIVETRAIN": "The bodies, shafts and stages of a drivetrain make no chain.",
+    "E-DUPLICATE": "The same thing is given twice.",
+    "E-FEMGEAR": "A refusal that has no code of its own.",
+    "E-FILE": "A file cannot be read: missing, no regular file, too long, or not of its form.",
+    "E-FILE-ENC": "A file is not UTF-8.",
+    "E-FILLET": "A tip runs into the root fillet of its mate.",
+    "E-FINITE": "A number is not finite.",
+    "E-FIXED-MEMBER": "The model needs another member to be fixed.",
+    "E-FORMAT": "A file has a format that this version of femgear does not read, or is no results file.",
+    "E-GEOMETRY": "A gear cannot have this value, or differs from its mates where it must not.",
+    "E-GRID": "An outline cannot be meshed, or a grid is not usable.",
+    "E-GRID-FILE": "A grid cannot be read or written.",
+    "E-GRID-FREE": "Nothing holds the body, or a part of it.",
+    "E-GRID-GMSH": "Gmsh failed, was stopped, or cannot be loaded.",
+    "E-HARMONICS": "Harmonics, lines or samples do not fit each other.",
+    "E-INFEASIBLE": "No design can be computed and lies within the limits.",
+    "E-INTEGRATION": "A time integration stopped before its end, or missed a balance.",
+    "E-INTERFERENCE": "Tips strike flanks outside the mesh.",
+    "E-ISO6336": "The formula of ISO 6336 does not cover this gear pair.",
+    "E-JOURNAL": "The journal of a search or sweep is broken, or belongs to another one.",
+    "E-KEY-MISSING": "A needed entry of the case file is missing.",
+    "E-KEY-UNKNOWN": "The case file has a key that nobody reads.",
+    "E-LOAD-BALANCE": "Constant loads do work on a motion that nothing holds.",
+    "E-LOCKED": "Another run is writing into the folder.",
+    "E-MASS": "A mass matrix is not positive definite.",
+    "E-MECHANISM": "Something moves freely that must be held, or is held that must move.",
+    "E-MODEL": "There is no such model, or the model of the case has not what is asked for.",
+    "E-MODES": "The modes that are asked for do not exist.",
+    "E-MODIFICATION": "A modification or an error of the flanks that they cannot have.",
+    "E-MOTION": "Displacements are too large for a model of small displacements.",
+    "E-NEIGHBOURS": "Neighbouring planets overlap.",
+    "E-NO-LOAD": "Without torque no tooth carries load.",
+    "E-OBJECTIVE": "There is no such quantity, or no such limit of one.",
+    "E-OTHER-CASE": "A result is that of another case.",
+    "E-OUTPUT": "The folder of the results cannot be used, or holds something else.",
+    "E-PERIODS": "The errors span more mesh periods than the method takes.",
+    "E-PUBLISHED": "A published line cannot be compared: its speed or harmonic is not computed.",
+    "E-RANGE": "A value lies outside what is allowed.",
+    "E-RATE": "The steps are too few to follow the motion.",
+    "E-RESIDUAL": "A solution misses its equations, or truncated modes leave too much behind.",
+    "E-RESONANCE": "An undamped resonance has an infinite response.",
+    "E-RESULTS-CHANGED": "A results file is not the one that the run wrote.",
+    "E-RESULTS-INCOMPLETE": "The run was interrupted.",
+    "E-RESULTS-MISSING": "There are no such results.",
+    "E-RIM": "A rim is too thin, or lies on the wrong side of the teeth.",
+    "E-ROOT-RADIUS": "The root radius of the tool does not fit its profile.",
+    "E-SHAFT": "The parts make no shaft.",
+    "E-SHAPE": "Arrays do not have the shapes that belong together.",
+    "E-SHIFT": "A profile shift is not possible, or cannot be found.",
+    "E-SOLVE": "A system of linear equations has no trustworthy solution.",
+    "E-SPECTRUM": "No spectrum can be made of this record.",
+    "E-SPEED": "Speeds, frequencies and directions do not fit each other, or a speed is critical.",
+    "E-STAGE": "The case has no such stage.",
+    "E-START": "The start of an iteration or of a motion cannot be used.",
+    "E-STIFFNESS": "A stiffness is negative where it must not be, or too far from the others.",
+    "E-STORAGE": "Results cannot be written or read.",
+    "E-SUPPORT": "A support has values that no model can have.",
+    "E-SYMMETRY": "A matrix or an arrangement lacks the symmetry that the method needs.",
+    "E-SYSTEM-LIBRARY": "A library or package that a picture needs is not installed.",
+    "E-TEETH": "Tooth numbers that no gear or set can have.",
+    "E-TIP": "The tip of a gear is pointed, too high or too low.",
+    "E-TOML": "The file is not TOML.",
+    "E-TORQUE": "A torque or a history of torques that the method cannot take.",
+    "E-TYPE": "The value is not of the kind that is needed.",
+    "E-UNIT": "A quantity lacks its unit, or has a unit of another kind.",
+    "E-VARIABLE": "There is no such variable, or it has no such values.",
+}
+"""Meaning of every code; docs/errors.md lists the messages that carry it."""
+
 
 class FemgearError(Exception):
     """Base of all errors that femgear raises on purpose.
@@ -155,12 +243,12 @@ def checked_tolerance(value, key: str = "tolerance") -> float:
     Raises
     ------
     CaseError
-        Not a number, or one out of that range (E-TOLERANCE).
+        Not a number, or one out of that range (E-RANGE).
     """
-    number = checked_numbers(value, key, code="E-TOLERANCE", unit="")
+    number = checked_numbers(value, key, code="E-RANGE", unit="")
     if number.ndim or not 0.0 < number < 1.0:
         raise CaseError(
-            f"a {key} of {number.tolist()}", code="E-TOLERANCE", key=key, limit="between 0 and 1",
+            f"a {key} of {number.tolist()}", code="E-RANGE", key=key, limit="between 0 and 1",
             remedy="1e-6 to 1e-12 is usual",
         )  # fmt: skip
     return float(number)

@@ -44,7 +44,7 @@ def main(results: Path, /, *, output: Path = FOLDER) -> None:
         small.save(stream, format="png", optimize=True)
         data = stream.getvalue()
         if len(data) > LARGEST:
-            raise StorageError(f"{name} takes {len(data)} bytes", code="E-SIZE", limit=f"{LARGEST} bytes")
+            raise StorageError(f"{name} takes {len(data)} bytes", code="E-RANGE", limit=f"{LARGEST} bytes")
         replace_file(
             ready_folder(output) / name, lambda path, data=data: path.write_bytes(data), size=len(data)
         )

@@ -175,7 +175,7 @@ def test_what_the_dynamics_cannot_represent_is_refused_before_computing(case):
     for key, value, code in (
         ("operation.fixed", "carrier", "E-FIXED-MEMBER"),
         ("operation.torque", "0 N m", "E-NO-LOAD"),
-        ("operation.speeds", ["1e6 rpm"], "E-FREQUENCY"),
+        ("operation.speeds", ["1e6 rpm"], "E-RANGE"),
         ("sun.errors", {"runout_amplitude": "5 um"}, "E-PERIODS"),
     ):
         changed = with_value(case, key, value)

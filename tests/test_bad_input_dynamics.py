@@ -73,7 +73,7 @@ def test_too_few_harmonics_show_in_the_tail():
 def test_a_step_beyond_the_stability_limit_is_refused_with_the_limit():
     """Central differences: h < T/pi (T. J. R. Hughes, The Finite Element Method, 2000, 9.1)."""
     problem = oscillator(PolynomialSprings([0], [[(2.0 * np.pi) ** 2]]))
-    with pytest.raises(CaseError, match="E-STEP") as error:
+    with pytest.raises(CaseError, match="E-RANGE") as error:
         solve_transient(problem, 0.0, [0.0, 100.0], method="central difference", step=0.4)
     assert "0.3183" in error.value.limit
 
@@ -91,7 +91,7 @@ def test_speeds_through_zero_are_refused():
     for speeds in (["0 rpm"], ["-100 rpm", "100 rpm"], {"from": "-10 rpm", "to": "10 rpm", "count": 3}):
         with pytest.raises(CaseError, match=r"operation\.speeds"):
             with_value(case, "operation.speeds", speeds)
-    with pytest.raises(CaseError, match="E-FREQUENCY"):
+    with pytest.raises(CaseError, match="E-RANGE"):
         frequency_response_curve(rectangular(), (0.0, 1.0), harmonics=3)
 
 
@@ -101,6 +101,6 @@ def test_planets_faster_than_the_waves_of_the_ring_are_refused():
         nodal_diameter=np.array([0, 1, 2, 3]), frequency=np.array([10.0, 400.0, 700.0, 900.0])
     )
     check_rim_speed(modes, [2.0 * np.pi * 299.9])
-    with pytest.raises(CaseError, match="E-CRITICAL-SPEED") as error:
+    with pytest.raises(CaseError, match="E-SPEED") as error:
         check_rim_speed(modes, [10.0, 2.0 * np.pi * 300.1])
     assert "18000 rpm" in error.value.limit and "3 nodal diameters" in str(error.value)

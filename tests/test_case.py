@@ -203,20 +203,20 @@ def test_not_utf8_names_the_offset(tmp_path):  # bad input 1
 def test_duplicate_key_names_both_lines(tmp_path):  # bad input 3
     first = TEXT.splitlines().index("teeth = 27") + 1
     error = refused(replaced("teeth = 27\n", "teeth = 27\nbore_radius = '8 mm'\nteeth = 28\n"), tmp_path)
-    assert error.code == "E-TOML-DUPLICATE" and error.key == "sun.teeth"
+    assert error.code == "E-TOML" and error.key == "sun.teeth"
     assert f"lines {first} and {first + 2}" in str(error)
 
 
 def test_duplicate_section_names_both_lines(tmp_path):  # bad input 3
     error = refused(TEXT + "\n[sun]\nteeth = 3\n", tmp_path)
     lines = [n for n, line in enumerate((TEXT + "\n[sun]\n").splitlines(), 1) if line == "[sun]"]
-    assert error.code == "E-TOML-DUPLICATE" and error.key == "sun"
+    assert error.code == "E-TOML" and error.key == "sun"
     assert f"lines {lines[0]} and {lines[1]}" in str(error)
 
 
 def test_duplicate_in_the_last_line(tmp_path):  # bad input 3: tomllib says "at end of document"
     error = refused("title = 'a'\ntitle = 'b'", tmp_path)
-    assert error.code == "E-TOML-DUPLICATE" and "lines 1 and 2" in str(error)
+    assert error.code == "E-TOML" and "lines 1 and 2" in str(error)
 
 
 def test_unknown_key_suggests_the_near_one(tmp_path):  # bad input 4
@@ -292,7 +292,7 @@ def test_an_integer_of_4000_digits_as_a_number(tmp_path):  # bad input 12
 )  # bad input 13
 def test_deep_nesting(text, tmp_path):
     error = refused(text, tmp_path)
-    assert error.code == "E-TOML-DEPTH" and "32" in error.limit
+    assert error.code == "E-TOML" and "32" in error.limit
 
 
 def test_too_long_a_file(tmp_path):  # bad input 13
@@ -413,7 +413,7 @@ WRONG = [
     ("dynamics", {"mesh_harmonics": 6, "up_to": "20 kHz"}, "E-RANGE", "given twice"),
     ("dynamics", {"response_harmonics": 18}, "E-RANGE", "together with dynamics.mesh_harmonics"),
     ("dynamics.up_to", "300 kHz", "E-RANGE", "200000 Hz"),
-    ("housing", {"form": "linear", "points": 55}, "E-POINTS", "multiple of 3"),
+    ("housing", {"form": "linear", "points": 55}, "E-SYMMETRY", "multiple of 3"),
     ("housing.form", "hat", "E-CHOICE", "'linear'"),
     ("dynamics.damping_ratio", math.nan, "E-FINITE", "dynamics.damping_ratio"),  # 10
     pytest.param("dynamics.damping_ratio", 10**5000, "E-RANGE", "too long", id="5000 digits"),  # 12
@@ -426,7 +426,7 @@ WRONG = [
     ("sun", 3, "E-TYPE", "[sun]"),
     ("sun.modul", "1.5 mm", "E-KEY-UNKNOWN", "module?"),
     ("sun.tip.diameter", "1.5 mm", "E-KEY-UNKNOWN", "tip_diameter"),
-    ("title.x", 1, "E-KEY", "not a table"),
+    ("title.x", 1, "E-TYPE", "not a table"),
 ]
 
 
@@ -437,7 +437,7 @@ def test_wrong_values(key, value, code, part):
     assert part in str(error)
     assert all(problem.key.startswith(key.split(".")[0]) for problem in getattr(error, "problems", [error]))
     if len(getattr(error, "problems", [error])) == 1:
-        assert error.limit or error.remedy or error.code in ("E-TYPE", "E-DUPLICATE", "E-KEY")
+        assert error.limit or error.remedy or error.code in ("E-TYPE", "E-DUPLICATE", "E-TYPE")
 
 
 def test_fixed_member_must_be_named(tmp_path):  # bad input 49

@@ -281,7 +281,7 @@ def test_modifications_of_a_flank_are_limited_in_sum():
     """20 x 0.28 mm on a module of 1.5 mm: every entry is below 0.2 modules, the tip would lose 5.6 mm."""
     extra = RELIEF.replace("12 um", "280 um") * 20
     error = refused(extra, GeometryError)
-    assert (error.code, error.key, error.value) == ("E-DEVIATION", "sun.modifications", "5600 um")
+    assert (error.code, error.key, error.value) == ("E-MODIFICATION", "sun.modifications", "5600 um")
     assert error.file == f"case.toml:{line_of(extra, '[[sun.modifications]]')}"
     assert "20 modifications together take off 5600 um" in str(error) and "300 um" in error.limit
     # what one adds the other may take off, and what stands on different ends of a flank does not add up
@@ -306,7 +306,7 @@ def test_the_sum_is_that_of_each_flank_of_the_planets():
 def test_a_relief_that_goes_on_beyond_its_end_is_limited_too():
     extra = RELIEF.replace("12 um", "250 um") + 'end_diameter = "43.9 mm"\n'
     error = refused(extra, GeometryError)
-    assert error.code == "E-DEVIATION" and "goes on beyond its end" in str(error)
+    assert error.code == "E-MODIFICATION" and "goes on beyond its end" in str(error)
 
 
 @pytest.mark.parametrize("kind", ["tip relief", "root relief", "profile crowning"])

@@ -134,7 +134,7 @@ def test_sizes_alone_are_no_mechanism(own):
     """An inertia of 1e-9 kg m^2 and a shaft of 70 m are computed; what rounding would hide is called so."""
     assert check_drivetrain(with_value(own, "body[1].inertia", "1e-9 kg m^2"))
     tiny = refused_model(with_value(own, "body[1].inertia", "1e-12 kg m^2"))
-    assert tiny.code == "E-SPREAD" and tiny.key == "body[1]" and "pinion" in tiny.remedy
+    assert tiny.code == "E-STIFFNESS" and tiny.key == "body[1]" and "pinion" in tiny.remedy
     data = case_text.parse(to_toml(own), "")
     for length, fits in (("70 m", True), ("1 km", False)):
         shafts = [data["shaft"][0], data["shaft"][1] | {"length": length}]
@@ -143,7 +143,7 @@ def test_sizes_alone_are_no_mechanism(own):
             assert check_drivetrain(case)
         else:
             error = refused_model(case)
-            assert error.code == "E-SPREAD" and "wheel-fan" in error.remedy
+            assert error.code == "E-STIFFNESS" and "wheel-fan" in error.remedy
 
 
 @pytest.mark.parametrize("body", [0, 1])
@@ -165,7 +165,7 @@ def test_one_soft_bearing_is_named(body):
     """
     assert check_drivetrain(parse_case(text))
     error = refused_model(with_value(parse_case(text), f"bearing[{body}].radial", "1e-3 N/m"))
-    assert (error.code, error.key, error.value) == ("E-SPREAD", f"bearing[{body}].radial", "0.001 N/m")
+    assert (error.code, error.key, error.value) == ("E-STIFFNESS", f"bearing[{body}].radial", "0.001 N/m")
     hertz = math.sqrt(1e-3 / (210.0, 160.0)[body]) / (2.0 * math.pi)
     assert f"{'ab'[body]} on its bearings alone has {hertz:.3g} Hz" in error.message
 

@@ -99,7 +99,7 @@ def test_what_is_refused(case, key, value, code, named):
 
 
 def test_two_eccentric_gears_of_one_speed_are_refused(case):
-    with pytest.raises(CaseError, match="E-PAIR"):
+    with pytest.raises(CaseError, match="E-RANGE"):
         with_values(case, {"gears.teeth": [20, 20], "gears.eccentricity": ["1 um", "1 um"]})
 
 

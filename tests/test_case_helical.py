@@ -237,7 +237,7 @@ def test_virtual_gears_that_cannot_be_made_are_refused(case):
     # a round tool tip that fits between the flanks of the transverse section alone
     blunt = with_value(case, "rack", {"root_radius": 0.4, "addendum": 0.7})
     gears = planetary_set(blunt)
-    with pytest.raises(CaseError, match="E-HELICAL-SECTION") as info:
+    with pytest.raises(CaseError, match="E-GEOMETRY") as info:
         check_helical_case(blunt, gears)
     assert 'section = "transverse"' in info.value.remedy
     check_helical_case(with_value(blunt, "helical.section", "transverse"), gears)

@@ -390,21 +390,21 @@ def test_results_that_are_no_numbers_are_failures(case):
         (lambda c: Variable("sun.mass", "1 kg", "2 kg", "-1 kg"), "E-VARIABLE", "tolerance"),
         (lambda c: Problem(c, [], ROSENBROCK), "E-VARIABLE", "needs a design variable"),
         (lambda c: Problem(c, [X, X], ROSENBROCK), "E-VARIABLE", "given twice"),
-        (lambda c: Problem(c, [Variable("sun.masss", "1 kg", "2 kg")], ROSENBROCK), "E-KEY", "masss"),
+        (lambda c: Problem(c, [Variable("sun.masss", "1 kg", "2 kg")], ROSENBROCK), "E-TYPE", "masss"),
         (lambda c: Problem(c, [Variable("sun.mass", "1 mm", "2 mm")], ROSENBROCK), "E-UNIT", "sun.mass"),
-        (lambda c: Limit(ROSENBROCK), "E-LIMIT", "Rosenbrock"),
-        (lambda c: minimise(Problem(c, [X], ROSENBROCK), method="magic"), "E-METHOD", "magic"),
+        (lambda c: Limit(ROSENBROCK), "E-OBJECTIVE", "Rosenbrock"),
+        (lambda c: minimise(Problem(c, [X], ROSENBROCK), method="magic"), "E-CHOICE", "magic"),
         (lambda c: minimise(Problem(c, [X], ROSENBROCK), start=[2.0]), "E-START", "0.05 to 0.95"),
         (lambda c: SearchOptions(max_designs=1), "E-RANGE", "max_designs"),
         (lambda c: SearchOptions(starts=0), "E-RANGE", "starts"),
         (lambda c: pareto_front(Problem(c, [X], ROSENBROCK), X_ALONE, points=1), "E-RANGE", "points"),
-        (lambda c: sweep(c, {}, [ROSENBROCK]), "E-SWEEP", "0 cases"),
+        (lambda c: sweep(c, {}, [ROSENBROCK]), "E-VARIABLE", "0 cases"),
         (lambda c: sweep(c, {"sun.mass": ["1 mm"]}, [ROSENBROCK]), "E-UNIT", "sun.mass"),
-        (lambda c: sweep(c, {"title": ["a", "b"]}, [ROSENBROCK]), "E-SWEEP", "title"),
+        (lambda c: sweep(c, {"title": ["a", "b"]}, [ROSENBROCK]), "E-VARIABLE", "title"),
         (lambda c: Variable("sun.mass", 0.0, "2 kg"), "E-UNIT", "0.0 kg..2 kg"),
         (
             lambda c: Problem(c, [Variable("sun.modifications[9].amount", "0 um", "2 um")], ROSENBROCK),
-            "E-KEY",
+            "E-TYPE",
             "",
         ),
         (
@@ -442,5 +442,5 @@ def test_whole_numbers(case):
     found = minimise(Problem(case, [teeth], parabola), method="global", options=options)
     assert found.values == {"housing.points": 47} and found.after["parabola"] == 1.0
     assert found.tolerances[0].tolerance == 1.0 and found.tolerances[0].more["parabola"] == 2.0
-    with pytest.raises(CaseError, match="E-METHOD"):
+    with pytest.raises(CaseError, match="E-CHOICE"):
         minimise(Problem(case, [teeth], parabola), method="simplex")

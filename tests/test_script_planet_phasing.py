@@ -21,7 +21,7 @@ def run(folder, *arguments):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--sun", "70", "--ring", "30"), "E-PHASING"),
+        (("--sun", "70", "--ring", "30"), "E-RANGE"),
         (("--planet", "5"), "20 teeth close this set"),
         (("--planets", "100"), "overlap by"),
         (("--harmonics", "1000000"), "1 to 100 harmonics"),

@@ -14,16 +14,16 @@ OWN = Path(__file__).parents[1] / "cases" / "own_chain.toml"
 @pytest.mark.parametrize(
     ("text", "code", "words"),
     [
-        ("time [s],torque [N m]\n0,1\n1,nan\n", "E-CSV", "not a finite number"),
-        ("time [s],torque [N m]\n0,1\n2,1\n1,1\n", "E-CSV", "do not ascend"),
-        ("time [s],torque [N m]\n0,1\n0,2\n", "E-CSV", "do not ascend"),
-        ("time [s],torque [kg]\n0,1\n", "E-CSV", "not a unit of torque"),
-        ("time [m],torque [N m]\n0,1\n", "E-CSV", "not a unit of time"),
-        ("time,torque\n0,1\n", "E-CSV", "no known name"),
-        ("time [s],torque [N m]\n0,1,2\n", "E-CSV", "3 entries"),
-        ("time [s],torque [N m]\n0,one\n", "E-CSV", "not a finite number"),
-        ("time [s],time [s]\n0,1\n", "E-CSV", "columns are time"),
-        ("time [s],torque [N m]\n", "E-CSV", "no points"),
+        ("time [s],torque [N m]\n0,1\n1,nan\n", "E-FILE", "not a finite number"),
+        ("time [s],torque [N m]\n0,1\n2,1\n1,1\n", "E-FILE", "do not ascend"),
+        ("time [s],torque [N m]\n0,1\n0,2\n", "E-FILE", "do not ascend"),
+        ("time [s],torque [kg]\n0,1\n", "E-FILE", "not a unit of torque"),
+        ("time [m],torque [N m]\n0,1\n", "E-FILE", "not a unit of time"),
+        ("time,torque\n0,1\n", "E-FILE", "no known name"),
+        ("time [s],torque [N m]\n0,1,2\n", "E-FILE", "3 entries"),
+        ("time [s],torque [N m]\n0,one\n", "E-FILE", "not a finite number"),
+        ("time [s],time [s]\n0,1\n", "E-FILE", "columns are time"),
+        ("time [s],torque [N m]\n", "E-FILE", "no points"),
         (None, "E-FILE", "cannot open"),
     ],
 )
@@ -67,7 +67,7 @@ def test_csv_mistakes_name_their_line_and_a_remedy(tmp_path, text, line, words, 
     (tmp_path / "own_chain_motor.csv").write_text(text, encoding="utf-8")
     with pytest.raises(CaseError, match=words) as info:
         read_case(tmp_path / "case.toml")
-    assert info.value.code == "E-CSV" and info.value.file.endswith(f"own_chain_motor.csv:{line}")
+    assert info.value.code == "E-FILE" and info.value.file.endswith(f"own_chain_motor.csv:{line}")
     assert remedy in info.value.remedy
 
 

@@ -146,7 +146,7 @@ def _check_numbers(case: Case):
         yield CaseError(
             f"{case.housing.points} points break the symmetry of {planets} equally spaced planets: the "
             "interpolation between them makes carrier orders that cannot exist",
-            code="E-POINTS",
+            code="E-SYMMETRY",
             key="housing.points",
             value=case.housing.points,
             limit=f"a multiple of {planets}",

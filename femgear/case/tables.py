@@ -52,7 +52,7 @@ class Columns:
     heading: int
 
     def problem(self, message: str, line: int, *, value=None, limit=None, remedy: str) -> CaseError:
-        """A refusal (E-CSV) that names the file and its line."""
+        """A refusal (E-FILE) that names the file and its line."""
         return _problem(message, self.name, line, value=value, limit=limit, remedy=remedy)
 
 
@@ -77,7 +77,7 @@ def read_columns(
     Raises
     ------
     CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-CSV`` with the number of the line: unknown
+        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-FILE`` with the number of the line: unknown
         columns or units, numbers that are none or not finite, decimal commas beside decimal points.
     """
     name = text.printable(os.fsdecode(path))
@@ -179,7 +179,7 @@ def _number(cell: str, divider: str, comma: bool, name: str, line: int) -> float
 
 def _problem(message: str, name: str, line: int | None, *, value=None, limit=None, remedy: str) -> CaseError:
     file = f"{name}:{line}" if line else name
-    return CaseError(message, code="E-CSV", file=file, value=value, limit=limit, remedy=remedy)
+    return CaseError(message, code="E-FILE", file=file, value=value, limit=limit, remedy=remedy)
 
 
 def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
@@ -284,7 +284,7 @@ def read_profile(path: str | os.PathLike) -> dict[str, list[float]]:
     Raises
     ------
     CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-CSV`` with the number of the line.
+        ``E-FILE``, ``E-FILE-ENC`` (see `text.read_text`); ``E-FILE`` with the number of the line.
     """
     found = read_columns(path, _PROFILE_DIMENSIONS, least=2, most=MOST_POINTS, remedy=_PROFILE_HEADING)
     if "deviation" not in found.values:

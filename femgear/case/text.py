@@ -81,7 +81,7 @@ def parse(text: str, name: str) -> dict:
     Raises
     ------
     CaseError
-        ``E-TOML`` (syntax, with line and column), ``E-TOML-DUPLICATE`` (with both lines), ``E-TOML-DEPTH``,
+        ``E-TOML`` (syntax, with line and column), ``E-TOML`` (with both lines), ``E-TOML``,
         ``E-FINITE`` (with keys and lines).
     """
     if _LONG_KEY.search(text):
@@ -135,7 +135,7 @@ def _check_tree(data: dict, name: str) -> dict[str, float]:
 
 def _too_deep(name: str) -> CaseError:
     return CaseError(
-        "tables or lists are nested too deeply", code="E-TOML-DEPTH", file=name, limit=f"{MAX_DEPTH} levels"
+        "tables or lists are nested too deeply", code="E-TOML", file=name, limit=f"{MAX_DEPTH} levels"
     )
 
 
@@ -149,7 +149,7 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
             places = " and ".join(str(number) for number in lines)
             return CaseError(
                 f"given twice, in lines {places}",
-                code="E-TOML-DUPLICATE",
+                code="E-TOML",
                 key=key,
                 file=name,
                 remedy="keep one of them",

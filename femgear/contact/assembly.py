@@ -264,7 +264,7 @@ def in_windows(
     Raises
     ------
     ContactError
-        E-CONTACT-WINDOW
+        E-CONTACT
     """
     for _ in range(8):
         found, *wider = attempt(share, nearest)
@@ -273,7 +273,7 @@ def in_windows(
         share, nearest = wider
     raise ContactError(
         "the contact windows do not contain the contact after seven enlargements",
-        code="E-CONTACT-WINDOW",
+        code="E-CONTACT",
         remedy="reduce operation.torque or the errors",
     )
 

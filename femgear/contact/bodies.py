@@ -441,7 +441,7 @@ def _check_depth(depth: float | None, stations: FlankStations) -> None:
     if depth is not None and not depth >= 0.5 * spacing:
         raise CaseError(
             f"a joining depth of {1e3 * depth:.4g} mm is within the elements at the flank",
-            code="E-DEPTH",
+            code="E-RANGE",
             key="static.depth",
             value=f"{1e3 * depth:.4g} mm",
             limit=f"at least half an element of the flank, {500 * spacing:.4g} mm",

@@ -455,7 +455,7 @@ def _at_position(
     if not state.residual <= LARGEST_RESIDUAL:
         raise ContactError(
             f"the contact solution at position {p} violates its conditions by {state.residual:.2g}",
-            code="E-CONTACT-RESIDUAL",
+            code="E-CONTACT",
             value=state.residual,
             limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
             remedy="look for stiffnesses, clearances or separations of very different size",

@@ -206,7 +206,7 @@ def tooth_numbers(planetary_set: PlanetarySet, index: np.ndarray) -> tuple[np.nd
     if max(np.abs(exact[0] - first_gear).max(), np.abs(exact[1] - second_gear).max()) > 1e-3:
         raise ContactError(
             "the phases of the meshes and the positions of the teeth contradict one another",
-            code="E-CONTACT-PHASE",
+            code="E-CONTACT",
             remedy="planet angles must be whole multiples of 360/(z_sun + z_ring) degrees from one another",
         )
     return first_gear, second_gear

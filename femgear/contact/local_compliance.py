@@ -253,4 +253,4 @@ def _positive(value, name):
 
 
 def _refuse(what, value, limit):
-    raise ContactError(f"{what} is {value}", code="E-HALFPLANE", value=value, limit=limit)
+    raise ContactError(f"{what} is {value}", code="E-RANGE", value=value, limit=limit)

@@ -129,7 +129,7 @@ def solve_step(problem: Problem, active: np.ndarray) -> Step:
     Raises
     ------
     ContactError
-        E-CONTACT-UNSUPPORTED when no candidate can balance the load.
+        E-CONTACT-OPEN when no candidate can balance the load.
     """
     loads, motions, null = _solve_bordered(problem, np.flatnonzero(active))
     elastic, approach = problem.H @ loads, problem.G @ motions
@@ -221,7 +221,7 @@ def _settle(problem: Problem, null, gaps, active):
         if not meets.any():
             raise ContactError(
                 "no candidate can balance the load: the contacts cannot push in its direction",
-                code="E-CONTACT-UNSUPPORTED",
+                code="E-CONTACT-OPEN",
                 value=(problem.load * problem.arm).tolist(),
                 remedy="check the sign of the load and that every mesh has candidates",
             )

@@ -87,9 +87,9 @@ def solve_contact(H, gap, G, load, *, start=None, max_steps=200) -> ContactState
     Raises
     ------
     ContactError
-        E-CONTACT-INPUT for wrong shapes or values that are not finite, E-CONTACT-COMPLIANCE for a matrix
-        that is not symmetric positive definite, E-CONTACT-UNSUPPORTED when no contact can balance the
-        load, E-CONTACT-CONVERGENCE when no method solves the problem.
+        E-SHAPE for wrong shapes or values that are not finite, E-CONTACT-COMPLIANCE for a matrix
+        that is not symmetric positive definite, E-CONTACT-OPEN when no contact can balance the
+        load, E-CONTACT when no method solves the problem.
     """
     problem = _scaled(*_checked(H, gap, G, load))
     n = len(problem.gap)
@@ -180,15 +180,13 @@ def _checked(H, gap, G, load):
     if H.shape != (n, n) or gap.shape != (n,) or load.shape != (m,):
         raise ContactError(
             f"shapes do not fit: H {H.shape}, gap {gap.shape}, G {G.shape}, load {load.shape}",
-            code="E-CONTACT-INPUT",
+            code="E-SHAPE",
             limit="(n, n), (n,), (n, m), (m,)",
         )
     for name, array in (("compliance H", H), ("gap", gap), ("arms G", G), ("load", load)):
         if not np.isfinite(array).all():
             bad = int(array.size - np.isfinite(array).sum())
-            raise ContactError(
-                f"{bad} of {array.size} values of the {name} are not finite", code="E-CONTACT-INPUT"
-            )
+            raise ContactError(f"{bad} of {array.size} values of the {name} are not finite", code="E-SHAPE")
     if n and (lack := np.abs(H - H.T).max()) > 1e-9 * np.abs(H).max():
         raise ContactError(
             f"the compliance is not symmetric: largest difference {lack:.3g} of {np.abs(H).max():.3g} m/N",
@@ -216,7 +214,7 @@ def _search(problem: Problem, start, max_steps) -> tuple[Step, int, str]:
         if start.shape != everything.shape:
             raise ContactError(
                 f"the start has shape {start.shape}, the problem {len(everything)} candidates",
-                code="E-CONTACT-INPUT",
+                code="E-SHAPE",
             )
         starts = [start, everything] if start.any() else starts
     iterations = 0
@@ -253,7 +251,7 @@ def _by_daqp(problem: Problem) -> tuple[Step, int]:
             return step, int(info["iterations"]) + more
     raise ContactError(
         f"no method solves the contact of {n} candidates and {m} motions (daqp ends with flag {flag})",
-        code="E-CONTACT-CONVERGENCE",
+        code="E-CONTACT",
         remedy="look for separations or compliances of very different size",
     )
 

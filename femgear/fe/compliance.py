@@ -70,7 +70,7 @@ def symmetric_factor(matrix) -> SuperLU:
     except RuntimeError as error:
         raise GridError(
             f"the stiffness matrix of a sector is singular ({error})",
-            code="E-SINGULAR",
+            code="E-SOLVE",
             remedy="hold the bore, the rim or a foundation so that the body cannot move freely",
         ) from error
 
@@ -100,7 +100,7 @@ def mirror_nodes(grid: Grid) -> np.ndarray:
     if distance.max() > 1e-9 * np.abs(grid.points).max():
         raise GridError(
             f"the sector grid is not mirror-symmetric (largest offset {distance.max():.2e} m)",
-            code="E-GRID-MIRROR",
+            code="E-GRID",
             remedy="make the sector by mirroring the grid of half a sector",
         )
     return np.asarray(image)
@@ -148,7 +148,7 @@ def interpolation(grid: Grid, points: np.ndarray):
         worst = points[inside[row, element].argmin()]
         raise GridError(
             f"the point ({worst[0]:.6g}, {worst[1]:.6g}) m lies outside the grid",
-            code="E-GRID-POINT",
+            code="E-GRID",
             remedy="reduce static.depth: it must stay inside the tooth",
         )
     b1, b2 = _curved_coordinates(nodes[triangles[element]], points, b1[row, element], b2[row, element])
@@ -183,7 +183,7 @@ def _curved_coordinates(element_nodes, points, b1, b2):
         if max(np.abs(step1).max(), np.abs(step2).max()) < 1e-13:
             break
     if np.minimum(np.minimum(b1, b2), 1.0 - b1 - b2).min() < -0.05:
-        raise GridError("an observation point falls between curved elements", code="E-GRID-POINT")
+        raise GridError("an observation point falls between curved elements", code="E-GRID")
     return b1, b2
 
 
@@ -204,7 +204,7 @@ def split_sector(grid: Grid, held: str | None) -> tuple[np.ndarray, np.ndarray, 
         nodes = np.setdiff1d(boundary_nodes(grid, name), fixed)
         cuts.append(nodes[np.argsort(np.hypot(*grid.points[nodes].T))])
     if len(cuts[0]) != len(cuts[1]):
-        raise GridError("the two cuts of a sector do not match", code="E-GRID-CUT")
+        raise GridError("the two cuts of a sector do not match", code="E-GRID")
     interior = np.setdiff1d(np.arange(len(grid.points)), np.concatenate([fixed, *cuts]))
     return dof_pairs(interior), dof_pairs(cuts[0]), dof_pairs(cuts[1])
 
@@ -294,12 +294,12 @@ def solve_interior(grid: Grid, stiffness, parts, loads: np.ndarray) -> InteriorS
     Raises
     ------
     GridError
-        A load on a cut (E-GRID-LOAD), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
+        A load on a cut (E-GRID), or a solution that is not finite or misses equilibrium (E-RESIDUAL).
     """
     interior, right, left = parts
     cut = np.concatenate([right, left])
     if np.any(loads[cut]):
-        raise GridError("a load acts on a cut of the sector", code="E-GRID-LOAD")
+        raise GridError("a load acts on a cut of the sector", code="E-GRID")
     stiffness = stiffness.tocsc()
     rows = stiffness[interior]
     K_ii, K_ib = rows[:, interior], rows[:, cut]

@@ -53,13 +53,11 @@ class Material:
         for name, unit in (("youngs_modulus", "Pa"), ("density", "kg/m^3")):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
-                raise CaseError(
-                    f"{name} is {value}", code="E-MATERIAL", key=name, limit=f"finite, > 0 {unit}"
-                )
+                raise CaseError(f"{name} is {value}", code="E-RANGE", key=name, limit=f"finite, > 0 {unit}")
         if not -1.0 < self.poisson_ratio < 0.5:
             raise CaseError(
                 f"poisson_ratio is {self.poisson_ratio}",
-                code="E-MATERIAL",
+                code="E-RANGE",
                 key="poisson_ratio",
                 limit="-1 < nu < 0.5 (an incompressible body needs other elements)",
             )
@@ -80,7 +78,7 @@ class Material:
             return E * nu / ((1 + nu) * (1 - 2 * nu)), self.shear_modulus
         if state == "plane stress":
             return E * nu / (1 - nu**2), self.shear_modulus
-        raise GridError(f"unknown plane state {state!r}", code="E-STATE", limit=" or ".join(STATES))
+        raise GridError(f"unknown plane state {state!r}", code="E-CHOICE", limit=" or ".join(STATES))
 
 
 def basis(grid: Grid, *, order: int = 4):
@@ -102,7 +100,7 @@ def node_of_dof(grid: Grid, scalar) -> np.ndarray:
     nodes = np.full(scalar.N, -1)
     nodes[scalar.element_dofs] = grid.triangles.T
     if scalar.N != grid.n_nodes or np.any(nodes[scalar.element_dofs] != grid.triangles.T):
-        raise GridError("the nodes of the grid are not those of a conforming P2 grid", code="E-GRID-NODES")
+        raise GridError("the nodes of the grid are not those of a conforming P2 grid", code="E-GRID")
     return nodes
 
 
@@ -177,14 +175,14 @@ def _per_element(grid: Grid, value) -> np.ndarray:
         else:
             raise GridError(
                 f"the grid has no region {name!r}",
-                code="E-GRID-REGION",
+                code="E-GRID",
                 key=name,
                 limit="one of " + ", ".join(sorted(grid.regions)),
             )
     if np.isnan(result).any():
         raise GridError(
             f"{np.count_nonzero(np.isnan(result))} elements belong to none of the regions given",
-            code="E-GRID-REGION",
+            code="E-GRID",
             limit="all of " + ", ".join(sorted(grid.regions)),
         )
     return result
@@ -216,9 +214,7 @@ def foundation(grid: Grid, boundary: str, radial: float, tangential: float, *, t
 
     for name, value in (("radial", radial), ("tangential", tangential)):
         if not (np.isfinite(value) and value >= 0):
-            raise GridError(
-                f"the {name} modulus is {value}", code="E-FOUNDATION", key=name, limit=">= 0 N/m^3"
-            )
+            raise GridError(f"the {name} modulus is {value}", code="E-RANGE", key=name, limit=">= 0 N/m^3")
     edges, shape, x, tangent = edge_quadrature(grid, boundary)
     length = np.hypot(tangent[..., 0], tangent[..., 1])
     out = x / np.hypot(x[..., 0], x[..., 1])[..., None]
@@ -308,7 +304,7 @@ def tangential_stress(grid: Grid, material: Material, boundary, *, state: str) -
     if len(edges) < 2 or np.any(edges[1:, 0] != edges[:-1, 1]):
         raise GridError(
             f"the boundaries {', '.join(names)} are not one chain of at least two edges",
-            code="E-GRID-BOUNDARY",
+            code="E-GRID",
             key=names[0],
             remedy="name them in the order in which the body lies to their left",
         )

@@ -70,7 +70,7 @@ def ordered_nodes(grid: Grid, name: str) -> np.ndarray:
     """
     edges = boundary_edges(grid, name)
     if np.any(edges[1:, 0] != edges[:-1, 1]):
-        raise GridError(f"the boundary {name!r} is not one chain of edges", code="E-GRID-BOUNDARY", key=name)
+        raise GridError(f"the boundary {name!r} is not one chain of edges", code="E-GRID", key=name)
     return np.append(edges[:, [0, 2]].ravel(), edges[-1, 1])
 
 
@@ -79,7 +79,7 @@ def boundary_edges(grid: Grid, name: str) -> np.ndarray:
     if name not in grid.boundaries:
         raise GridError(
             f"the grid has no boundary {name!r}",
-            code="E-GRID-BOUNDARY",
+            code="E-GRID",
             key=name,
             limit="one of " + ", ".join(sorted(grid.boundaries)),
         )
@@ -111,7 +111,7 @@ def mirror(grid: Grid) -> Grid:
     if offset > 1e-9 * size:
         raise GridError(
             f"the boundary 'symmetry' leaves the x axis by {offset:.3e} m",
-            code="E-GRID-MIRROR",
+            code="E-GRID",
             key="symmetry",
         )
     n = grid.n_nodes
@@ -165,7 +165,7 @@ def copy_nodes(grid: Grid, count: int) -> np.ndarray:
     if not gap <= 1e-9 * size:
         raise GridError(
             f"the cuts of the sector do not meet when it is repeated {count} times (gap {gap:.3e} m)",
-            code="E-GRID-COPIES",
+            code="E-GRID",
         )
     free = np.ones(grid.n_nodes, dtype=bool)
     free[right] = False
@@ -241,13 +241,11 @@ def check_grid(grid: Grid) -> None:
         Naming the number of bad elements and the position of the worst.
     """
     if not np.isfinite(grid.points).all():
-        raise GridError("a node of the grid has a coordinate that is not a number", code="E-GRID-NAN")
+        raise GridError("a node of the grid has a coordinate that is not a number", code="E-GRID")
     used = np.zeros(grid.n_nodes, dtype=bool)
     used[grid.triangles] = True
     if not used.all():
-        raise GridError(
-            f"{np.count_nonzero(~used)} nodes of the grid belong to no element", code="E-GRID-LOOSE"
-        )
+        raise GridError(f"{np.count_nonzero(~used)} nodes of the grid belong to no element", code="E-GRID")
     lowest = jacobian_bounds(grid)[:, 0]
     bad = np.count_nonzero(lowest <= 0)
     if bad:
@@ -255,7 +253,7 @@ def check_grid(grid: Grid) -> None:
         x, y = grid.points[grid.triangles[worst, :3]].mean(axis=0)
         raise GridError(
             f"{bad} of {len(lowest)} elements are inverted or folded, the worst at ({x:.6g}, {y:.6g}) m",
-            code="E-GRID-INVERTED",
+            code="E-GRID",
             value=f"Jacobian determinant {lowest[worst]:.3e} m^2",
             limit="positive everywhere in every element",
             remedy="use more elements along the curved part of the outline near this point",
@@ -296,7 +294,7 @@ def write_grid(path: Path, grid: Grid) -> None:
     except OSError as error:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
-        raise StorageError(f"cannot write the grid {path}: {error}", code="E-GRID-WRITE") from error
+        raise StorageError(f"cannot write the grid {path}: {error}", code="E-GRID-FILE") from error
 
 
 def read_grid(path: Path) -> Grid:
@@ -329,7 +327,7 @@ def read_grid(path: Path) -> Grid:
     except (SystemExit, Exception) as error:  # meshio calls sys.exit on some unreadable files
         raise StorageError(
             f"{path} is not a readable grid: {type(error).__name__}: {error}",
-            code="E-GRID-READ",
+            code="E-GRID-FILE",
             remedy="delete the file; it is made again when needed",
         ) from error
     return grid

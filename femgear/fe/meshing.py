@@ -65,7 +65,7 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
     if expected > MAX_ELEMENTS:
         raise GridError(
             f"the grid would have about {expected:.3g} elements",
-            code="E-GRID-COUNT",
+            code="E-GRID",
             value=f"{expected:.3g}",
             limit=f"at most {MAX_ELEMENTS}",
             remedy="use fewer points along the outline",
@@ -107,7 +107,7 @@ def _check_cached(grid: Grid, plan: Plan) -> Grid:
         same = same and np.array_equal(edges[:, :2], plan.segments[own])
         same = same and np.array_equal(grid.points[edges[:, 2]], plan.mids[own])
     if not same:
-        raise GridError("the cached grid is not that of the outline", code="E-GRID-CACHE")
+        raise GridError("the cached grid is not that of the outline", code="E-GRID-FILE")
     return grid
 
 
@@ -166,7 +166,7 @@ def _run_gmsh(plan: Plan) -> dict[str, np.ndarray]:
         except subprocess.TimeoutExpired as error:
             raise GridError(
                 f"Gmsh was stopped: no grid after {TIME_LIMIT:g} s",
-                code="E-GRID-TIMEOUT",
+                code="E-GRID-GMSH",
                 remedy="use fewer points along the outline or a longer time limit",
             ) from error
         if done.returncode != 0 or not target.exists():
@@ -190,7 +190,7 @@ def _library_error(text):
     if library:
         package = PACKAGES.get(library.group(1), "libglu1-mesa libgl1")
         remedy = f"install the system library, on Debian: apt-get install {package}"
-    return GridError(f"Gmsh cannot be loaded: {text}", code="E-GRID-LIBRARY", remedy=remedy)
+    return GridError(f"Gmsh cannot be loaded: {text}", code="E-GRID-GMSH", remedy=remedy)
 
 
 def _second_order(plan: Plan, points, corners, face) -> Grid:

@@ -68,23 +68,23 @@ def check_outline(outline) -> Plan:
     Raises
     ------
     GridError
-        ``E-GRID-NAN``, ``-SHAPE``, ``-OPEN``, ``-CLOSE-POINTS``, ``-CROSSING``, ``-AREA``, ``-CLOCKWISE``,
+        ``E-GRID``, ``-SHAPE``, ``-OPEN``, ``-CLOSE-POINTS``, ``-CROSSING``, ``-AREA``, ``-CLOCKWISE``,
         ``-INTERFACE``, ``-REGION`` or ``-COUNT``, with the coordinates of what is wrong.
     """
     curves = [(name, _curve(name, points)) for name, points in outline.curves]
     inner = [(name, _curve(name, points)) for name, points in outline.interfaces]
     if not curves:
-        raise GridError("the outline has no curves", code="E-GRID-SHAPE")
+        raise GridError("the outline has no curves", code="E-GRID")
     every = np.vstack([points for _, points in curves])
     size = np.ptp(every, axis=0).max()
     if not size > 0:
-        raise GridError("all points of the outline coincide", code="E-GRID-AREA")
+        raise GridError("all points of the outline coincide", code="E-GRID")
     _check_closed(curves, size)
     points, segments, mids, names = _join(curves, inner, size)
     n_boundary = sum(len(p) // 2 for _, p in curves)
     if len(segments) > MAX_SEGMENTS:
         raise GridError(
-            f"the outline has {len(segments)} segments", code="E-GRID-COUNT", limit=f"at most {MAX_SEGMENTS}"
+            f"the outline has {len(segments)} segments", code="E-GRID", limit=f"at most {MAX_SEGMENTS}"
         )
     _check_distinct(points, size)
     _check_crossing(points, segments, names, size)
@@ -99,7 +99,7 @@ def _curve(name, points):
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3 or len(points) % 2 == 0:
         raise GridError(
             f"the curve {name!r} is an array of shape {points.shape}",
-            code="E-GRID-SHAPE",
+            code="E-GRID",
             key=name,
             limit="(2k + 1, 2) with k >= 1: corners at even rows, mid-side points at odd rows",
         )
@@ -107,7 +107,7 @@ def _curve(name, points):
     if len(bad):
         raise GridError(
             f"point {bad[0]} of the curve {name!r} is ({points[bad[0], 0]}, {points[bad[0], 1]})",
-            code="E-GRID-NAN",
+            code="E-GRID",
             key=name,
             limit="finite coordinates",
         )
@@ -120,7 +120,7 @@ def _check_closed(curves, size):
         if gap > CLOSE * size:
             raise GridError(
                 f"the curve {name!r} ends {gap:.3e} m from the start of {following!r}",
-                code="E-GRID-OPEN",
+                code="E-GRID",
                 limit="each curve starts where the one before ends, the first where the last ends",
             )
 
@@ -142,7 +142,7 @@ def _join(curves, inner, size):
                     raise GridError(
                         f"the interface {name!r} ends at ({corner[0]:.9g}, {corner[1]:.9g}) m, "
                         f"{distance[nearest]:.3e} m from the nearest corner",
-                        code="E-GRID-INTERFACE",
+                        code="E-GRID",
                         key=name,
                     )
                 nearest = len(points)
@@ -161,7 +161,7 @@ def _check_distinct(points, size):
         raise GridError(
             f"{len(pairs)} pairs of corners coincide, the first at ({a[0]:.9g}, {a[1]:.9g}) m, "
             f"{np.hypot(*(a - b)):.3e} m apart",
-            code="E-GRID-CLOSE-POINTS",
+            code="E-GRID",
             limit=f"at least {CLOSE * size:.3e} m between any two corners",
         )
 
@@ -191,7 +191,7 @@ def _check_crossing(points, segments, names, size):
             raise GridError(
                 f"the outline crosses or touches itself: {names[p]!r} and {names[q]!r} near "
                 f"({x:.9g}, {y:.9g}) m",
-                code="E-GRID-CROSSING",
+                code="E-GRID",
             )
 
 
@@ -207,12 +207,12 @@ def _check_area(polygon, size):
     if abs(area) < 1e-6 * size**2:
         raise GridError(
             f"the outline encloses an area of {area:.3e} m^2 in a box {size:.3e} m wide: a slit",
-            code="E-GRID-AREA",
+            code="E-GRID",
         )
     if area < 0:
         raise GridError(
             "the outline runs clockwise",
-            code="E-GRID-CLOCKWISE",
+            code="E-GRID",
             limit="counter-clockwise, the body on the left",
             remedy="reverse the order of the curves and of the points of each",
         )
@@ -254,7 +254,7 @@ def _faces(points, segments, n_boundary, area, names):
     if len(dangling):
         raise GridError(
             f"the interface {names[dangling[0]]!r} does not separate two parts of the body",
-            code="E-GRID-INTERFACE",
+            code="E-GRID",
             key=names[dangling[0]],
         )
     inside = [loop for loop in loops if _area(points[start[loop]]) > 0]
@@ -262,7 +262,7 @@ def _faces(points, segments, n_boundary, area, names):
     if abs(total - area) > 1e-9 * area:
         raise GridError(
             f"the interfaces do not divide the body: the parts add up to {total / area:.6f} of its area",
-            code="E-GRID-INTERFACE",
+            code="E-GRID",
             limit="interfaces inside the body that start and end on its boundary",
         )
     return tuple(np.where(loop % 2 == 0, loop // 2 + 1, -(loop // 2 + 1)) for loop in inside)
@@ -279,7 +279,7 @@ def _name_faces(points, segments, loops, regions):
             where = "outside the body" if not holders else f"in the region {faces[holders[0]]!r}"
             raise GridError(
                 f"the point ({at[0, 0]:.9g}, {at[0, 1]:.9g}) m of the region {region!r} lies {where}",
-                code="E-GRID-REGION",
+                code="E-GRID",
                 key=region,
             )
         faces[holders[0]] = region
@@ -287,7 +287,7 @@ def _name_faces(points, segments, loops, regions):
         raise GridError(
             f"the interfaces make {len(loops)} parts, the regions {[r for r, _ in regions]} name "
             f"{len(set(faces) - {''})} of them",
-            code="E-GRID-REGION",
+            code="E-GRID",
             remedy="give Outline.regions one entry for each part",
         )
     return tuple(faces)

@@ -39,7 +39,7 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
     Raises
     ------
     GeometryError
-        E-ASSEMBLY, E-NEIGHBOURS, E-BACKLASH, E-INTERFERENCE, E-FILLET, E-TROCHOID, E-CLEARANCE,
+        E-ASSEMBLY, E-NEIGHBOURS, E-BACKLASH, E-INTERFERENCE, E-FILLET, E-INTERFERENCE, E-CLEARANCE,
         E-CONTACT-RATIO.
     """
     found = [*_planets(planetary), *_neighbours(planetary)]
@@ -348,13 +348,13 @@ def tip_margin(planet: Gear, ring: Gear, centre_distance: float) -> float:
 
 
 def check_passing_tips(planet: Gear, ring: Gear, centre_distance: float) -> None:
-    """Refuse an internal pair whose tips strike each other outside the path of contact (E-TROCHOID)."""
+    """Refuse an internal pair whose tips strike each other outside the path of contact (E-INTERFERENCE)."""
     margin = tip_margin(planet, ring, centre_distance)
     if margin < 0.0:
         raise GeometryError(
             f"the tips of planet ({planet.teeth} teeth) and ring ({ring.teeth}) strike each other outside "
             f"the path of contact: the corners overlap by {-margin * ring.tip_radius * 1e3:.4f} mm",
-            code="E-TROCHOID",
+            code="E-INTERFERENCE",
             key="ring.teeth",
             value=ring.teeth,
             limit="corners of the tips pass each other",

@@ -426,7 +426,7 @@ def check_deviations(deviations: SetDeviations, planetary_set: PlanetarySet) -> 
     Raises
     ------
     GeometryError
-        E-DEVIATION (arrays of another length than the teeth or planets, numbers that are not finite or
+        E-MODIFICATION (arrays of another length than the teeth or planets, numbers that are not finite or
         exceed 0.2 modules, modifications of a flank that do so together), E-MODIFICATION (see
         `modifications.check_form`).
     """
@@ -549,5 +549,9 @@ def _check_amounts(d: SetDeviations, module: float) -> None:
 
 def _refuse(message: str, key: str, limit: str):
     raise GeometryError(
-        message, code="E-DEVIATION", key=key, limit=limit, remedy="lengths are in metres, angles in radians"
+        message,
+        code="E-MODIFICATION",
+        key=key,
+        limit=limit,
+        remedy="lengths are in metres, angles in radians",
     )

@@ -86,8 +86,8 @@ class Gear:
     Raises
     ------
     GeometryError
-        A value that no gear can have (E-TEETH, E-MODULE, E-PRESSURE-ANGLE, E-SHIFT, E-FACE-WIDTH, E-RIM,
-        E-ALLOWANCE, E-RACK, E-ROOT-RADIUS, E-CUTTER, E-TIP, E-POINTED).
+        A value that no gear can have (E-TEETH, E-GEOMETRY, E-GEOMETRY, E-SHIFT, E-GEOMETRY, E-RIM,
+        E-BACKLASH, E-CUTTER, E-ROOT-RADIUS, E-CUTTER, E-TIP, E-TIP).
     """
 
     teeth: int
@@ -318,12 +318,12 @@ def _check_numbers(gear: Gear) -> None:
     unit_hint = "lengths are in m and angles in rad here: check the unit of the value"
     limits = (
         ("teeth", "E-TEETH", *TEETH_RANGE, "", "larger gears would take hours: use fewer teeth"),
-        ("module", "E-MODULE", *MODULE_RANGE, " m", unit_hint),
-        ("pressure_angle", "E-PRESSURE-ANGLE", *PRESSURE_ANGLE_RANGE, " rad", unit_hint),
+        ("module", "E-GEOMETRY", *MODULE_RANGE, " m", unit_hint),
+        ("pressure_angle", "E-GEOMETRY", *PRESSURE_ANGLE_RANGE, " rad", unit_hint),
         ("profile_shift", "E-SHIFT", -5.0, 5.0, " modules", "profile shifts are in modules, not in mm"),
-        ("face_width", "E-FACE-WIDTH", 1e-6, 10.0, " m", unit_hint),
+        ("face_width", "E-GEOMETRY", 1e-6, 10.0, " m", unit_hint),
         ("rim_radius", "E-RIM", 1e-6, 1000.0, " m", unit_hint),
-        ("thickness_allowance", "E-ALLOWANCE", 0.0, gear.module, " m", "an allowance thins the tooth"),
+        ("thickness_allowance", "E-BACKLASH", 0.0, gear.module, " m", "an allowance thins the tooth"),
     )
     for entry, code, low, high, unit, remedy in limits:
         value = getattr(gear, entry)
@@ -357,7 +357,7 @@ def _check_rack(gear: Gear) -> None:
                 gear,
                 f"rack.{entry}",
                 f"basic rack with {entry.replace('_', ' ')} {value} modules",
-                code="E-RACK",
+                code="E-CUTTER",
                 value=value,
                 limit=f"{low:g} .. 3 modules",
                 remedy="ISO 53 profile C has addendum 1, dedendum 1.25 and root_radius 0.25",
@@ -504,7 +504,7 @@ def _check_flank(gear: Gear) -> None:
             "profile_shift",
             f"the tooth is pointed below its tip circle: thickness {2e3 * half * gear.tip_radius:.4f} mm at "
             f"the tip radius {gear.tip_radius * 1e3:.4f} mm",
-            code="E-POINTED",
+            code="E-TIP",
             value=gear.profile_shift,
             limit="tip thickness > 0",
             remedy="change the profile shift or give a tip_diameter that cuts the point off",

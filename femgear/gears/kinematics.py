@@ -108,7 +108,7 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
         _refuse_mechanism(f"the {input} is both driven and held, which leaves two members free", input)
     if not math.isfinite(speed):
         raise GeometryError(
-            f"a speed of {speed} rad/s", code="E-VALUE", key="operation.speeds", value=speed, limit="finite"
+            f"a speed of {speed} rad/s", code="E-RANGE", key="operation.speeds", value=speed, limit="finite"
         )
     zs, zp, zr = planetary.sun.teeth, planetary.planet.teeth, planetary.ring.teeth
     known = {input: speed, fixed: 0.0}
@@ -134,13 +134,13 @@ def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
     Raises
     ------
     GeometryError
-        Unknown member (E-MECHANISM) or a torque that is not finite (E-VALUE).
+        Unknown member (E-MECHANISM) or a torque that is not finite (E-RANGE).
     """
     if member not in MEMBERS:
         _refuse_mechanism(f"the torque acts on {member!r}", member)
     if not math.isfinite(torque):
         raise GeometryError(
-            f"a torque of {torque} N m", code="E-VALUE", key="operation.torque", value=torque, limit="finite"
+            f"a torque of {torque} N m", code="E-RANGE", key="operation.torque", value=torque, limit="finite"
         )
     ratio = planetary.ring.teeth / planetary.sun.teeth
     share = {"sun": 1.0, "ring": ratio, "carrier": -(1.0 + ratio)}

@@ -270,8 +270,7 @@ def check_flank(flank: str, form: FlankForm, gear: Gear) -> Iterator[GeometryWar
     Raises
     ------
     GeometryError
-        E-MODIFICATION (see `check_form`), E-DEVIATION: modifications, each of them plausible, that together
-        are not.
+        E-MODIFICATION: see `check_form`; modifications, each of them plausible, that together are not.
 
     Yields
     ------
@@ -324,7 +323,7 @@ def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
         remedy = "let it end nearer to the end of the flank"
     raise GeometryError(
         f"{flank}: {message}",
-        code="E-DEVIATION",
+        code="E-MODIFICATION",
         key=f"{gear.name}.modifications",
         value=f"{removed[i] * 1e6:.6g} um",
         limit=f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um, at every place of the flank",

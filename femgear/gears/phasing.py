@@ -61,7 +61,7 @@ class MeshPhasing:
     Raises
     ------
     GeometryError
-        Numbers that describe no set (E-PHASING).
+        Numbers that describe no set (E-RANGE).
     """
 
     sun_teeth: int
@@ -145,7 +145,7 @@ def mesh_phasing(
     ------
     GeometryError
         Angles at which the planets do not assemble (E-ASSEMBLY, with the nearest that do), no angles
-        (E-PLANETS, E-ANGLES), or other numbers that describe no set (E-PHASING).
+        (E-RANGE, E-RANGE), or other numbers that describe no set (E-RANGE).
     """
     angles = _angles(planet_angles)
     MeshPhasing(sun_teeth, ring_teeth, (0,), rotation, flank, convention, lag)
@@ -182,11 +182,11 @@ def standard_lag(planet_teeth: int) -> float:
     Raises
     ------
     GeometryError
-        No whole number of teeth that a gear can have (E-PHASING).
+        No whole number of teeth that a gear can have (E-RANGE).
     """
     if not is_whole(planet_teeth) or not TEETH_RANGE[0] <= planet_teeth <= TEETH_RANGE[1]:
         raise GeometryError(
-            f"the lag of a planet with {planet_teeth!r} teeth", code="E-PHASING", value=planet_teeth,
+            f"the lag of a planet with {planet_teeth!r} teeth", code="E-RANGE", value=planet_teeth,
             limit=f"a whole number, {TEETH_RANGE[0]} to {TEETH_RANGE[1]}",
         )  # fmt: skip
     return 0.5 * ((planet_teeth - 1) % 2)
@@ -390,7 +390,7 @@ def _angles(planet_angles) -> tuple[float, ...]:
         angles = tuple(float(a) for a in planet_angles)
     except (TypeError, ValueError):
         raise GeometryError(
-            f"planet angles {planet_angles!r}", code="E-ANGLES", key="set.planet_angles",
+            f"planet angles {planet_angles!r}", code="E-RANGE", key="set.planet_angles",
             limit="a sequence of numbers [rad], one a planet", remedy="for instance equal_planet_angles(3)",
         ) from None  # fmt: skip
     check_angles(angles)
@@ -417,4 +417,4 @@ def _check_phasing(phasing: MeshPhasing) -> None:
     elif not isinstance(p.lag, int | float | np.number) or not math.isfinite(p.lag):
         problem = f"a lag of {p.lag!r} periods, allowed: a finite number"
     if problem:
-        raise GeometryError(f"mesh phases of {problem}", code="E-PHASING", remedy="see MeshPhasing")
+        raise GeometryError(f"mesh phases of {problem}", code="E-RANGE", remedy="see MeshPhasing")

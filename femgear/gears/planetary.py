@@ -40,7 +40,7 @@ class PlanetarySet:
     Raises
     ------
     GeometryError
-        Numbers that describe no set (E-PLANETS, E-ANGLES, E-ROLE, E-MODULE, E-CENTRE-DISTANCE); whether it
+        Numbers that describe no set (E-RANGE, E-RANGE, E-GEOMETRY, E-GEOMETRY, E-ASSEMBLY); whether it
         can be assembled and run is told by `checks.check_set`.
     """
 
@@ -198,8 +198,8 @@ def close_set(
     Raises
     ------
     GeometryError
-        Meshes that ask for different centre distances (E-COAXIAL), shifts not determined (E-FIND), an
-        impossible centre distance (E-CENTRE-DISTANCE, E-INVOLUTE), or a gear that the shift found spoils.
+        Meshes that ask for different centre distances (E-COAXIAL), shifts not determined (E-SHIFT), an
+        impossible centre distance (E-ASSEMBLY, E-GEOMETRY), or a gear that the shift found spoils.
     """
     sun, planet, ring = (replace(g, name=n) for g, n in ((sun, "sun"), (planet, "planet"), (ring, "ring")))
     _check_find(find, centre_distance)
@@ -294,14 +294,14 @@ def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> floa
     Raises
     ------
     GeometryError
-        E-CENTRE-DISTANCE: the base circles would overlap (``cos(aw) > 1``).
+        E-ASSEMBLY: the base circles would overlap (``cos(aw) > 1``).
     """
     base = 0.5 * one.module * _tooth_sum(one, two) * math.cos(one.pressure_angle)
     if not centre_distance >= base:
         raise GeometryError(
             f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {one.teeth} and "
             f"{two.teeth} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
-            code="E-CENTRE-DISTANCE",
+            code="E-ASSEMBLY",
             key="set.centre_distance",
             value=centre_distance,
             limit=f">= {math.ceil(base * 1e7) / 1e4:.4f} mm",
@@ -319,7 +319,7 @@ def zero_backlash_distance(one: Gear, two: Gear) -> float:
     Raises
     ------
     GeometryError
-        E-INVOLUTE: ``inv(aw)`` would be negative.
+        E-GEOMETRY: ``inv(aw)`` would be negative.
     """
     alpha, total = one.pressure_angle, _tooth_sum(one, two)
     x_1, x_2 = one.profile_shift, two.profile_shift
@@ -354,12 +354,12 @@ def equal_planet_angles(planets: int) -> tuple[float, ...]:
     Raises
     ------
     GeometryError
-        Not a whole number of at least one planet (E-PLANETS).
+        Not a whole number of at least one planet (E-RANGE).
     """
     if not is_whole(planets) or not 1 <= planets <= 1000:
         raise GeometryError(
             f"a planetary set with {planets!r} planets",
-            code="E-PLANETS",
+            code="E-RANGE",
             key="set.planets",
             value=planets,
             limit="a whole number, 1 to 1000",
@@ -369,7 +369,7 @@ def equal_planet_angles(planets: int) -> tuple[float, ...]:
 
 
 def check_angles(angles: tuple[float, ...]) -> None:
-    """Refuse planet angles [rad] that are none, unordered or in the wrong unit (E-PLANETS, E-ANGLES)."""
+    """Refuse planet angles [rad] that are none, unordered or in the wrong unit (E-RANGE, E-RANGE)."""
     if not 1 <= len(angles) <= 1000:
         equal_planet_angles(len(angles))
     problem = None
@@ -383,7 +383,7 @@ def check_angles(angles: tuple[float, ...]) -> None:
         listing = ", ".join(f"{a:.6g}" for a in angles[:12])
         raise GeometryError(
             f"the planet angles [{listing}] rad {problem}",
-            code="E-ANGLES",
+            code="E-RANGE",
             key="set.planet_angles",
             value=listing,
             limit="ascending, different, within one turn",
@@ -429,13 +429,13 @@ def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...
 
 
 def _check_roles(planetary: PlanetarySet) -> None:
-    """Refuse gears that cannot be sun, planet and ring of one set (E-ROLE, E-MODULE)."""
+    """Refuse gears that cannot be sun, planet and ring of one set (E-GEOMETRY, E-GEOMETRY)."""
     sun, planet, ring = planetary.sun, planetary.planet, planetary.ring
     for gear, internal in ((sun, False), (planet, False), (ring, True)):
         if gear.internal is not internal:
             raise GeometryError(
                 f"the {gear.name} is {'an external' if internal else 'an internal'} gear",
-                code="E-ROLE",
+                code="E-GEOMETRY",
                 key=f"{gear.name}.internal",
                 value=gear.internal,
                 limit="sun and planet external, ring internal",
@@ -445,7 +445,7 @@ def _check_roles(planetary: PlanetarySet) -> None:
             if abs(mine - suns) > 1e-12 * suns:
                 raise GeometryError(
                     f"{entry.replace('_', ' ')} of the {gear.name} is {mine:.6g}, of the sun {suns:.6g}",
-                    code="E-MODULE",
+                    code="E-GEOMETRY",
                     key=f"{gear.name}.{entry}",
                     value=mine,
                     limit=f"{suns:.6g}",
@@ -518,7 +518,7 @@ def _check_find(find: tuple[str, ...], centre_distance: float | None) -> None:
         raise GeometryError(
             f"the profile shifts of {', '.join(find)} cannot be found {'without' if free else 'from'} a "
             "centre distance: two meshes give two conditions",
-            code="E-FIND",
+            code="E-SHIFT",
             key="set.centre_distance",
             value=find,
             limit="sun, ring" + ("" if free else ", or two of sun, planet, ring"),

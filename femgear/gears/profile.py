@@ -79,7 +79,7 @@ def arcinv(value) -> Any:
     if not np.all(np.isfinite(v)) or np.any(v < 0.0):
         raise GeometryError(
             f"no pressure angle has the involute {float(np.min(v)):.6g} rad",
-            code="E-INVOLUTE",
+            code="E-GEOMETRY",
             value=float(np.min(v)),
             limit="inv(angle) >= 0",
             remedy="increase the sum of the profile shifts or the centre distance",

@@ -116,7 +116,7 @@ def neighbouring_teeth(
     Raises
     ------
     GeometryError
-        Numbers out of range (E-CHOICE, E-PLANETS).
+        Numbers out of range (E-CHOICE, E-RANGE).
     """
     equal_planet_angles(planets)
     wanted = (sun_teeth, planet_teeth, ring_teeth)

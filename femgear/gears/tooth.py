@@ -70,8 +70,8 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     Raises
     ------
     GeometryError
-        Less than 2 flank elements or a factor that is not positive (E-SIZE), a body so deep that more than
-        400 nodes, times `refine`, would lie on a cut (E-GRID-COST).
+        Less than 2 flank elements or a factor that is not positive (E-RANGE), a body so deep that more than
+        400 nodes, times `refine`, would lie on a cut (E-GRID).
     """
     _check_sizes(flank_elements, refine)
     count = max(2, round(flank_elements * refine))
@@ -132,7 +132,7 @@ def _check_sizes(flank_elements: int, refine: float) -> None:
     if not (flank_elements >= 2 and math.isfinite(refine) and 0.05 <= refine <= 100.0):
         raise GeometryError(
             f"{flank_elements} flank elements with refinement {refine:.6g} give no usable outline",
-            code="E-SIZE",
+            code="E-RANGE",
             key="static.flank_elements",
             value=flank_elements,
             limit="at least 2 elements, refinement 0.05 .. 100",
@@ -265,7 +265,7 @@ def _check_cost(gear: Gear, cut_nodes: int, sizes: _Sizes) -> None:
     raise GeometryError(
         f"the body of the {gear.name} reaches from {1e3 * gear.root_radius:.6g} mm to "
         f"{1e3 * gear.rim_radius:.6g} mm: its sector would have {cut_nodes} nodes on each cut",
-        code="E-GRID-COST",
+        code="E-GRID",
         key=f"{gear.name}.{word}_radius",
         value=f"{1e3 * gear.rim_radius:.6g} mm",
         limit=f"at most {limit} nodes",

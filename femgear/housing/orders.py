@@ -121,14 +121,14 @@ def order_spectrum(signal, *, revolutions: int = 1) -> OrderSpectrum:
     Raises
     ------
     CaseError
-        ``E-SIGNAL`` for samples that are not finite or less than two, or no whole number of revolutions.
+        ``E-SHAPE`` for samples that are not finite or less than two, or no whole number of revolutions.
     """
     signal = np.asarray(signal, dtype=float)
     n = signal.shape[-1] if signal.ndim else 0
     if n < 2 or not np.all(np.isfinite(signal)) or revolutions != int(revolutions) or revolutions < 1:
         raise CaseError(
             f"a signal of {n} samples over {revolutions} revolutions has no order spectrum",
-            code="E-SIGNAL",
+            code="E-SHAPE",
             limit="two or more finite samples over a whole number of carrier revolutions",
             remedy="cut the record to whole revolutions",
         )
@@ -162,13 +162,13 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
     Raises
     ------
     CaseError
-        ``E-BAND`` for limits that hold no order of the spectrum above zero.
+        ``E-RANGE`` for limits that hold no order of the spectrum above zero.
     """
     inside = (spectrum.order >= low) & (spectrum.order <= high)
     if low <= 0 or not inside.any():
         raise CaseError(
             f"no carrier orders from {low} to {high} in a spectrum that ends at {spectrum.order[-1]}",
-            code="E-BAND",
+            code="E-RANGE",
             value=(low, high),
             limit=f"0 < low <= high, low <= {spectrum.order[-1]}",
             remedy="choose a mesh harmonic that the response contains",
@@ -192,14 +192,14 @@ def analytic_signal(spectrum: OrderSpectrum, *, samples: int | None = None) -> n
     Raises
     ------
     CaseError
-        ``E-SAMPLES`` for too few samples.
+        ``E-HARMONICS`` for too few samples.
     """
     lines = spectrum.value.shape[-1]
     count = 4 * lines if samples is None else samples
     if count < 2 * lines - 1:
         raise CaseError(
             f"{count} samples cannot carry {lines} lines",
-            code="E-SAMPLES",
+            code="E-HARMONICS",
             key="samples",
             value=count,
             limit=f"at least {2 * lines - 1}",
@@ -226,7 +226,7 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int =
     Raises
     ------
     CaseError
-        ``E-SIGNAL`` for an envelope or a threshold that cannot be used.
+        ``E-SHAPE`` for an envelope or a threshold that cannot be used.
     """
     from scipy.signal import find_peaks  # takes longer to import than all the rest
 
@@ -235,7 +235,7 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1, revolutions: int =
     if not usable or not 0 < threshold < 1:
         raise CaseError(
             f"no lobes can be counted on values of shape {values.shape} with the threshold {threshold}",
-            code="E-SIGNAL",
+            code="E-SHAPE",
             limit="one envelope, finite and not negative, 0 < threshold < 1",
             remedy="pass the envelope of one speed",
         )
@@ -280,13 +280,13 @@ def dominant_lines(
     Raises
     ------
     CaseError
-        ``E-BAND`` as `band_pass`; ``E-SIGNAL`` for a spectrum of several signals.
+        ``E-RANGE`` as `band_pass`; ``E-SHAPE`` for a spectrum of several signals.
     """
     amplitude = band_pass(spectrum, low, high).amplitude
     if amplitude.ndim != 1:
         raise CaseError(
             f"lines are listed for one signal, not for values of shape {amplitude.shape}",
-            code="E-SIGNAL",
+            code="E-SHAPE",
             limit="a spectrum of shape (n_orders,)",
             remedy="pick one speed first",
         )
@@ -333,7 +333,7 @@ def analyse_band(
     Raises
     ------
     CaseError
-        ``E-TEETH``, ``E-BAND``, ``E-SIGNAL``.
+        ``E-TEETH``, ``E-RANGE``, ``E-SHAPE``.
     """
     check_teeth(z_ring)
     half_width = (z_ring - 1) // 2 if half_width is None else half_width

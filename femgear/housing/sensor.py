@@ -152,7 +152,7 @@ def fixed_sensor_lines(
     Raises
     ------
     CaseError
-        ``E-FIELD``, ``E-TEETH``, ``E-SPEED``, ``E-ORDERS``: data of the wrong shape or not finite, speeds
+        ``E-SHAPE``, ``E-TEETH``, ``E-SPEED``, ``E-HARMONICS``: data of the wrong shape or not finite, speeds
         of both directions, a ring that turns.
     """
     field, n = _checked_field(field)
@@ -198,7 +198,7 @@ def heaviside_linear_lines(
     Raises
     ------
     CaseError
-        As `fixed_sensor_lines`, and ``E-POINTS`` for less than 3 points.
+        As `fixed_sensor_lines`, and ``E-SYMMETRY`` for less than 3 points.
     """
     field, n = _checked_field(field)
     _check_points(points)
@@ -234,14 +234,14 @@ def fixed_sensor_signal(lines: SensorLines, *, samples: int | None = None) -> Ho
     Raises
     ------
     CaseError
-        ``E-SAMPLES`` for too few samples.
+        ``E-HARMONICS`` for too few samples.
     """
     top = int(lines.order[-1])
     count = lines.z_ring * -(-4 * top // lines.z_ring) if samples is None else samples
     if count <= 2 * top:
         raise CaseError(
             f"{count} samples cannot carry {top} carrier orders",
-            code="E-SAMPLES",
+            code="E-HARMONICS",
             key="samples",
             value=count,
             limit=f"more than {2 * top} samples a carrier revolution",
@@ -281,13 +281,13 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
     Raises
     ------
     CaseError
-        ``E-FIELD`` for harmonics that do not fit the planets; ``E-WINDOW`` for a width out of range.
+        ``E-SHAPE`` for harmonics that do not fit the planets; ``E-RANGE`` for a width out of range.
     """
     harmonics, psi = np.asarray(harmonics, dtype=complex), np.asarray(planet_angles, dtype=float)
     if harmonics.ndim < 2 or psi.shape != harmonics.shape[-2:-1] or not np.all(np.isfinite(harmonics)):
         raise CaseError(
             f"mesh harmonics of shape {harmonics.shape} do not fit {psi.size} planets",
-            code="E-FIELD",
+            code="E-SHAPE",
             limit="finite values of shape (..., planets, H + 1)",
             remedy="give the harmonics of the planet-ring meshes alone",
         )
@@ -296,7 +296,7 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
     if not 0 < width <= 2 * np.pi * (1 + 1e-12):
         raise CaseError(
             f"a window of {width} rad does not fit on the ring",
-            code="E-WINDOW",
+            code="E-RANGE",
             value=width,
             limit="0 < width <= 2 pi",
             remedy="leave it out for 2 pi divided by the number of planets",
@@ -350,7 +350,7 @@ def _top_order(field: np.ndarray, z_ring: int, max_order: int | None) -> int:
     if top != int(top) or top < 1:
         raise CaseError(
             f"{max_order} is not a highest carrier order",
-            code="E-ORDERS",
+            code="E-HARMONICS",
             key="max_order",
             value=max_order,
             limit="a positive integer",
@@ -365,7 +365,7 @@ def _checked_field(field) -> tuple[np.ndarray, np.ndarray]:
     if field.ndim < 2 or field.size == 0 or field.shape[-1] % 2 == 0 or not np.all(np.isfinite(field)):
         raise CaseError(
             f"the carrier-frame field of shape {field.shape} is not usable",
-            code="E-FIELD",
+            code="E-SHAPE",
             limit="finite values of shape (..., H + 1, 2 n_max + 1)",
             remedy="give one column for every n = -n_max..n_max",
         )
@@ -378,7 +378,7 @@ def _checked_angle(angle: float) -> float:
     if not np.isfinite(angle):
         raise CaseError(
             f"the angle {angle} is not a number of radians",
-            code="E-ANGLE",
+            code="E-RANGE",
             key="housing.sensor_angle",
             value=angle,
             limit="a finite angle",
@@ -392,7 +392,7 @@ def _check_points(points: int) -> None:
     if points != int(points) or points < 3:
         raise CaseError(
             f"{points} points do not describe a ring",
-            code="E-POINTS",
+            code="E-SYMMETRY",
             key="housing.points",
             value=points,
             limit="an integer of at least 3, more than twice the largest nodal diameter that matters",

@@ -150,7 +150,7 @@ def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
     pv = load_pyvista()
     bodies = [body if isinstance(body, Body) else Body(*body) for body in bodies]
     if not bodies:
-        raise CaseError("a scene needs at least one body", code="E-SCENE")
+        raise CaseError("a scene needs at least one body", code="E-SHAPE")
     for body in bodies:
         _check_body(body)
     start = np.cumsum([0] + [len(body.points) for body in bodies])
@@ -180,7 +180,7 @@ def _check_body(body: Body) -> None:
         raise CaseError(
             f"body {body.name!r}: points {points.shape}, triangles {triangles.shape} and displacement "
             f"{np.shape(body.displacement)} do not fit together",
-            code="E-SCENE",
+            code="E-SHAPE",
             limit="(n, 2), (m, 6) with node numbers below n, (n, 2)",
         )
 
@@ -277,7 +277,7 @@ def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
         When the file cannot be written.
     """
     if Path(path).suffix != ".vtu":
-        raise CaseError("fields are written as VTU", code="E-SUFFIX", value=str(path), limit=".vtu")
+        raise CaseError("fields are written as VTU", code="E-CHOICE", value=str(path), limit=".vtu")
     replace_file(
         path, lambda temporary: grid.save(temporary, binary=True), size=grid.actual_memory_size * 1024
     )
@@ -331,7 +331,7 @@ def deformed_picture(
     pv = load_pyvista()
     if field not in grid.point_data:
         raise CaseError(
-            f"the grid has no field {field!r}", code="E-SCENE", limit=", ".join(grid.point_data) or "none"
+            f"the grid has no field {field!r}", code="E-SHAPE", limit=", ".join(grid.point_data) or "none"
         )
     u = np.asarray(grid.point_data[field])
     length = np.linalg.norm(u, axis=1)
@@ -508,7 +508,7 @@ def animate_operating_deflection(
     if radial.ndim != 2 or radial.shape[1] % 2 == 0 or radial.shape != tangential.shape:
         raise CaseError(
             f"components of shape {radial.shape} and {tangential.shape}",
-            code="E-SCENE",
+            code="E-SHAPE",
             limit="(H + 1, 2 n_max + 1), equal for both directions",
         )
     _check_suffix(path)
@@ -537,14 +537,14 @@ def _check_suffix(path) -> None:
     """Refuse animations that cannot be written, before they are drawn."""
     suffix = Path(path).suffix
     if suffix not in (".gif", ".mp4"):
-        raise CaseError("unknown kind of animation", code="E-SUFFIX", value=str(path), limit=".gif or .mp4")
+        raise CaseError("unknown kind of animation", code="E-CHOICE", value=str(path), limit=".gif or .mp4")
     if suffix == ".mp4":
         try:
             import imageio_ffmpeg  # noqa: F401
         except ImportError:
             raise FemgearError(
                 "MP4 needs the package imageio-ffmpeg, which is not installed",
-                code="E-PACKAGE",
+                code="E-SYSTEM-LIBRARY",
                 remedy="pip install imageio-ffmpeg, or write a .gif",
             ) from None
 

@@ -45,7 +45,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     Raises
     ------
     StorageError
-        ``E-SCHEMA``: complex variable, missing attribute. ``E-DISK-FULL``, ``E-STORAGE``.
+        ``E-FORMAT``: complex variable, missing attribute. ``E-DISK-FULL``, ``E-STORAGE``.
     """
     encoding = {}
     for name, variable in dataset.variables.items():
@@ -71,7 +71,7 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     Raises
     ------
     StorageError
-        ``E-STORAGE`` (missing, truncated, checksum), ``E-HOSTILE`` (see above), ``E-FORMAT``.
+        ``E-STORAGE`` (missing, truncated, checksum), ``E-FORMAT`` (see above), ``E-FORMAT``.
     """
     import xarray as xr
 
@@ -152,12 +152,12 @@ def checked_name(name: str) -> str:
     Raises
     ------
     StorageError
-        ``E-NAME``.
+        ``E-CHOICE``.
     """
     if not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.startswith(".") or name.endswith("."):
         raise StorageError(
             "not a safe file name",
-            code="E-NAME",
+            code="E-CHOICE",
             value=name,
             limit="1 to 100 of A-Z a-z 0-9 . _ -, no dot at the ends, no reserved name",
         )
@@ -247,14 +247,14 @@ def _check_variable(name: str, variable: xr.Variable, *, coordinate: bool, path:
     if variable.dtype.kind not in "fiubOUS":
         raise StorageError(
             f"{name} has the type {variable.dtype}",
-            code="E-SCHEMA",
+            code="E-FORMAT",
             file=os.fspath(path),
             remedy="store complex numbers as real and imaginary part",
         )
     labels = coordinate and variable.dtype.kind in "OUS"
     missing = [key for key in ("units", "long_name") if key not in variable.attrs]
     if missing and not labels:
-        raise StorageError(f"{name} lacks {' and '.join(missing)}", code="E-SCHEMA", file=os.fspath(path))
+        raise StorageError(f"{name} lacks {' and '.join(missing)}", code="E-FORMAT", file=os.fspath(path))
 
 
 def _refuse_hostile(path: str | os.PathLike) -> None:
@@ -294,4 +294,4 @@ def _is_plain(dtype: np.dtype) -> bool:
 
 def _hostile(path: str | os.PathLike, name: str | None, what: str) -> StorageError:
     message = f"{name!a} {what}" if name else f"the file {what}"
-    return StorageError(message, code="E-HOSTILE", file=os.fspath(path), remedy="do not use this file")
+    return StorageError(message, code="E-FORMAT", file=os.fspath(path), remedy="do not use this file")

@@ -331,16 +331,14 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
     with storage_errors(path):
         if not path.is_file() or path.stat().st_size > 10_000_000:
             raise StorageError(
-                "no manifest of reasonable size", code="E-MANIFEST", file=str(path), remedy=remedy
+                "no manifest of reasonable size", code="E-FORMAT", file=str(path), remedy=remedy
             )
         text = path.read_bytes()
     try:
         data = json.loads(text)
         version = data.pop("femgear_format")
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
-        raise StorageError(
-            "not a femgear manifest", code="E-MANIFEST", file=str(path), remedy=remedy
-        ) from None
+        raise StorageError("not a femgear manifest", code="E-FORMAT", file=str(path), remedy=remedy) from None
     if type(version) is not int or not 1 <= version <= FORMAT:
         raise StorageError(
             "written by another version of femgear",
@@ -352,14 +350,10 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
     try:
         manifest = Manifest(format=version, **data)
     except (TypeError, ValueError):
-        raise StorageError(
-            "not a femgear manifest", code="E-MANIFEST", file=str(path), remedy=remedy
-        ) from None
+        raise StorageError("not a femgear manifest", code="E-FORMAT", file=str(path), remedy=remedy) from None
     for name in manifest.files:
         if not is_safe_path(name):
-            raise StorageError(
-                "names a file outside the folder", code="E-MANIFEST", file=str(path), value=name
-            )
+            raise StorageError("names a file outside the folder", code="E-FORMAT", file=str(path), value=name)
     return manifest
 
 

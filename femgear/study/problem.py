@@ -230,7 +230,7 @@ def check_variables(case: Case, variables: Sequence[Variable]) -> None:
             try:
                 with_values(case, dict.fromkeys(variable.keys, variable.text(bound)))
             except CaseError as error:
-                if error.code == "E-KEY" and error.message.endswith("is not a list"):
+                if error.code == "E-TYPE" and error.message.endswith("is not a list"):
                     # entries of a list can only be varied where the file has them
                     entry = variable.name.split("[")[0]
                     error.remedy = f"give the case a table [[{entry}]] for every entry that is varied"
@@ -257,7 +257,7 @@ class Limit:
         if not (finite and self.low <= self.high):
             raise CaseError(
                 "a limit needs a lower or an upper bound",
-                code="E-LIMIT",
+                code="E-OBJECTIVE",
                 key=self.quantity.name,
                 value=f"{self.low} to {self.high}",
                 limit=f"numbers in {self.quantity.dimension.si}, low <= high",
@@ -331,17 +331,17 @@ def parse_limit(text: str, **options) -> Limit:
     Raises
     ------
     CaseError
-        E-LIMIT: no such text; E-OBJECTIVE; E-UNIT.
+        E-OBJECTIVE: no such text; E-OBJECTIVE; E-UNIT.
     """
     match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text, re.DOTALL)
     if not match:
         example = '"contact ratio sun-planet >= 1.3" or "root stress sun <= 300 MPa"'
-        raise CaseError("not a limit", code="E-LIMIT", key="--limit", value=text, limit=example)
+        raise CaseError("not a limit", code="E-OBJECTIVE", key="--limit", value=text, limit=example)
     quantity = named_quantity(match[1], **options)
     if quantity.dimension is NUMBER:
         bound = _number(match[3])
         if not isinstance(bound, float):
-            raise CaseError("not a number", code="E-LIMIT", key="--limit", value=text)
+            raise CaseError("not a number", code="E-OBJECTIVE", key="--limit", value=text)
     else:
         bound = to_si(match[3], quantity.dimension)
     return Limit(quantity, low=bound) if match[2] == ">=" else Limit(quantity, high=bound)

@@ -207,7 +207,7 @@ def minimise(
     Raises
     ------
     CaseError
-        E-METHOD: no such method, or not for this problem; E-START: a start outside the bounds.
+        E-CHOICE: no such method, or not for this problem; E-START: a start outside the bounds.
     ConvergenceError
         E-INFEASIBLE: no design within the limits was found.
     StorageError
@@ -231,7 +231,7 @@ def minimise(
 
 
 def _method(problem: Problem, method: Method) -> Method:
-    """The method, chosen where that is left to the problem; refused (E-METHOD) where it does not fit."""
+    """The method, chosen where that is left to the problem; refused (E-CHOICE) where it does not fit."""
     smooth = has_derivatives(problem)
     if method == "auto":
         return "minimax" if smooth else "global"
@@ -239,14 +239,14 @@ def _method(problem: Problem, method: Method) -> Method:
     if wrong or (method == "minimax" and not smooth):
         raise CaseError(
             "no such method" if wrong else "this problem has no derivatives",
-            code="E-METHOD",
+            code="E-CHOICE",
             key="method",
             value=method,
             limit=", ".join(METHODS) if wrong else "a transmission error over deviations of the drive flanks",
             remedy=None if wrong else 'take "global"',
         )
     if method != "global" and any(variable.integer for variable in problem.variables):
-        raise CaseError("whole numbers", code="E-METHOD", key="method", value=method, limit='"global"')
+        raise CaseError("whole numbers", code="E-CHOICE", key="method", value=method, limit='"global"')
     return method
 
 
@@ -552,7 +552,7 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
         found = sensitivity(linear, _deviations(case, variable), inside, step=step)
         slopes.append(signal(found.sun_arc, found.deflection, n))
     if not np.isfinite(slopes).all():
-        raise ContactError("a planet that carries nothing has no derivative", code="E-DERIVATIVE")
+        raise ContactError("a planet that carries nothing has no derivative", code="E-NO-LOAD")
     return value, np.array(slopes)
 
 

@@ -280,7 +280,7 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
     CaseError
         E-RANGE: pin errors of another shape, or not finite.
     ContactError
-        E-CONTACT-CONVERGENCE
+        E-CONTACT
     """
     pins = np.asarray(pins, float)
     N, m = model.approach.shape
@@ -306,7 +306,7 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
     if not residual < 1e-6:
         raise ContactError(
             f"load sharing of {len(pins)} samples ends with a residual of {residual:.3g}",
-            code="E-CONTACT-CONVERGENCE",
+            code="E-CONTACT",
             limit="1e-6",
         )
     return Sharing(forces / model.load, motions, residual, len(left))
@@ -377,7 +377,7 @@ def _one(model, curves, separation):
         forces = forces + (state.loads - forces) * (1.0 if step < 30 else 0.5)
         if change < 1e-10 * model.load:
             return state.loads, state.motions
-    raise ContactError("the load sharing of a sample does not settle", code="E-CONTACT-CONVERGENCE")
+    raise ContactError("the load sharing of a sample does not settle", code="E-CONTACT")
 
 
 def _residual(model, curves, separation, forces, motions) -> float:

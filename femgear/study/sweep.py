@@ -109,7 +109,7 @@ def sweep(
     Raises
     ------
     CaseError
-        E-SWEEP: nothing to compute, or too much; values that the case file refuses.
+        E-VARIABLE: nothing to compute, or too much; values that the case file refuses.
     """
     keys, quantities = tuple(over), tuple(quantities)
     count = check_sweep(case, over, quantities)
@@ -139,13 +139,13 @@ def check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Se
     if not (0 < count <= LARGEST and quantities):
         raise CaseError(
             f"{count} cases with {len(quantities)} quantities",
-            code="E-SWEEP",
+            code="E-VARIABLE",
             limit=f"1 to {LARGEST} cases, at least one quantity",
         )
     for key, values in over.items():
         if key.split(".")[0] in _WITHOUT_EFFECT:
             raise CaseError(
-                f"{key} changes no quantity", code="E-SWEEP", key="--over", value=key,
+                f"{key} changes no quantity", code="E-VARIABLE", key="--over", value=key,
                 limit="entries that the computation uses",
             )  # fmt: skip
         for value in values:
@@ -192,7 +192,7 @@ def parse_over(text: str) -> tuple[str, Sequence[object]]:
     Raises
     ------
     CaseError
-        E-SWEEP: no key, no values, or a range of less than two.
+        E-VARIABLE: no key, no values, or a range of less than two.
     """
     key, equals, values = (part.strip() for part in text.partition("="))
     if not (key and equals and values):
@@ -226,7 +226,7 @@ def _value(text: str) -> str | float | bool:
 def _not_over(text: str) -> CaseError:
     return CaseError(
         "not a key with values",
-        code="E-SWEEP",
+        code="E-VARIABLE",
         key="--over",
         value=text,
         limit="KEY=V1,V2,V3 or KEY=LOW..HIGH/COUNT with a count of 2 or more",
@@ -269,12 +269,12 @@ def sweep_into(
     Raises
     ------
     CaseError
-        E-SWEEP, E-OBJECTIVE: what cannot be computed; nothing is written then.
+        E-VARIABLE, E-OBJECTIVE: what cannot be computed; nothing is written then.
     StorageError
     """
     values = dict(parse_over(text) for text in over)
     if len(values) < len(over):
-        raise CaseError("a key is given twice", code="E-SWEEP", key="--over", value=", ".join(over))
+        raise CaseError("a key is given twice", code="E-VARIABLE", key="--over", value=", ".join(over))
     quantities = [named_quantity(words, speeds=speeds) for words in of]
     check_sweep(case, values, quantities)
     with storage_errors(folder):

@@ -130,7 +130,7 @@ def gear_set_system(
     ------
     CaseError
         A torque on a held member, a set that cannot move at all (E-MECHANISM), an unknown or infinitely stiff
-        bearing (E-BEARING), a carrier speed or bearings of bodies that move in space (E-HELICAL).
+        bearing (E-BEARING), a carrier speed or bearings of bodies that move in space (E-RANGE).
     """
     if len(data.axes) > 3 and carrier_speed:
         data.refuse("carrier_speed", carrier_speed, "rad/s", "0 of bodies that move in space")

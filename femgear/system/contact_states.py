@@ -51,14 +51,14 @@ def contact_states(meshes: GearMeshes, x, theta) -> ContactStates:
     Raises
     ------
     CaseError
-        Meshes that do not separate, no instants, deflections or forces that are not finite (E-CONTACT-STATE).
+        Meshes that do not separate, no instants, deflections or forces that are not finite (E-CONTACT).
     """
     if not meshes.separates:
         raise CaseError(
-            "meshes that do not separate have no impacts", code="E-CONTACT-STATE", limit="separates=True"
+            "meshes that do not separate have no impacts", code="E-CONTACT", limit="separates=True"
         )
-    x = checked_numbers(x, "x", code="E-CONTACT-STATE", unit="m")
-    theta = checked_numbers(theta, "theta", code="E-CONTACT-STATE", unit="rad")
+    x = checked_numbers(x, "x", code="E-CONTACT", unit="m")
+    theta = checked_numbers(theta, "theta", code="E-CONTACT", unit="rad")
     columns = meshes.columns[:, 0]
     if x.ndim < 2 or x.shape[-1] <= columns.max(initial=-1) or theta.ndim != 2 or not len(theta):
         _refuse(f"deflections of shape {x.shape} at phases of shape {theta.shape}")
@@ -106,7 +106,7 @@ def range_states(lowest, highest, *, drive: float, back: float) -> np.ndarray:
         Deflections above and below which the drive and the back flanks touch.
     """
     lowest, highest, drive, back = (
-        checked_numbers(value, name, code="E-CONTACT-STATE", unit="m")
+        checked_numbers(value, name, code="E-CONTACT", unit="m")
         for name, value in (("lowest", lowest), ("highest", highest), ("drive", drive), ("back", back))
     )
     if not (np.all(np.isfinite([drive, back])) and np.all(back <= drive)):
@@ -124,8 +124,8 @@ def state_regions(parameter, state) -> list[tuple[int, float, float]]:
 
     Neighbouring runs share no value; where the state changes the border lies between them.
     """
-    parameter = checked_numbers(parameter, "parameter", code="E-CONTACT-STATE", unit="")
-    state = checked_numbers(state, "state", code="E-CONTACT-STATE", unit="")
+    parameter = checked_numbers(parameter, "parameter", code="E-CONTACT", unit="")
+    state = checked_numbers(state, "state", code="E-CONTACT", unit="")
     if parameter.ndim != 1 or parameter.shape != state.shape:
         _refuse(f"states of shape {state.shape} over parameters of shape {parameter.shape}")
     ends = np.flatnonzero(np.diff(state, append=-1, prepend=-1))
@@ -137,7 +137,7 @@ def state_regions(parameter, state) -> list[tuple[int, float, float]]:
 
 def _refuse(message: str):
     raise CaseError(
-        message, code="E-CONTACT-STATE", limit="finite numbers, as many instants as phases, one or more"
+        message, code="E-CONTACT", limit="finite numbers, as many instants as phases, one or more"
     )
 
 

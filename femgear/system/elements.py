@@ -351,7 +351,7 @@ class TurningSprings:
     Raises
     ------
     CaseError
-        Columns that do not fit (E-SHAPE), stiffnesses out of range (E-COUPLING).
+        Columns that do not fit (E-SHAPE), stiffnesses out of range (E-RANGE).
     """
 
     columns: np.ndarray
@@ -371,7 +371,7 @@ class TurningSprings:
             )  # fmt: skip
         if not np.all(np.isfinite(stiffness)) or np.any(stiffness < 0.0):
             raise CaseError(
-                f"lateral stiffnesses {stiffness.tolist()} N/m", code="E-COUPLING", limit="finite, 0 or more"
+                f"lateral stiffnesses {stiffness.tolist()} N/m", code="E-RANGE", limit="finite, 0 or more"
             )
         for name, value in (("columns", columns), ("stiffness", stiffness)):
             value.setflags(write=False)
@@ -407,7 +407,7 @@ def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSerie
         phi at time zero [rad].
     """
     if not math.isfinite(phase):
-        raise CaseError(f"a phase of {phase} rad", code="E-VALUE", key="phase", limit="finite")
+        raise CaseError(f"a phase of {phase} rad", code="E-RANGE", key="phase", limit="finite")
     turned = np.exp(1j * phase)
     return FourierSeries(np.array([[0.0, turned], [0.0, -1j * turned]]), orders)
 
@@ -623,6 +623,6 @@ def _numbers(value, key: str, code: str = "E-SHAPE") -> np.ndarray:
 
 
 def _positive(name: str, value: float) -> None:
-    length = _numbers(value, name, "E-SMOOTHING")
+    length = _numbers(value, name, "E-RANGE")
     if not (np.isfinite(length) and length >= 0.0):
-        raise CaseError(f"{name} of {length} m", code="E-SMOOTHING", limit="0 m or more")
+        raise CaseError(f"{name} of {length} m", code="E-RANGE", limit="0 m or more")

@@ -210,7 +210,7 @@ def phase_of(theta, orders) -> np.ndarray:
     if any(orders[known:]):
         raise CaseError(
             f"orders {tuple(orders)} name more base frequencies than the {known} that are given",
-            code="E-ORDERS", limit="one order a base frequency",
+            code="E-HARMONICS", limit="one order a base frequency",
         )  # fmt: skip
     used = np.asarray(orders[:known], float)
     return theta[..., : len(used)] @ used
@@ -286,10 +286,10 @@ def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np
     amplitude : (n, L) complex array
         ``Re sum_l A_l exp(i omega_l t)``.
     """
-    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
         raise CaseError(
-            f"base frequencies of shape {frequency.shape}", code="E-FREQUENCY", key="frequency",
+            f"base frequencies of shape {frequency.shape}", code="E-RANGE", key="frequency",
             limit="finite numbers, one a base",
         )  # fmt: skip
     parts = series.parts if isinstance(series, SummedSeries) else (series,)
@@ -392,18 +392,18 @@ def checked_lines(orders) -> np.ndarray:
     array = np.array(orders)
     array = array[:, None] if array.ndim == 1 else array
     if array.ndim != 2 or not array.size or np.any(array != np.round(array)):
-        raise CaseError("lines must be an (L, n_bases) table of whole numbers", code="E-LINES")
+        raise CaseError("lines must be an (L, n_bases) table of whole numbers", code="E-HARMONICS")
     array = array.astype(int)
     if np.any(array[0]):
         raise CaseError(
-            f"the first line has the orders {array[0].tolist()}", code="E-LINES", limit="zeros: the mean",
+            f"the first line has the orders {array[0].tolist()}", code="E-HARMONICS", limit="zeros: the mean",
             remedy="build the lines with harmonic_lines, side_bands or distinct_lines",
         )  # fmt: skip
     unique, count = np.unique(array * mirror_sign(array)[:, None], axis=0, return_counts=True)
     if np.any(count > 1):
         raise CaseError(
-            f"the line {unique[count > 1][0].tolist()} or its mirror image is there twice", code="E-LINES",
-            remedy="pass the lines through distinct_lines",
+            f"the line {unique[count > 1][0].tolist()} or its mirror image is there twice",
+            code="E-HARMONICS", remedy="pass the lines through distinct_lines",
         )  # fmt: skip
     return array
 

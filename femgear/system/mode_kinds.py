@@ -177,7 +177,7 @@ def phase_shares(motions: SetMotions, *, signed: bool = False) -> np.ndarray:
     Raises
     ------
     CaseError
-        Signed shares of unequally spaced planets (E-SPACING).
+        Signed shares of unequally spaced planets (E-SYMMETRY).
     """
     weighted, N = motions.weighted, len(motions.planet_angles)
     total = (np.abs(weighted) ** 2).sum(axis=(0, 1))
@@ -185,7 +185,7 @@ def phase_shares(motions: SetMotions, *, signed: bool = False) -> np.ndarray:
     if signed:
         if not equally_spaced(motions.planet_angles):
             raise CaseError(
-                "harmonics j and N - j cannot be told apart for planets at unequal angles", code="E-SPACING",
+                "harmonics j and N - j cannot be told apart for planets at unequal angles", code="E-SYMMETRY",
                 limit="equal angles, in ascending order", remedy="take the shares without sign",
             )  # fmt: skip
         energy = (np.abs(np.fft.fft(weighted, axis=0)) ** 2).sum(axis=1) / N

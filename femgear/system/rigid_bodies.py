@@ -1,8 +1,8 @@
 """Data of planetary sets of rigid bodies: bodies, supports, radii, angles, torques, refusals.
 
 Bodies have up to six motions: along x, y and z, two tilts ``w = r phi`` and the rotation ``u = r theta``.
-Those of the planar set move in their plane (E-PLANAR), those of the helical set in all directions
-(E-HELICAL).
+Those of the planar set move in their plane (E-RANGE), those of the helical set in all directions
+(E-RANGE).
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class RigidSet:
         the code of the kind of set.
     """
 
-    code: ClassVar[str] = "E-HELICAL"
+    code: ClassVar[str] = "E-RANGE"
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
     directions: ClassVar[dict[str, tuple[int, ...]]] = {}
     meshes_optional: ClassVar[bool] = True
@@ -217,8 +217,8 @@ class PlanarSet(RigidSet):
     Raises
     ------
     CaseError
-        Numbers that no set can have (E-PLANAR), planet angles that are none, unordered or span more than a
-        turn (E-PLANAR).
+        Numbers that no set can have (E-RANGE), planet angles that are none, unordered or span more than a
+        turn (E-RANGE).
 
     Notes
     -----
@@ -226,7 +226,7 @@ class PlanarSet(RigidSet):
     taken as they are, and `closure` tells by how much.
     """
 
-    code: ClassVar[str] = "E-PLANAR"
+    code: ClassVar[str] = "E-RANGE"
     axes: ClassVar[tuple[int, ...]] = (0, 1, 5)
     directions: ClassVar[dict[str, tuple[int, ...]]] = {"{}": (0, 1), "torsional {}": (2,)}
     meshes_optional: ClassVar[bool] = False
@@ -271,7 +271,7 @@ class PlanarTorque:
                 limit="two of sun, carrier and ring",
             )  # fmt: skip
         if not math.isfinite(self.torque):
-            raise CaseError(f"a torque of {self.torque} N m", code="E-VALUE", limit="finite")
+            raise CaseError(f"a torque of {self.torque} N m", code="E-RANGE", limit="finite")
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +292,7 @@ class HelicalSupport:
     Raises
     ------
     CaseError
-        Stiffnesses that are no numbers, negative or NaN (E-HELICAL).
+        Stiffnesses that are no numbers, negative or NaN (E-RANGE).
     """
 
     radial: float | np.ndarray = 0.0
@@ -328,7 +328,7 @@ class HelicalBody:
     Raises
     ------
     CaseError
-        Mass or inertias that are not finite and above 0 (E-HELICAL).
+        Mass or inertias that are not finite and above 0 (E-RANGE).
     """
 
     mass: float
@@ -478,7 +478,7 @@ def check_set(data: RigidSet) -> None:
 
 def check_body(name: str, body: PlanarBody | HelicalBody) -> None:
     """Refuse a mass, inertia or support."""
-    code = "E-HELICAL" if isinstance(body, HelicalBody) else "E-PLANAR"
+    code = "E-RANGE"
     for entry, unit in (("mass", "kg"), ("inertia", "kg m^2"), ("diametral_inertia", "kg m^2")):
         if hasattr(body, entry):
             _check_positive(f"{name}.{entry}", getattr(body, entry), unit, code=code)
@@ -497,8 +497,8 @@ def check_body(name: str, body: PlanarBody | HelicalBody) -> None:
 
 
 def check_support(key: str, support: HelicalSupport, *, count: int | None = None) -> None:
-    """Refuse stiffnesses of a support (E-HELICAL): of `count` planets, of one body (0), of either (None)."""
-    code, allowed = "E-HELICAL", f"one number, or {count}" if count else "one number"
+    """Refuse stiffnesses of a support (E-RANGE): of `count` planets, of one body (0), of either (None)."""
+    code, allowed = "E-RANGE", f"one number, or {count}" if count else "one number"
     # what is no support has none of its stiffnesses
     if not all(hasattr(support, entry) for entry in DIRECTIONS):
         refuse(key, repr(support), "", "a HelicalSupport", code=code)

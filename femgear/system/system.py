@@ -356,15 +356,15 @@ def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
     Raises
     ------
     CaseError
-        Not a list of finite numbers, or one too long (E-FREQUENCY).
+        Not a list of finite numbers, or one too long (E-RANGE).
     """
-    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
-        raise CaseError("base frequencies must be finite numbers", code="E-FREQUENCY", key="frequency")
+        raise CaseError("base frequencies must be finite numbers", code="E-RANGE", key="frequency")
     if len(frequency) > problem.bases:
         raise CaseError(
             f"{len(frequency)} base frequencies, elements and forces name {problem.bases}",
-            code="E-FREQUENCY", key="frequency", value=frequency.tolist(), limit=f"{problem.bases} or fewer",
+            code="E-RANGE", key="frequency", value=frequency.tolist(), limit=f"{problem.bases} or fewer",
             remedy="leave out those that drive nothing, or give elements and forces one order a frequency",
         )  # fmt: skip
     return frequency

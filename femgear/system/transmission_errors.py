@@ -90,7 +90,7 @@ class TransmissionErrors:
     def __post_init__(self):
         if self.flank not in (1, -1) or self.direction not in (1, -1):
             raise CaseError(
-                f"errors on flank {self.flank}, direction {self.direction}", code="E-ERRORS", limit="1 or -1"
+                f"errors on flank {self.flank}, direction {self.direction}", code="E-RANGE", limit="1 or -1"
             )
         _check_teeth(self.data, self.teeth)
         used = tuple(name for name in SENSE if getattr(self, name) is not None)
@@ -160,11 +160,11 @@ class TransmissionErrors:
         given = getattr(self, name)
         if not isinstance(given, Eccentricity):
             raise CaseError(
-                f"an eccentricity given as {given!r}", code="E-ERRORS", key=name, limit="an Eccentricity",
+                f"an eccentricity given as {given!r}", code="E-RANGE", key=name, limit="an Eccentricity",
                 remedy=f"{name}=Eccentricity(5e-6)",
             )  # fmt: skip
-        amplitude = checked_numbers(given.amplitude, f"{name}.amplitude", code="E-ERRORS", unit="m")
-        phase = checked_numbers(given.phase, f"{name}.phase", code="E-ERRORS", unit="rad")
+        amplitude = checked_numbers(given.amplitude, f"{name}.amplitude", code="E-RANGE", unit="m")
+        phase = checked_numbers(given.phase, f"{name}.phase", code="E-RANGE", unit="rad")
         size = (self.data.n_planets,) if name == "planet" else ()
         sense = SENSE[name] * self.direction
         try:
@@ -173,7 +173,7 @@ class TransmissionErrors:
             turned = np.array(np.nan)
         if not np.all(np.isfinite(turned)) or np.any(amplitude < 0.0):
             raise CaseError(
-                f"an eccentricity of {amplitude.tolist()} m at {phase.tolist()} rad", code="E-ERRORS",
+                f"an eccentricity of {amplitude.tolist()} m at {phase.tolist()} rad", code="E-RANGE",
                 key=name, limit="0 m or more, finite, one value, for planets also one each",
             )  # fmt: skip
         return np.stack([turned, -1j * sense * turned], axis=-1)
@@ -228,7 +228,7 @@ def with_errors(
     Raises
     ------
     CaseError
-        Back flanks on their own lines, stepwise series (E-ERRORS), dampers without a frequency (E-FREQUENCY).
+        Back flanks on their own lines, stepwise series (E-RANGE), dampers without a frequency (E-RANGE).
     """
     drive, *others = problem.elements
     known = drive.state[0] if isinstance(drive, GearMeshes) else None
@@ -241,7 +241,7 @@ def with_errors(
         or len(drive.columns) != 2 * errors.data.n_planets
     ):
         raise CaseError(
-            "errors need one element of all meshes with Fourier series", code="E-ERRORS",
+            "errors need one element of all meshes with Fourier series", code="E-RANGE",
             remedy="build the problem with planar_problem, without back flanks on their own lines",
         )  # fmt: skip
     series = errors.series
@@ -250,11 +250,9 @@ def with_errors(
     forces = problem.forces
     if dampers is not None:
         if mesh_frequency is None:
-            raise CaseError(
-                "mesh dampers without the mesh frequency", code="E-FREQUENCY", key="mesh_frequency"
-            )
+            raise CaseError("mesh dampers without the mesh frequency", code="E-RANGE", key="mesh_frequency")
         dampers = checked_numbers(dampers, "dampers", code="E-SHAPE", unit="N s/m")
-        rate = checked_numbers(mesh_frequency, "mesh_frequency", code="E-FREQUENCY", unit="rad/s")
+        rate = checked_numbers(mesh_frequency, "mesh_frequency", code="E-RANGE", unit="rad/s")
         if dampers.shape != (len(drive.columns),) or rate.ndim or not np.all(np.isfinite([*dampers, rate])):
             raise CaseError(
                 f"mesh dampers of shape {dampers.shape} at {rate.tolist()} rad/s", code="E-SHAPE",
@@ -278,9 +276,9 @@ def carrier_pins(data: PlanarSet, amplitude: float, phase: float = 0.0) -> np.nd
     """
     given = {"amplitude": amplitude, "phase": phase}
     for name, value in given.items():
-        number = checked_numbers(value, name, code="E-ERRORS", unit="")
+        number = checked_numbers(value, name, code="E-RANGE", unit="")
         if number.ndim or not np.isfinite(number):
-            raise CaseError(f"a {name} of {value}", code="E-ERRORS", key=name, limit="one finite number")
+            raise CaseError(f"a {name} of {value}", code="E-RANGE", key=name, limit="one finite number")
     angle = phase - data.angles
     return amplitude * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
@@ -392,7 +390,7 @@ def _check_teeth(data: PlanarSet, teeth) -> None:
     ]
     if len(numbers) != 3:
         raise CaseError(
-            f"errors of gears with teeth {teeth}", code="E-ERRORS", key="teeth",
+            f"errors of gears with teeth {teeth}", code="E-RANGE", key="teeth",
             limit="whole numbers of sun, planet and ring, 1 or more",
         )  # fmt: skip
     for name, count, radius in zip(names[1:], numbers[1:], (data.planet_radius, data.ring_radius)):

@@ -165,7 +165,7 @@ def _change(data: dict, key: str, value: object, name: str) -> None:
     for part, following in zip(tables, parts[1:], strict=True):
         table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
     if last.startswith("["):
-        raise CaseError("a list is changed as a whole", code="E-KEY", key=key, file=name or None)
+        raise CaseError("a list is changed as a whole", code="E-TYPE", key=key, file=name or None)
     if value is None:
         table.pop(last, None)
     else:
@@ -181,7 +181,7 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
         found = table.setdefault(part, {}) if wanted is dict else table.get(part)
     if not isinstance(found, wanted):
         kind = "table" if wanted is dict else "list"
-        raise CaseError(f"{part} is not a {kind}", code="E-KEY", key=key, file=name or None)
+        raise CaseError(f"{part} is not a {kind}", code="E-TYPE", key=key, file=name or None)
     return found
 
 

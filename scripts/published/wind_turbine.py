@@ -205,7 +205,7 @@ def _set(
 ) -> PlanarSet:
     """Three equal planets; pitch radii [m] of sun, planet, ring; bodies sun, ring, carrier, planet."""
     if not 0.0 < angle < 0.5 * math.pi:
-        raise CaseError(f"a pressure angle of {angle} rad", code="E-PLANAR", limit="between 0 and pi/2")
+        raise CaseError(f"a pressure angle of {angle} rad", code="E-RANGE", limit="between 0 and pi/2")
     sun, planet, ring = (float(r) * math.cos(angle) for r in radii)
     inertias = [inertia_of_reduced(i, r) for i, r in zip(reduced, (sun, ring, distance, planet))]
     return PlanarSet(

@@ -158,5 +158,5 @@ def test_relative_radius_of_a_hollow_surface():
     ],
 )
 def test_impossible_values_are_refused(call):
-    with pytest.raises(ContactError, match="E-HALFPLANE"):
+    with pytest.raises(ContactError, match="E-RANGE"):
         call()

@@ -129,14 +129,14 @@ def test_generator_that_does_not_return_is_killed(tmp_path, monkeypatch):
     fake_gmsh(tmp_path, monkeypatch, "import time\ntime.sleep(60)\n")
     monkeypatch.setattr(meshing, "TIME_LIMIT", 0.8)
     error = refusal(polygon(SQUARE))
-    assert error.code == "E-GRID-TIMEOUT" and "0.8 s" in str(error)
+    assert error.code == "E-GRID-GMSH" and "0.8 s" in str(error)
 
 
 def test_missing_system_library_names_its_package(tmp_path, monkeypatch):
     text = "raise OSError('libGLU.so.1: cannot open shared object file: No such file or directory')"
     fake_gmsh(tmp_path, monkeypatch, text)
     error = refusal(polygon(SQUARE))
-    assert error.code == "E-GRID-LIBRARY" and "apt-get install libglu1-mesa" in str(error)
+    assert error.code == "E-GRID-GMSH" and "apt-get install libglu1-mesa" in str(error)
 
 
 def test_generator_errors_are_passed_on(tmp_path, monkeypatch):
@@ -149,7 +149,7 @@ def test_generator_errors_are_passed_on(tmp_path, monkeypatch):
 
 def test_self_crossing_outline():  # bad input 52
     error = refusal(polygon([(0, 0), (1, 1), (1, 0), (0, 1.5)]))
-    assert error.code == "E-GRID-CROSSING" and "edge0" in str(error) and "edge2" in str(error)
+    assert error.code == "E-GRID" and "edge0" in str(error) and "edge2" in str(error)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -159,16 +159,16 @@ def test_points_that_are_not_numbers(value):  # bad input 53
     with np.errstate(invalid="ignore"):
         outline = polygon(corners)
     error = refusal(outline)
-    assert error.code == "E-GRID-NAN" and "finite" in str(error)
+    assert error.code == "E-GRID" and "finite" in str(error)
 
 
 def test_points_that_coincide():  # bad input 54
     error = refusal(polygon([(0, 0), (1, 0), (1, 1e-13), (1, 1), (0, 1)]))
-    assert error.code == "E-GRID-CLOSE-POINTS" and "1.000e-13 m apart" in str(error)
+    assert error.code == "E-GRID" and "1.000e-13 m apart" in str(error)
 
 
 def test_clockwise_outline():  # bad input 55
-    assert refusal(polygon(SQUARE[::-1])).code == "E-GRID-CLOCKWISE"
+    assert refusal(polygon(SQUARE[::-1])).code == "E-GRID"
 
 
 @pytest.mark.parametrize(
@@ -182,23 +182,23 @@ def test_clockwise_outline():  # bad input 55
     ids=["zero area", "slit", "corner on a side", "one point"],
 )
 def test_slits_and_zero_area(corners):  # bad input 56
-    assert refusal(polygon(corners)).code in ("E-GRID-CROSSING", "E-GRID-AREA")
+    assert refusal(polygon(corners)).code in ("E-GRID", "E-GRID")
 
 
 def test_thin_sliver_is_a_slit():
     assert refusal(polygon([(0, 0), (1, 0), (1, 4e-9), (0, 4e-9)])).code in (
-        "E-GRID-AREA",
-        "E-GRID-CLOSE-POINTS",
+        "E-GRID",
+        "E-GRID",
     )
-    assert refusal(polygon([(0, 0), (1, 0), (0.5, 1.9e-9)])).code in ("E-GRID-AREA", "E-GRID-CROSSING")
+    assert refusal(polygon([(0, 0), (1, 0), (0.5, 1.9e-9)])).code in ("E-GRID", "E-GRID")
 
 
 def test_element_count_is_estimated_before_meshing(monkeypatch):  # bad input 57
     monkeypatch.setattr(meshing, "_run_gmsh", None)
     error = refusal(polygon(SQUARE, divide=400))
-    assert error.code == "E-GRID-COUNT" and "elements" in str(error) and "at most 200000" in str(error)
+    assert error.code == "E-GRID" and "elements" in str(error) and "at most 200000" in str(error)
     error = refusal(polygon(SQUARE, divide=2000))
-    assert error.code == "E-GRID-COUNT" and "8000 segments" in str(error)
+    assert error.code == "E-GRID" and "8000 segments" in str(error)
 
 
 @pytest.mark.parametrize("divide", [4, 8, 25])
@@ -210,10 +210,10 @@ def test_estimate_is_within_a_factor_two(divide):
 
 def test_open_outline_and_wrong_shapes():
     curves = polygon(SQUARE).curves
-    assert refusal(Outline(curves[:3])).code == "E-GRID-OPEN"
-    assert refusal(Outline(())).code == "E-GRID-SHAPE"
+    assert refusal(Outline(curves[:3])).code == "E-GRID"
+    assert refusal(Outline(())).code == "E-GRID"
     for points in (np.zeros((4, 2)), np.zeros((1, 2)), np.zeros((3, 3)), np.zeros(6)):
-        assert refusal(Outline((("edge", points),))).code == "E-GRID-SHAPE"
+        assert refusal(Outline((("edge", points),))).code == "E-GRID"
 
 
 def split_square(points, regions=(("lower", (0.5, 0.1)), ("upper", (0.5, 0.9)))):
@@ -237,26 +237,26 @@ def test_interface_divides_the_body():
 @pytest.mark.parametrize(
     "points, code",
     [
-        (straight((0, 0.5), (0.7, 0.6)), "E-GRID-INTERFACE"),
-        (straight((0, 0.5), (1, 0.55)), "E-GRID-INTERFACE"),
-        (straight((0.3, 0.5), (0.6, 0.5)), "E-GRID-INTERFACE"),
-        (straight((0, 0.5), (1, 0.5))[[0, 1, 2, 3, 8]], "E-GRID-CROSSING"),
+        (straight((0, 0.5), (0.7, 0.6)), "E-GRID"),
+        (straight((0, 0.5), (1, 0.55)), "E-GRID"),
+        (straight((0.3, 0.5), (0.6, 0.5)), "E-GRID"),
+        (straight((0, 0.5), (1, 0.5))[[0, 1, 2, 3, 8]], "E-GRID"),
         (
             np.vstack([straight((0, 0.5), (0.5, 1.5), 1)[:-1], straight((0.5, 1.5), (1, 0.5), 1)]),
-            "E-GRID-CROSSING",
+            "E-GRID",
         ),
     ],
     ids=["dangling", "off a corner", "floating", "folded back", "outside"],
 )
 def test_interfaces_that_do_not_divide(points, code):
-    if code == "E-GRID-CROSSING" and len(points) == 5 and points[2, 1] == 0.5:
+    if code == "E-GRID" and len(points) == 5 and points[2, 1] == 0.5:
         points = np.array([(0, 0.5), (0.4, 0.5), (0.8, 0.5), (0.6, 0.5), (0.4, 0.5), (0.7, 0.5), (1, 0.5)])
     assert refusal(split_square(points)).code == code
 
 
 def test_interface_loop_outside_the_boundary_is_refused():
     outside = np.array([(0, 0.5), (-0.5, 0.6), (-0.5, 0.75), (-0.3, 0.8), (0, 0.75)])
-    assert refusal(split_square(outside)).code == "E-GRID-INTERFACE"
+    assert refusal(split_square(outside)).code == "E-GRID"
 
 
 @pytest.mark.parametrize(
@@ -271,7 +271,7 @@ def test_interface_loop_outside_the_boundary_is_refused():
     ids=["none", "one missing", "outside", "same part", "same name"],
 )
 def test_regions_must_name_every_part_once(regions):
-    assert refusal(split_square(straight((0, 0.5), (1, 0.5)), regions)).code == "E-GRID-REGION"
+    assert refusal(split_square(straight((0, 0.5), (1, 0.5)), regions)).code == "E-GRID"
 
 
 def test_heavy_libraries_are_imported_late():

@@ -117,10 +117,10 @@ def test_states_and_thicknesses_by_region():
     for bad in ({"left": "plane stress"}, {"left": "plane stress", "no": "plane stress"}):
         with pytest.raises(GridError) as error:
             stiffness(grid, STEEL, state=bad)
-        assert error.value.code == "E-GRID-REGION"
+        assert error.value.code == "E-GRID"
     with pytest.raises(GridError) as error:
         stiffness(grid, STEEL, state="plain stress")
-    assert error.value.code == "E-STATE"
+    assert error.value.code == "E-CHOICE"
 
 
 def test_mass_gives_weight_and_moments_of_inertia():
@@ -163,7 +163,7 @@ def test_foundation_work_of_rigid_motions():
     for bad in (-1.0, np.nan):
         with pytest.raises(GridError) as error:
             foundation(grid, "outer", bad, kt, thickness=thickness)
-        assert error.value.code == "E-FOUNDATION"
+        assert error.value.code == "E-RANGE"
 
 
 def test_foundation_pressure_is_modulus_times_displacement():
@@ -208,7 +208,7 @@ def test_skfem_grid_keeps_names_and_order(plate):
 def test_impossible_materials(values):
     with pytest.raises(CaseError) as error:
         Material(*values)
-    assert error.value.code == "E-MATERIAL"
+    assert error.value.code == "E-RANGE"
 
 
 def test_free_and_half_held_bodies_are_refused(plate):  # bad input 59
@@ -253,16 +253,16 @@ def test_bad_solutions_are_refused(plate):
     assert check_solution(K, u, load, fixed=fixed) < 1e-10
     with pytest.raises(FemgearError) as error:
         check_solution(K, 1.13 * u, load, fixed=fixed)
-    assert error.value.code == "E-SOLVE-RESIDUAL" and "1.30e-01" in str(error)
+    assert error.value.code == "E-SOLVE" and "1.30e-01" in str(error)
     with pytest.raises(FemgearError) as error:
         check_solution(K, np.where(np.arange(len(u)) == 3, np.nan, u), load, fixed=fixed)
-    assert error.value.code == "E-SOLVE-NAN"
+    assert error.value.code == "E-SOLVE"
     with pytest.raises(FemgearError) as error:
         check_solution(-K, -u, load, fixed=fixed)
-    assert error.value.code == "E-SOLVE-ENERGY"
+    assert error.value.code == "E-SOLVE"
     with pytest.raises(FemgearError) as error:
         checked_solve(plate, K, np.where(np.arange(len(u)) == 3, np.inf, load), fixed=fixed)
-    assert error.value.code == "E-SOLVE-NAN"
+    assert error.value.code == "E-SOLVE"
 
 
 def test_prescribed_displacements_and_several_loads(plate):

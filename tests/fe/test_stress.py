@@ -156,9 +156,9 @@ def test_modulus_of_an_edge():
 def test_refusals():
     grid = quarter(0.5, 1.0, 3)
     for names, state, code in (
-        ("nothing", "plane stress", "E-GRID-BOUNDARY"),
-        (("u=1", "v=0"), "plane stress", "E-GRID-BOUNDARY"),
-        ("u=0", "membrane", "E-STATE"),
+        ("nothing", "plane stress", "E-GRID"),
+        (("u=1", "v=0"), "plane stress", "E-GRID"),
+        ("u=0", "membrane", "E-CHOICE"),
     ):
         with pytest.raises(GridError) as caught:
             tangential_stress(grid, STEEL, names, state=state)

@@ -157,7 +157,7 @@ def test_passing_tips_are_refused():
     ring = Gear(46, 1e-3, ALPHA, 0.0, 1e-2, 40e-3, internal=True)
     with pytest.raises(GeometryError) as caught:
         check_passing_tips(planet, ring, 3e-3)
-    assert caught.value.code == "E-TROCHOID"
+    assert caught.value.code == "E-INTERFERENCE"
 
 
 def _planet_and_ring(ring_teeth, tip):

@@ -155,25 +155,25 @@ def test_sets_whose_meshes_want_different_centre_distances_are_refused():
 def test_shifts_without_any_centre_distance_are_refused():
     with pytest.raises(GeometryError) as caught:
         close_set(*gears((27, 40, 108), shifts=(0.0, -1.5, 0.0)), planet_angles=(0.0,))
-    assert (caught.value.code, caught.value.key) == ("E-INVOLUTE", "planet.profile_shift")
+    assert (caught.value.code, caught.value.key) == ("E-GEOMETRY", "planet.profile_shift")
 
 
 @pytest.mark.parametrize("find", [("sun", "planet", "ring"), ("planet",), ("sun", "sun"), ("carrier",)])
 def test_undetermined_shifts_are_refused(find):
     with pytest.raises(GeometryError) as caught:
         close_set(*gears((27, 40, 108)), planet_angles=(0.0,), centre_distance=51e-3, find=find)
-    assert caught.value.code == "E-FIND"
+    assert caught.value.code == "E-SHIFT"
 
 
 @pytest.mark.parametrize(
     ("angles", "code"),
     [
-        ((), "E-PLANETS"),
-        ((0.0, 0.0, 2.0), "E-ANGLES"),
-        ((0.0, 4.0, 2.0), "E-ANGLES"),
-        ((0.0, 120.0, 240.0), "E-ANGLES"),
-        ((0.0, math.nan), "E-ANGLES"),
-        ((0.0, 2 * math.pi), "E-ANGLES"),
+        ((), "E-RANGE"),
+        ((0.0, 0.0, 2.0), "E-RANGE"),
+        ((0.0, 4.0, 2.0), "E-RANGE"),
+        ((0.0, 120.0, 240.0), "E-RANGE"),
+        ((0.0, math.nan), "E-RANGE"),
+        ((0.0, 2 * math.pi), "E-RANGE"),
     ],
 )
 def test_planet_angles_that_are_none_are_refused(angles, code):
@@ -186,20 +186,20 @@ def test_planet_angles_that_are_none_are_refused(angles, code):
 def test_numbers_of_planets_that_are_none_are_refused(count):
     with pytest.raises(GeometryError) as caught:
         equal_planet_angles(count)
-    assert (caught.value.code, caught.value.key) == ("E-PLANETS", "set.planets")
+    assert (caught.value.code, caught.value.key) == ("E-RANGE", "set.planets")
 
 
 def test_gears_that_do_not_belong_together_are_refused():
     sun, planet, ring = gears((27, 40, 108))
     with pytest.raises(GeometryError) as caught:
         PlanetarySet(sun, replace(planet, module=1.6e-3), ring, 51e-3, (0.0,))
-    assert (caught.value.code, caught.value.key) == ("E-MODULE", "planet.module")
+    assert (caught.value.code, caught.value.key) == ("E-GEOMETRY", "planet.module")
     with pytest.raises(GeometryError) as caught:
         PlanetarySet(sun, ring, planet, 51e-3, (0.0,))
-    assert caught.value.code == "E-ROLE"
+    assert caught.value.code == "E-GEOMETRY"
     with pytest.raises(GeometryError) as caught:
         PlanetarySet(sun, planet, ring, 47e-3, (0.0,))
-    assert (caught.value.code, caught.value.key) == ("E-CENTRE-DISTANCE", "set.centre_distance")
+    assert (caught.value.code, caught.value.key) == ("E-ASSEMBLY", "set.centre_distance")
 
 
 def test_mesh_names_follow_the_order_of_the_phases():

@@ -90,7 +90,7 @@ def test_chosen_by_phasing():
 )
 def test_numbers_out_of_range_are_refused(change):
     arguments = dict(sun_teeth=30, planet_teeth=20, ring_teeth=70, planets=4) | change
-    with pytest.raises(GeometryError, match=r"E-CHOICE|E-PLANETS"):
+    with pytest.raises(GeometryError, match=r"E-CHOICE|E-RANGE"):
         neighbouring_teeth(**arguments)
 
 

@@ -165,9 +165,9 @@ def test_results_are_read_only():
 
 GOOD = {"field": random_field(), "z_ring": Z_RING, "carrier_speed": SPEED, "sensor_angle": SENSOR}
 BAD = {
-    "even number of columns": ({"field": np.ones((3, 4))}, "E-FIELD"),
-    "one dimension": ({"field": np.ones(5)}, "E-FIELD"),
-    "not a number": ({"field": np.full((2, 3), np.nan)}, "E-FIELD"),
+    "even number of columns": ({"field": np.ones((3, 4))}, "E-SHAPE"),
+    "one dimension": ({"field": np.ones(5)}, "E-SHAPE"),
+    "not a number": ({"field": np.full((2, 3), np.nan)}, "E-SHAPE"),
     "no teeth": ({"z_ring": 0}, "E-TEETH"),
     "half a tooth": ({"z_ring": 10.5}, "E-TEETH"),
     "speeds for one field": ({"carrier_speed": np.array([1.0, 2.0])}, "E-SPEED"),
@@ -178,8 +178,8 @@ BAD = {
     ),
     "standing, frequency unknown": ({"carrier_speed": 0.0}, "E-SPEED"),
     "turning ring": ({"mesh_frequency": 91.0}, "E-SPEED"),
-    "infinite angle": ({"sensor_angle": np.inf}, "E-ANGLE"),
-    "no orders": ({"max_order": 0}, "E-ORDERS"),
+    "infinite angle": ({"sensor_angle": np.inf}, "E-RANGE"),
+    "no orders": ({"max_order": 0}, "E-HARMONICS"),
 }
 
 
@@ -197,5 +197,5 @@ def test_too_few_samples_are_refused():
     lines = fixed_sensor_lines(**GOOD)
     with pytest.raises(CaseError, match="432 carrier orders") as caught:
         fixed_sensor_signal(lines, samples=864)
-    assert caught.value.code == "E-SAMPLES"
+    assert caught.value.code == "E-HARMONICS"
     assert fixed_sensor_signal(lines, samples=865).displacement.shape == (865,)

@@ -68,8 +68,8 @@ def test_phases_shift_the_signal_of_a_planet():
 def test_unusable_models_are_refused():
     with pytest.raises(CaseError) as caught:
         hanning_model(np.ones((2, 3)), [0.0, 1.0, 2.0])
-    assert caught.value.code == "E-FIELD"
+    assert caught.value.code == "E-SHAPE"
     for width in (0.0, 7.0, np.nan):
         with pytest.raises(CaseError) as caught:
             hanning_model(np.ones((2, 3)), [0.0, 1.0], width=width)
-        assert caught.value.code == "E-WINDOW"
+        assert caught.value.code == "E-RANGE"

@@ -155,19 +155,19 @@ def test_unusable_requests_are_refused():
     spectrum = spectrum_of({108: 1.0})
     several = OrderSpectrum(np.arange(10), np.ones((2, 10), dtype=complex))
     refused = [
-        (lambda: order_spectrum([1.0]), "E-SIGNAL"),
-        (lambda: order_spectrum([1.0, np.nan]), "E-SIGNAL"),
-        (lambda: order_spectrum(np.ones(8), revolutions=0), "E-SIGNAL"),
-        (lambda: order_spectrum(np.ones(8), revolutions=1.5), "E-SIGNAL"),
-        (lambda: band_pass(spectrum, 0, 10), "E-BAND"),
-        (lambda: band_pass(spectrum, 500, 600), "E-BAND"),
-        (lambda: analyse_band(spectrum, 108, 9), "E-BAND"),
+        (lambda: order_spectrum([1.0]), "E-SHAPE"),
+        (lambda: order_spectrum([1.0, np.nan]), "E-SHAPE"),
+        (lambda: order_spectrum(np.ones(8), revolutions=0), "E-SHAPE"),
+        (lambda: order_spectrum(np.ones(8), revolutions=1.5), "E-SHAPE"),
+        (lambda: band_pass(spectrum, 0, 10), "E-RANGE"),
+        (lambda: band_pass(spectrum, 500, 600), "E-RANGE"),
+        (lambda: analyse_band(spectrum, 108, 9), "E-RANGE"),
         (lambda: analyse_band(spectrum, 0, 1), "E-TEETH"),
-        (lambda: analytic_signal(spectrum, samples=800), "E-SAMPLES"),
-        (lambda: dominant_lines(several, low=1, high=5), "E-SIGNAL"),
-        (lambda: count_lobes(np.ones((2, 9))), "E-SIGNAL"),
-        (lambda: count_lobes(-np.ones(9)), "E-SIGNAL"),
-        (lambda: count_lobes(np.ones(9), threshold=1.5), "E-SIGNAL"),
+        (lambda: analytic_signal(spectrum, samples=800), "E-HARMONICS"),
+        (lambda: dominant_lines(several, low=1, high=5), "E-SHAPE"),
+        (lambda: count_lobes(np.ones((2, 9))), "E-SHAPE"),
+        (lambda: count_lobes(-np.ones(9)), "E-SHAPE"),
+        (lambda: count_lobes(np.ones(9), threshold=1.5), "E-SHAPE"),
     ]
     for call, code in refused:
         with pytest.raises(CaseError) as caught:

@@ -125,4 +125,4 @@ def test_linear_form_tends_to_the_exact_one_with_the_square_of_the_spacing():
 def test_unusable_points_are_refused(points):
     with pytest.raises(CaseError) as caught:
         heaviside_linear_lines(random_field(2, 3), 108, 5.0, 0.0, points=points)
-    assert caught.value.code == "E-POINTS"
+    assert caught.value.code == "E-SYMMETRY"

@@ -250,7 +250,7 @@ def test_case_file_follows_its_torques_or_says_who_drives():
     for variant in (BENDING, TORSIONAL):
         given = case_model(with_value(case, key, second), variant)
         assert given.train.parallel[0].driver == second
-    with pytest.raises(CaseError, match="E-BODY") as caught:
+    with pytest.raises(CaseError, match="E-CHOICE") as caught:
         with_value(case, key, "nobody")
     assert key in str(caught.value) and first in str(caught.value)
 
@@ -258,5 +258,5 @@ def test_case_file_follows_its_torques_or_says_who_drives():
 def test_case_file_of_a_planetary_stage():
     case = read_case(OWN.with_name("wind_turbine_drivetrain.toml"))
     assert case_model(with_value(case, "planetary[0].driver", "sun")).train.planetary[0].flank == -1
-    with pytest.raises(CaseError, match="E-BODY"):
+    with pytest.raises(CaseError, match="E-CHOICE"):
         with_value(case, "planetary[0].driver", "rotor")

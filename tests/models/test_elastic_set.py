@@ -342,7 +342,7 @@ def test_meshes_that_cannot_be_linearised_are_refused():
     assert caught.value.code == "E-CONTACT-OPEN"
     with pytest.raises(ContactError) as caught:
         mesh_excitation(k, still, force, 30 * C, backlash=0.0)
-    assert caught.value.code == "E-RING-COMPLIANCE"
+    assert caught.value.code == "E-CONTACT-COMPLIANCE"
 
 
 def test_motor_and_brake_follow_the_driven_member():

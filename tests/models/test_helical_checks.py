@@ -25,7 +25,7 @@ from femgear.system.rigid_bodies import CENTRAL, HelicalBody, HelicalSupport, Pl
     ],
 )
 def test_bodies_and_supports_that_cannot_be_are_refused(make, text):
-    with pytest.raises(CaseError, match="E-HELICAL") as caught:
+    with pytest.raises(CaseError, match="E-RANGE") as caught:
         make()
     assert text in caught.value.message
 

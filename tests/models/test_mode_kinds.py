@@ -218,7 +218,7 @@ def test_unequal_planets_have_honest_phase_shares():
         assert share[j] == pytest.approx(1 - (rest**2).sum(axis=0) / (shape**2).sum(axis=0), abs=1e-12)
     assert share[0, 0] == pytest.approx(1.0) and share[1, 1] == pytest.approx(1.0)
     assert phasing(motions)[2] == "mixed"
-    with pytest.raises(CaseError, match="E-SPACING"):
+    with pytest.raises(CaseError, match="E-SYMMETRY"):
         phase_shares(motions, signed=True)
 
 

@@ -310,17 +310,17 @@ def test_bearing_columns_carry_what_left_the_stiffness():
 @pytest.mark.parametrize(
     ("changes", "code", "word"),
     [
-        ({"sun": PlanarBody(0.0, 1.0)}, "E-PLANAR", "sun: mass"),
-        ({"ring": PlanarBody(1.0, math.nan)}, "E-PLANAR", "ring: inertia"),
-        ({"carrier": PlanarBody(1.0, 1.0, -1.0)}, "E-PLANAR", "carrier: support"),
-        ({"planet": PlanarBody(1.0, 1.0, 1e8)}, "E-PLANAR", "planet_bearing"),
-        ({"planet_angles": [0.0, 120.0, 240.0]}, "E-PLANAR", "radians"),
-        ({"planet_angles": [0.0, 0.0, 1.0]}, "E-PLANAR", "ascending"),
-        ({"pressure_angle_sun_planet": 24.6}, "E-PLANAR", "radians"),
-        ({"stiffness_planet_ring": [1e8, 1e8]}, "E-PLANAR", "2 values"),
-        ({"stiffness_sun_planet": 0.0}, "E-PLANAR", "above 0"),
-        ({"planet_bearing": -1e8}, "E-PLANAR", "above 0, or infinite"),
-        ({"centre_distance": 0.0}, "E-PLANAR", "centre distance"),
+        ({"sun": PlanarBody(0.0, 1.0)}, "E-RANGE", "sun: mass"),
+        ({"ring": PlanarBody(1.0, math.nan)}, "E-RANGE", "ring: inertia"),
+        ({"carrier": PlanarBody(1.0, 1.0, -1.0)}, "E-RANGE", "carrier: support"),
+        ({"planet": PlanarBody(1.0, 1.0, 1e8)}, "E-RANGE", "planet_bearing"),
+        ({"planet_angles": [0.0, 120.0, 240.0]}, "E-RANGE", "radians"),
+        ({"planet_angles": [0.0, 0.0, 1.0]}, "E-RANGE", "ascending"),
+        ({"pressure_angle_sun_planet": 24.6}, "E-RANGE", "radians"),
+        ({"stiffness_planet_ring": [1e8, 1e8]}, "E-RANGE", "2 values"),
+        ({"stiffness_sun_planet": 0.0}, "E-RANGE", "above 0"),
+        ({"planet_bearing": -1e8}, "E-RANGE", "above 0, or infinite"),
+        ({"centre_distance": 0.0}, "E-RANGE", "centre distance"),
     ],
 )
 def test_impossible_data_are_refused(changes, code, word):

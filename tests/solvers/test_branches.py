@@ -341,7 +341,7 @@ def test_lost_branch_says_what_to_change():
 def test_refusals():
     with pytest.raises(CaseError, match="E-RANGE"):
         frequency_response_curve(duffing(), (1.0, 1.0), harmonics=3)
-    with pytest.raises(CaseError, match="E-FREQUENCY"):
+    with pytest.raises(CaseError, match="E-RANGE"):
         frequency_response_curve(duffing(), (1.0, 1.2), harmonics=3, base=1)
     with pytest.raises(CaseError, match="start_at"):
         frequency_response_curve(duffing(), (1.0, 1.2), harmonics=3, start_at=1.3)

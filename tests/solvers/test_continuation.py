@@ -272,12 +272,12 @@ def test_refusals():
         continue_curve(circle, [1.0], 0.0, limits=(1.0, -1.0))
     with pytest.raises(CaseError, match="outside the range"):
         continue_curve(circle, [1.0], 3.0, limits=(-1.0, 1.0))
-    with pytest.raises(CaseError, match="E-SCALE"):
+    with pytest.raises(CaseError, match="E-RANGE"):
         continue_curve(circle, [1.0], 0.0, limits=(-1.0, 1.0), scale=0.0)
-    with pytest.raises(CaseError, match="E-STEP"):
+    with pytest.raises(CaseError, match="E-RANGE"):
         StepOptions(smallest=1.0)
     with pytest.raises(ConvergenceError, match="E-START"):
         continue_curve(circle, [0.5], 1.5, limits=(-2.0, 2.0))
     known = continue_curve(circle, [1.0], 0.0, limits=(-2.0, 2.0))
-    with pytest.raises(CaseError, match="E-BRANCH"):
+    with pytest.raises(CaseError, match="E-CONVERGENCE"):
         switch_branch(circle, known, 3, limits=(-2.0, 2.0))

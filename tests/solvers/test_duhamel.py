@@ -151,9 +151,9 @@ def test_damping_that_couples_the_modes_needs_the_full_route(history):
 def test_bad_input_is_refused(history):
     t, force = history
     for arguments, options, code in (
-        ((t**1.01, force), {}, "E-TIMES"),
+        ((t**1.01, force), {}, "E-RANGE"),
         ((t, force[:-1]), {}, "E-SHAPE"),
-        ((t, force), {"route": "fast"}, "E-METHOD"),
+        ((t, force), {"route": "fast"}, "E-CHOICE"),
         ((t, force), {"route": "guyan", "masters": [0, 9]}, "E-MASTERS"),
     ):
         with pytest.raises(CaseError) as error:

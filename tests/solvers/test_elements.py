@@ -161,7 +161,7 @@ def test_polynomial_and_piecewise_laws():
         (lambda: GearMeshes([-1], constant([1.0])), "E-SHAPE"),
         (lambda: GearMeshes([0, 1], constant([1.0])), "E-SHAPE"),
         (lambda: GearMeshes([0], constant([1.0]), backlash=-1e-6), "E-BACKLASH"),
-        (lambda: GearMeshes([0], constant([1.0]), smoothing=-1.0), "E-SMOOTHING"),
+        (lambda: GearMeshes([0], constant([1.0]), smoothing=-1.0), "E-RANGE"),
         (lambda: RadialBearings([[0, 1]], -1.0), "E-BEARING"),
         (lambda: RadialBearings([[0, 1]], 1.0, clearance=np.nan), "E-BEARING"),
         (lambda: RadialBearings([[0, 1]], 1.0, springs=2), "E-BEARING"),

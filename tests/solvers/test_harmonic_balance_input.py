@@ -27,19 +27,19 @@ def two_base_problem():
 @pytest.mark.parametrize(
     ("options", "code"),
     [
-        ({}, "E-LINES"),
-        ({"harmonics": 3, "orders": [[0], [1]]}, "E-LINES"),
-        ({"orders": [[1], [0]]}, "E-LINES"),
-        ({"orders": [[0], [2]]}, "E-LINES"),
-        ({"harmonics": 3, "samples": 6}, "E-SAMPLES"),
-        ({"harmonics": 3, "samples": (8, 8)}, "E-SAMPLES"),
-        ({"harmonics": 3, "frequency": -1.0}, "E-FREQUENCY"),
-        ({"harmonics": 3, "frequency": np.nan}, "E-FREQUENCY"),
-        ({"harmonics": 3, "frequency": [1.0, 2.0]}, "E-FREQUENCY"),
+        ({}, "E-HARMONICS"),
+        ({"harmonics": 3, "orders": [[0], [1]]}, "E-HARMONICS"),
+        ({"orders": [[1], [0]]}, "E-HARMONICS"),
+        ({"orders": [[0], [2]]}, "E-HARMONICS"),
+        ({"harmonics": 3, "samples": 6}, "E-HARMONICS"),
+        ({"harmonics": 3, "samples": (8, 8)}, "E-HARMONICS"),
+        ({"harmonics": 3, "frequency": -1.0}, "E-RANGE"),
+        ({"harmonics": 3, "frequency": np.nan}, "E-RANGE"),
+        ({"harmonics": 3, "frequency": [1.0, 2.0]}, "E-RANGE"),
         ({"harmonics": 3, "start": np.zeros((1, 3))}, "E-START"),
         ({"harmonics": 3, "start": np.full((1, 4), np.nan)}, "E-START"),
-        ({"harmonics": 3, "tolerance": 0.0}, "E-TOLERANCE"),
-        ({"harmonics": 3, "max_iterations": 0}, "E-TOLERANCE"),
+        ({"harmonics": 3, "tolerance": 0.0}, "E-RANGE"),
+        ({"harmonics": 3, "max_iterations": 0}, "E-RANGE"),
         ({"harmonics": -1}, "E-HARMONICS"),
     ],
 )
@@ -53,7 +53,7 @@ def test_input_that_cannot_be_used_is_refused(options, code):
 def test_lines_need_an_order_for_every_base():
     with pytest.raises(CaseError) as error:
         harmonic_balance(two_base_problem(), orders=[[0], [1]])
-    assert error.value.code == "E-LINES"
+    assert error.value.code == "E-HARMONICS"
 
 
 def test_reduction_of_another_problem_is_refused():

@@ -212,7 +212,7 @@ def test_no_verdict_is_never_stable(duffing):
 def test_kinds_of_loss_and_refusals(duffing):
     assert [loss_of(v) for v in (1.2 + 0j, -1.2 + 0j, 0.9 + 0.8j)] == ["fold", "flip", "Neimark-Sacker"]
     problem, solution = pair(duffing, 1.2, 5)
-    with pytest.raises(CaseError, match="E-METHOD"):
+    with pytest.raises(CaseError, match="E-CHOICE"):
         floquet_verdict(problem, solution, method="guess")
     constant_spring = oscillator(
         0.1, (GearMeshes(np.array([0]), constant([1.0]), separates=False),), load=1.0

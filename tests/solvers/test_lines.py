@@ -48,7 +48,7 @@ def test_distinct_lines_drop_mirror_images_and_repetitions():
 def test_lines_that_cannot_be_used_are_refused(orders, word):
     with pytest.raises(CaseError, match=word) as error:
         checked_lines(orders)
-    assert error.value.code == "E-LINES"
+    assert error.value.code == "E-HARMONICS"
 
 
 @pytest.mark.parametrize("call", [lambda: harmonic_lines(-1), lambda: side_bands(3, 2.5, 1)])

@@ -88,13 +88,13 @@ def test_chaotic_pair_by_tangents_and_by_neighbours():
 @pytest.mark.parametrize(
     "options, code",
     [
-        ({"count": 3}, "E-LYAPUNOV"),
-        ({"points": 3}, "E-LYAPUNOV"),
-        ({"skip": -1}, "E-LYAPUNOV"),
-        ({"directions": 0}, "E-LYAPUNOV"),
-        ({"method": "Radau"}, "E-METHOD"),
+        ({"count": 3}, "E-RANGE"),
+        ({"points": 3}, "E-RANGE"),
+        ({"skip": -1}, "E-RANGE"),
+        ({"directions": 0}, "E-RANGE"),
+        ({"method": "Radau"}, "E-CHOICE"),
         ({"start": ([0.0, 1.0], [0.0, 1.0])}, "E-START"),
-        ({"steps": 1}, "E-STEP"),
+        ({"steps": 1}, "E-RANGE"),
     ],
 )
 def test_wrong_questions_are_refused(options, code):
@@ -133,13 +133,13 @@ def test_exponents_that_do_not_add_up_are_refused():
     problem = oscillator(GearMeshes([0], constant([1.0]), separates=False), 40.0, 1.0)
     with pytest.raises(ConvergenceError) as caught:
         lyapunov_exponents(problem, 1.0, count=2, points=8, skip=0, steps=8)
-    assert caught.value.code == "E-LYAPUNOV-SUM"
+    assert caught.value.code == "E-INTEGRATION"
 
 
 def test_motion_beyond_all_bounds_is_refused():
     with pytest.raises(ConvergenceError) as caught:
         lyapunov_exponents(unsupported(-1.0, 0.1, 1.0), 1.0, points=60, skip=20)
-    assert caught.value.code == "E-UNBOUNDED"
+    assert caught.value.code == "E-DIVERGED"
 
 
 def test_unstable_rest_by_the_adaptive_method():
@@ -152,11 +152,11 @@ def test_unstable_rest_by_the_adaptive_method():
 @pytest.mark.parametrize(
     "options, code",
     [
-        ({"points": 20.5}, "E-LYAPUNOV"),
-        ({"skip": 1.5}, "E-LYAPUNOV"),
-        ({"seed": -1}, "E-LYAPUNOV"),
-        ({"points": "many"}, "E-LYAPUNOV"),
-        ({"tolerance": 0.0, "method": "DOP853"}, "E-TOLERANCE"),
+        ({"points": 20.5}, "E-RANGE"),
+        ({"skip": 1.5}, "E-RANGE"),
+        ({"seed": -1}, "E-RANGE"),
+        ({"points": "many"}, "E-RANGE"),
+        ({"tolerance": 0.0, "method": "DOP853"}, "E-RANGE"),
     ],
 )
 def test_wrong_numbers_are_refused(options, code):

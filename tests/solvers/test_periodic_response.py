@@ -120,7 +120,7 @@ def test_frequency_zero_has_no_verdict():
         lambda: frequency_response_curve(duffing(), (2.0, 0.0), harmonics=5),
         lambda: parameter_curve(duffing, (0.1, 0.2), 0.0, harmonics=5),
     ):
-        with pytest.raises(CaseError, match="E-FREQUENCY") as caught:
+        with pytest.raises(CaseError, match="E-RANGE") as caught:
             call()
         assert caught.value.value == 0.0 and caught.value.limit and caught.value.remedy
     found = frequency_response_curve(duffing(), (0.0, 0.3), harmonics=5, stability=False)

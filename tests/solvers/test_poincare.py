@@ -58,7 +58,7 @@ def test_linear_motion_is_one_point_at_every_phase():
 def test_bad_input_is_refused():
     problem = oscillator(0.4, 2.0, force=1.0)
     for options in ({"points": 0}, {"phase": 1.5}):
-        with pytest.raises(CaseError, match="E-SECTION"):
+        with pytest.raises(CaseError, match="E-RANGE"):
             stroboscopic_section(problem, 1.0, **options)
-    with pytest.raises(CaseError, match="E-STEP"):
+    with pytest.raises(CaseError, match="E-RANGE"):
         stroboscopic_section(problem, 1.0, steps=2)

@@ -48,7 +48,7 @@ def test_a_base_that_is_not_given_needs_order_zero():
     assert phase_of([1.5], (2, 0)) == 3.0
     with pytest.raises(CaseError) as error:
         phase_of([1.5], (0, 1))
-    assert error.value.code == "E-ORDERS"
+    assert error.value.code == "E-HARMONICS"
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def test_chart_of_a_modal_basis_equals_the_linear_solver(geared_chain, chain_exc
 
 def test_refusals():
     wave = FourierSeries([[1.0, -0.6]])
-    with pytest.raises(CaseError, match="E-FREQUENCY"):
+    with pytest.raises(CaseError, match="E-RANGE"):
         stability_chart(mass(), wave, [0.0], [1.0])
     with pytest.raises(CaseError, match="E-SHAPE"):
         stability_chart(mass(), FourierSeries([[1.0], [1.0]]), [1.0], [1.0])

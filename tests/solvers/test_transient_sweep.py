@@ -82,5 +82,5 @@ def test_a_problem_that_changes_with_the_speed():
 def test_what_does_not_settle_says_so(duffing):
     found = sweep_response(duffing, [1.2], start=([3.0], [0.0]), steps=64, most=5, tolerance=1e-9)
     assert not found.settled[0] and found.periods[0] == 5
-    with pytest.raises(CaseError, match="E-FREQUENCY"):
+    with pytest.raises(CaseError, match="E-RANGE"):
         sweep_response(duffing, [0.0, 1.0])

@@ -96,7 +96,7 @@ def stability_limits() -> tuple[Row, ...]:
         try:
             solve_transient(problem, 0.0, [0.0, 100.1 * step], method=method, step=1.001 * step)
         except CaseError as error:
-            refused = int(error.code == "E-STEP")
+            refused = int(error.code == "E-RANGE")
         rows.append(counted("I2", "theory", f"{method}: 1.001 of the limit refused (1 yes)", 1, refused))
     return tuple(rows)
 

@@ -134,7 +134,7 @@ def _project(master, x, along):
     corner = np.einsum("qkc,qc->qk", master.points[None, 0::2] - x[:, None], along)
     crosses = corner[:, :-1] * corner[:, 1:] <= 0
     if not crosses.any(axis=1).all():
-        raise ContactError("a point of the contact surface has no counterpart", code="E-CONTACT-INPUT")
+        raise ContactError("a point of the contact surface has no counterpart", code="E-SHAPE")
     edge, row = crosses.argmax(axis=1), np.arange(len(x))
     t = corner[row, edge] / (corner[row, edge] - corner[row, edge + 1])
     for _ in range(8):
@@ -186,7 +186,7 @@ def mortar_contact(slave, master, near, load: float, *, centre: float, base_radi
     approach, pressure = _active_set(H, gap, hats.T @ arm, load)
     ends = ((first == 0, pressure[0]), (last == len(slave.nodes) // 2 - 1, pressure[-1]))
     if any(value > 0 and not at_end for at_end, value in ends):
-        raise ContactError("the contact runs out of the edges that may touch", code="E-CONTACT-WINDOW")
+        raise ContactError("the contact runs out of the edges that may touch", code="E-CONTACT")
     corner = slave.points[2 * first : 2 * last + 3 : 2]
     return approach, np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corner, axis=0).T))]), pressure
 
@@ -209,4 +209,4 @@ def _active_set(H, gap, arm, load):
         if np.array_equal(following, active):
             return float(solved[n]), pressure
         active = following
-    raise ContactError("the active set of the two bodies does not settle", code="E-CONTACT-CONVERGENCE")
+    raise ContactError("the active set of the two bodies does not settle", code="E-CONTACT")

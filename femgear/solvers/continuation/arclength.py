@@ -79,12 +79,12 @@ class StepOptions:
     def __post_init__(self):
         if not 0.0 < self.smallest <= self.first or not self.smallest <= self.largest < np.inf:
             raise CaseError(
-                f"steps from {self.smallest} over {self.first} to {self.largest}", code="E-STEP",
+                f"steps from {self.smallest} over {self.first} to {self.largest}", code="E-RANGE",
                 limit="0 < smallest <= first, smallest <= largest",
             )  # fmt: skip
         if min(self.angle, self.contraction, self.tolerance, self.max_iterations - 1, self.max_points) <= 0:
             raise CaseError(
-                "a step option is not positive", code="E-STEP", limit="> 0; two iterations or more"
+                "a step option is not positive", code="E-RANGE", limit="> 0; two iterations or more"
             )
         for name, bound in (("angle", _MOST_ANGLE), ("contraction", _MOST_CONTRACTION)):
             value = getattr(self, name)
@@ -219,7 +219,7 @@ def switch_branch(
     """
     if index not in known.branch_points:
         raise CaseError(
-            f"point {index} is no branch point", code="E-BRANCH",
+            f"point {index} is no branch point", code="E-CONVERGENCE",
             limit=f"one of {known.branch_points.tolist()}",
         )  # fmt: skip
     start = known.points[index]
@@ -234,8 +234,8 @@ def switch_branch(
         tangent = crossing_tangent(curve, point)
     except LostError as error:
         raise ConvergenceError(
-            f"no other curve found at {describe(float(known.parameter[index]))}: {error}", code="E-BRANCH",
-            remedy="disturb the symmetry of the system a little",
+            f"no other curve found at {describe(float(known.parameter[index]))}: {error}",
+            code="E-CONVERGENCE", remedy="disturb the symmetry of the system a little",
         ) from error  # fmt: skip
     along, back = (
         collect(curve, replace(point, tangent=sign * tangent), limits=limits, options=options)
@@ -261,7 +261,7 @@ def scaled_curve(
     unit = high - low if unit is None else unit
     scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
-        raise CaseError("the scales of a curve must be positive", code="E-SCALE", limit="> 0")
+        raise CaseError("the scales of a curve must be positive", code="E-RANGE", limit="> 0")
     curve = ScaledCurve(
         evaluate, scale, float(unit), options.tolerance, options.max_iterations, describe=describe
     )

@@ -217,7 +217,7 @@ def frequency_response_curve(
     Raises
     ------
     CaseError
-        A range, start or base that cannot be used; stability at the frequency zero (E-FREQUENCY).
+        A range, start or base that cannot be used; stability at the frequency zero (E-RANGE).
     ConvergenceError
         No solution at the start.
     """
@@ -227,7 +227,7 @@ def frequency_response_curve(
     others = np.ones(bases) if held is None and bases == 1 else held
     if others is None or np.shape(others) != (bases,) or not 0 <= base < bases:
         raise CaseError(
-            f"base {base} with the other base frequencies {others}", code="E-FREQUENCY", key="held",
+            f"base {base} with the other base frequencies {others}", code="E-RANGE", key="held",
             limit=f"{bases} base frequencies and one of them to vary",
         )  # fmt: skip
     if not 0.0 <= min(frequency) < max(frequency) < np.inf:
@@ -270,7 +270,7 @@ def parameter_curve(
     if chosen.stability:
         require_period(frequency)
     balance = chosen.balance(family(parameter[0] if chosen.start_at is None else chosen.start_at))
-    held = checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s")
+    held = checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s")
     equations = ContinuationProblem(
         balance, tuple(np.atleast_1d(held).tolist()), (min(parameter), max(parameter)), family=family,
         samples=chosen.samples, radius=chosen.with_radius,

@@ -240,7 +240,7 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
     CaseError
         Matrices that do not fit, are not symmetric or not finite.
     ConvergenceError
-        A mass that is not positive definite, or poles that share one vector (E-DEFECTIVE).
+        A mass that is not positive definite, or poles that share one vector (E-SOLVE).
 
     Notes
     -----
@@ -371,11 +371,11 @@ def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     if not np.all(np.isfinite(meshes)) or np.any(meshes < 0.0):
         raise CaseError(
             "mesh stiffnesses must be finite and not negative",
-            code="E-MESH-STIFFNESS", value=meshes.tolist(), limit=">= 0 N/m",
+            code="E-STIFFNESS", value=meshes.tolist(), limit=">= 0 N/m",
         )  # fmt: skip
     if system.gyroscopic is not None and np.any(system.gyroscopic):
         raise CaseError(
-            "real modes cannot carry gyroscopic terms", code="E-GYROSCOPIC", key="gyroscopic",
+            "real modes cannot carry gyroscopic terms", code="E-CHOICE", key="gyroscopic",
             remedy="leave them out of the system that is reduced to modes",
         )  # fmt: skip
     carried = np.diag(meshes)
@@ -509,7 +509,7 @@ def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
         mesh = int(np.argmax((strain - allowed).max(axis=1)))
         raise ConvergenceError(
             f"a motion without stiffness strains column {mesh + 1} of W: its mean stiffness is missing or "
-            "too small", code="E-RIGID-MODE", remedy="give every mesh, bearing or spring a mean stiffness",
+            "too small", code="E-MECHANISM", remedy="give every mesh, bearing or spring a mean stiffness",
         )  # fmt: skip
     work, allowed = np.abs(system.load @ rigid), _allowed(system.load[:, None], rigid)[0]
     if np.any(work > allowed):
@@ -589,7 +589,7 @@ def _inverse(vector: np.ndarray) -> np.ndarray:
     if not size[-1] * _DEFECTIVE > size[0]:
         raise ConvergenceError(
             f"two poles share one vector: condition {size[0] / max(size[-1], 1e-300):.1e} of the modes",
-            code="E-DEFECTIVE", limit=f"{_DEFECTIVE:.0e}",
+            code="E-SOLVE", limit=f"{_DEFECTIVE:.0e}",
             remedy="a mode is critically damped or a speed is critical: change damping or speed a little",
         )  # fmt: skip
     return np.linalg.inv(vector)

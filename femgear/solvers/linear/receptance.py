@@ -94,7 +94,7 @@ def direct_response(
     Raises
     ------
     CaseError
-        Arrays that do not fit (E-SHAPE), frequencies that are none (E-FREQUENCY).
+        Arrays that do not fit (E-SHAPE), frequencies that are none (E-RANGE).
     ConvergenceError
         An undamped resonance, or rigid motions at frequency zero (E-RESONANCE).
     """
@@ -392,7 +392,7 @@ def _check_poles(reduction: Reduction, modal, natural, omega: float) -> None:
     if not error <= _POLES * np.abs(direct).max(initial=np.finfo(float).tiny):
         raise ConvergenceError(
             f"the complex modes give a receptance that is wrong by {error:.2e} of {np.abs(direct).max():.2e}",
-            code="E-DEFECTIVE", remedy="modes are critically damped together: change the damping a little",
+            code="E-SOLVE", remedy="modes are critically damped together: change the damping a little",
         )  # fmt: skip
 
 
@@ -407,7 +407,7 @@ def source_columns(problem: NonlinearSystem, orders: np.ndarray) -> np.ndarray:
     """Amplitudes (1 + 2 n_forces, L) of the load columns of a reduction on the lines ``orders``.
 
     The first column holds the constant load with the forces of order zero. A harmonic force on a line that is
-    not there is refused (E-LINES).
+    not there is refused (E-HARMONICS).
     """
     out = np.zeros((1 + 2 * len(problem.forces), len(orders)), complex)
     out[0, 0] = 1.0
@@ -420,7 +420,7 @@ def source_columns(problem: NonlinearSystem, orders: np.ndarray) -> np.ndarray:
         if np.any(given[bases:]) or not len(same) + len(mirror):
             raise CaseError(
                 f"harmonic force {number + 1} has the orders {tuple(force.orders)}, which no line has",
-                code="E-LINES", remedy="add that line",
+                code="E-HARMONICS", remedy="add that line",
             )  # fmt: skip
         line, sign = (same[0], 1.0) if len(same) else (mirror[0], -1.0)
         out[1 + 2 * number : 3 + 2 * number, line] = 1.0, 1j * sign
@@ -444,7 +444,7 @@ def _checked(frequency, inputs, outputs, n: int):
         or np.any(frequency < 0.0)
     ):
         raise CaseError(
-            f"frequencies of shape {frequency.shape} must be finite and not negative", code="E-FREQUENCY",
+            f"frequencies of shape {frequency.shape} must be finite and not negative", code="E-RANGE",
             key="frequency", limit="a list of one or more numbers >= 0 Hz",
             remedy="list the frequencies of the response",
         )  # fmt: skip

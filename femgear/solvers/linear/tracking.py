@@ -154,9 +154,9 @@ def track_modes(
     Raises
     ------
     CaseError
-        Values that do not ascend or descend (E-VALUES).
+        Values that do not ascend or descend (E-RANGE).
     ConvergenceError
-        Fewer modes at a value than are followed (E-MODE-LOST).
+        Fewer modes at a value than are followed (E-MODES).
     """
     values = np.asarray(values, float)
     if (
@@ -164,7 +164,7 @@ def track_modes(
         or len(values) < 2
         or not (np.all(np.diff(values) > 0) or np.all(np.diff(values) < 0))
     ):
-        raise CaseError("parameter values must ascend or descend", code="E-VALUES", limit="two or more")
+        raise CaseError("parameter values must ascend or descend", code="E-RANGE", limit="two or more")
     root = np.linalg.cholesky(np.asarray(mass, float)).T
     first = _solved(family, float(values[0]), root)
     order = np.argsort(np.abs(first.eigenvalue), kind="stable")[:count]
@@ -226,7 +226,7 @@ def campbell_data(
     Raises
     ------
     CaseError
-        Fewer than two speeds, or speeds that do not ascend or descend (E-VALUES).
+        Fewer than two speeds, or speeds that do not ascend or descend (E-RANGE).
 
     Notes
     -----
@@ -236,7 +236,7 @@ def campbell_data(
     speeds = np.asarray(speeds, float)
     if speeds.ndim != 1 or len(speeds) < 2 or not np.all(np.isfinite(speeds)):
         raise CaseError(
-            f"a Campbell diagram over speeds of shape {speeds.shape}", code="E-VALUES", key="speeds",
+            f"a Campbell diagram over speeds of shape {speeds.shape}", code="E-RANGE", key="speeds",
             limit="two or more finite speeds [rad/s], ascending or descending",
             remedy="list the speeds at which the modes are wanted",
         )  # fmt: skip
@@ -285,7 +285,7 @@ def _assigned(old: _Point, new: _Point) -> tuple[_Point, np.ndarray]:
     m, value = len(old.eigenvalue), new.eigenvalue
     if len(value) < m:
         raise ConvergenceError(
-            f"{m} modes are followed, {len(value)} are there at {new.value:.6g}", code="E-MODE-LOST",
+            f"{m} modes are followed, {len(value)} are there at {new.value:.6g}", code="E-MODES",
             remedy="end before it, or follow fewer modes: one became rigid, overdamped or unstable",
         )  # fmt: skip
     plain = np.abs(old.vector.conj().T @ new.vector) ** 2

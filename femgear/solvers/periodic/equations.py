@@ -258,7 +258,8 @@ def harmonic_balance(
         A rigid motion that strains a column, see `reduced`.
     """
     if (harmonics is None) == (orders is None):
-        raise CaseError("give the number of harmonics or the lines", code="E-LINES", limit="one of the two")
+        words = "give the number of harmonics or the lines"
+        raise CaseError(words, code="E-HARMONICS", limit="one of the two")
     if orders is None:
         harmonics = checked_count(harmonics, "harmonics", code="E-HARMONICS", least=0)
         _check_harmonics(problem, harmonics)
@@ -267,13 +268,13 @@ def harmonic_balance(
     bases = orders.shape[1]
     if bases < problem.bases:
         raise CaseError(
-            f"lines of {bases} base frequencies, elements and forces of {problem.bases}", code="E-LINES",
+            f"lines of {bases} base frequencies, elements and forces of {problem.bases}", code="E-HARMONICS",
             remedy="give one order a base frequency",
         )  # fmt: skip
     if samples is not None:
         samples = (samples,) * bases if np.ndim(samples) == 0 else tuple(samples)
         if len(samples) != bases or any(int(count) != count for count in samples):
-            raise CaseError(f"samples {samples} for {bases} base frequencies", code="E-SAMPLES")
+            raise CaseError(f"samples {samples} for {bases} base frequencies", code="E-HARMONICS")
     reduction = reduced(problem) if reduction is None else reduction
     columns, loads = len(reduction.reference), 1 + 2 * len(problem.forces)
     if reduction.static.shape != (columns, columns + loads) or columns != problem.system.W.shape[1]:
@@ -293,18 +294,18 @@ def reduced(problem: NonlinearSystem) -> Reduction:
     Raises
     ------
     ConvergenceError
-        A motion without stiffness strains an element (E-RIGID-MODE).
+        A motion without stiffness strains an element (E-MECHANISM).
     """
     try:
         return reduce_problem(problem)
     except ConvergenceError as error:
         total = np.abs(problem.reference)
         column = int(np.argmin(total))
-        if error.code != "E-RIGID-MODE" or total[column] > _NO_STIFFNESS * total.max():
+        if error.code != "E-MECHANISM" or total[column] > _NO_STIFFNESS * total.max():
             raise
         raise ConvergenceError(
             f"{element_name(problem, column)} has no linear stiffness, and nothing else holds the motion "
-            "that strains it", code="E-RIGID-MODE", limit="a stiffness at rest, or a reference in its place",
+            "that strains it", code="E-MECHANISM", limit="a stiffness at rest, or a reference in its place",
             remedy="where it stiffens with the deflection pass reduction=reduce_problem(problem, "
             "reference=stiffness of every column at the expected amplitude [N/m]); else give it a stiffness",
         ) from error  # fmt: skip

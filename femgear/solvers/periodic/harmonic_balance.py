@@ -76,7 +76,7 @@ def solve_harmonic_balance(
     Raises
     ------
     CaseError
-        Input that cannot be used, two equal base frequencies (E-FREQUENCY). Where other lines have one
+        Input that cannot be used, two equal base frequencies (E-RANGE). Where other lines have one
         frequency, the message names them.
     ConvergenceError
         An undamped resonance of the system with reference springs at a line.
@@ -84,7 +84,7 @@ def solve_harmonic_balance(
     balance = harmonic_balance(problem, **equations)
     frequency = _checked_frequency(balance, frequency)
     tolerance = checked_tolerance(tolerance)
-    max_iterations = checked_count(max_iterations, "max_iterations", code="E-TOLERANCE")
+    max_iterations = checked_count(max_iterations, "max_iterations", code="E-RANGE")
     found = newton(balance, frequency, _start(balance, frequency, start), tolerance, max_iterations)
     if start is None and not found.converged:
         found = embed(balance, frequency, found, tolerance, max_iterations)
@@ -236,7 +236,7 @@ def periodic_response(
     Raises
     ------
     CaseError
-        Input that cannot be used, a single base frequency of zero (E-FREQUENCY).
+        Input that cannot be used, a single base frequency of zero (E-RANGE).
     ConvergenceError
         An undamped resonance of the system with reference springs at a line.
     """
@@ -409,14 +409,14 @@ def _message(converged: bool, steps: int, residual: float, trouble: str, toleran
 
 def _checked_frequency(balance: HarmonicBalance, frequency) -> np.ndarray:
     """Base frequencies (n_bases,), finite and not negative."""
-    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     if frequency.shape != balance.orders.shape[1:]:
         raise CaseError(
-            f"{frequency.size} base frequencies for lines of {balance.orders.shape[1]}", code="E-FREQUENCY"
+            f"{frequency.size} base frequencies for lines of {balance.orders.shape[1]}", code="E-RANGE"
         )
     if not np.all(np.isfinite(frequency)) or np.any(frequency < 0.0):
         raise CaseError(
-            f"base frequencies {frequency.tolist()} rad/s", code="E-FREQUENCY", limit="finite, not negative"
+            f"base frequencies {frequency.tolist()} rad/s", code="E-RANGE", limit="finite, not negative"
         )
     near = np.abs(frequency[:, None] - frequency) <= 1e-9 * frequency.max(initial=0.0)
     equal = near & (frequency > 0.0)
@@ -424,7 +424,7 @@ def _checked_frequency(balance: HarmonicBalance, frequency) -> np.ndarray:
         one, other = np.eye(len(frequency), dtype=int)[np.argwhere(same)[0]].tolist()
         raise CaseError(
             f"base frequencies {frequency.tolist()} rad/s: the lines {one} and {other} are one",
-            code="E-FREQUENCY", key="frequency", limit="no two base frequencies equal to 1e-9",
+            code="E-RANGE", key="frequency", limit="no two base frequencies equal to 1e-9",
             remedy="take one base frequency and add up the orders of elements and forces",
         )  # fmt: skip
     return frequency

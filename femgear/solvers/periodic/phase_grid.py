@@ -120,7 +120,7 @@ def phase_grid(orders: np.ndarray, samples: tuple[int, ...]) -> PhaseGrid:
     for base, (count, highest) in enumerate(zip(samples, top)):
         if count < 2 * highest + 1:
             raise CaseError(
-                f"{count} samples along base {base + 1} cannot show order {highest}", code="E-SAMPLES",
+                f"{count} samples along base {base + 1} cannot show order {highest}", code="E-HARMONICS",
                 limit=f"at least {2 * highest + 1}", remedy="ask for more samples or fewer harmonics",
             )  # fmt: skip
     axes = [2.0 * np.pi * np.arange(count) / count for count in samples]

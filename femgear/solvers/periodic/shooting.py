@@ -113,7 +113,7 @@ class ShootingOptions:
     radius: bool = True
 
     def __post_init__(self):
-        most = checked_count(self.max_iterations, "max_iterations", code="E-TOLERANCE")
+        most = checked_count(self.max_iterations, "max_iterations", code="E-RANGE")
         for name, value in (
             ("tolerance", checked_tolerance(self.tolerance)),
             ("integration", checked_tolerance(self.integration, "integration")),
@@ -122,7 +122,7 @@ class ShootingOptions:
             object.__setattr__(self, name, value)
         if self.harmonics < 1 or self.samples < 4 * self.harmonics:
             raise CaseError(
-                f"{self.harmonics} harmonics, {self.samples} samples", code="E-SHOOTING",
+                f"{self.harmonics} harmonics, {self.samples} samples", code="E-RANGE",
                 limit="a harmonic or more, four samples a harmonic or more",
             )  # fmt: skip
 
@@ -170,12 +170,12 @@ def solve_shooting(
     Raises
     ------
     CaseError
-        Frequencies without the common period or more of them than the problem has (E-FREQUENCY), numbers
-        out of range (tolerances: E-TOLERANCE), a start that does not fit (E-START).
+        Frequencies without the common period or more of them than the problem has (E-RANGE), numbers
+        out of range (tolerances: E-RANGE), a start that does not fit (E-START).
     """
     frequency, chosen = checked_bases(problem, frequency), ShootingOptions(**options)
     period = common_period(frequency, periods)
-    segments = checked_count(segments, "segments", code="E-SHOOTING")
+    segments = checked_count(segments, "segments", code="E-RANGE")
     start = checked_start(problem, _settled(problem, frequency, period, settle) if start is None else start)
     moving = flow(problem, frequency, variational=True)
     unknowns = _guess(moving, start, period, segments, chosen.integration)

@@ -333,7 +333,7 @@ def _checked(modes, excitation, mesh_frequency, method, tolerance, max_iteration
     if np.any(bad):
         raise CaseError(
             "mesh frequencies must be finite and not negative",
-            code="E-FREQUENCY", key="mesh_frequency", value=float(frequency[bad][0]), limit=">= 0 Hz",
+            code="E-RANGE", key="mesh_frequency", value=float(frequency[bad][0]), limit=">= 0 Hz",
         )  # fmt: skip
     if len(modes.mesh_stiffness) != len(excitation.stiffness):
         raise CaseError(
@@ -342,13 +342,13 @@ def _checked(modes, excitation, mesh_frequency, method, tolerance, max_iteration
         )  # fmt: skip
     if method not in ("auto", "fixed point", "direct"):
         raise CaseError(
-            f"unknown method {method!r}", code="E-METHOD", key="method", value=method,
+            f"unknown method {method!r}", code="E-CHOICE", key="method", value=method,
             limit="auto, fixed point, direct",
         )  # fmt: skip
     if not 1e-12 <= tolerance < 1.0 or max_iterations < 1:
         raise CaseError(
             f"tolerance {tolerance} and {max_iterations} iterations cannot be used",
-            code="E-TOLERANCE", limit="1e-12 <= tolerance < 1, at least one iteration",
+            code="E-RANGE", limit="1e-12 <= tolerance < 1, at least one iteration",
         )  # fmt: skip
     return frequency
 

@@ -393,7 +393,7 @@ def floquet_verdicts(
     Raises
     ------
     CaseError
-        An unknown method, a tolerance that is not between 0 and 1 (E-TOLERANCE).
+        An unknown method, a tolerance that is not between 0 and 1 (E-RANGE).
     ConvergenceError
         Modes left out that are too flexible.
 
@@ -404,7 +404,7 @@ def floquet_verdicts(
     """
     if method not in ("monodromy", "hill"):
         raise CaseError(
-            f"stability by {method!r}", code="E-METHOD", key="method", limit='"monodromy" or "hill"'
+            f"stability by {method!r}", code="E-CHOICE", key="method", limit='"monodromy" or "hill"'
         )
     tolerance = checked_tolerance(tolerance)
     frame = frame_of(problem, modes=modes)
@@ -442,11 +442,11 @@ def judged(
 
 
 def require_period(frequency) -> None:
-    """Refuse the single base frequency zero, which has no period to judge stability over (E-FREQUENCY)."""
-    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    """Refuse the single base frequency zero, which has no period to judge stability over (E-RANGE)."""
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     if frequency.size == 1 and frequency.ravel()[0] == 0.0:
         raise CaseError(
-            "stability needs a period, and the base frequency is zero", code="E-FREQUENCY", key="frequency",
+            "stability needs a period, and the base frequency is zero", code="E-RANGE", key="frequency",
             value=0.0, limit="> 0 rad/s",
             remedy="give a positive frequency, or solve without stability: solve_harmonic_balance, "
             "stability=False of a curve",

@@ -173,15 +173,15 @@ class LyapunovOptions:
     def __post_init__(self):
         least = {"points": 2 * _PARTS, "skip": 0, "directions": 1, "count": 1, "seed": 0}
         for name, lowest in least.items():
-            number = checked_count(getattr(self, name), name, code="E-LYAPUNOV", least=lowest)
+            number = checked_count(getattr(self, name), name, code="E-RANGE", least=lowest)
             object.__setattr__(self, name, number)
         if self.method not in _COARSER:
             raise CaseError(
-                f"exponents by {self.method!r}", code="E-METHOD", key="method",
+                f"exponents by {self.method!r}", code="E-CHOICE", key="method",
                 limit="average acceleration or DOP853",
             )  # fmt: skip
-        object.__setattr__(self, "steps", checked_count(self.steps, "steps", code="E-STEP", least=8))
-        object.__setattr__(self, "periods", checked_count(self.periods, "periods", code="E-FREQUENCY"))
+        object.__setattr__(self, "steps", checked_count(self.steps, "steps", code="E-RANGE", least=8))
+        object.__setattr__(self, "periods", checked_count(self.periods, "periods", code="E-RANGE"))
         object.__setattr__(self, "tolerance", checked_tolerance(self.tolerance))
 
 
@@ -201,11 +201,11 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
     Raises
     ------
     CaseError
-        Numbers out of range (E-LYAPUNOV, E-TOLERANCE), frequencies without the common period, an unknown
+        Numbers out of range (E-RANGE, E-RANGE), frequencies without the common period, an unknown
         method.
     ConvergenceError
-        A step whose column equations do not converge, a motion beyond all bounds (E-UNBOUNDED), exponents
-        whose sum is not the divergence (E-LYAPUNOV-SUM).
+        A step whose column equations do not converge, a motion beyond all bounds (E-DIVERGED), exponents
+        whose sum is not the divergence (E-INTEGRATION).
 
     Notes
     -----
@@ -214,12 +214,12 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
     """
     chosen = LyapunovOptions(**options)
     count, points = chosen.count, chosen.points
-    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     start = checked_start(problem, start)
     finer, coarser = _both_runs(problem, frequency, chosen)
     if count > finer.size:
         raise CaseError(
-            f"{count} exponents", code="E-LYAPUNOV", key="count", limit=f"1 to {finer.size}, two a coordinate"
+            f"{count} exponents", code="E-RANGE", key="count", limit=f"1 to {finer.size}, two a coordinate"
         )
     random = np.random.default_rng(chosen.seed)
     frames = np.linalg.qr(random.standard_normal((chosen.directions, finer.size, count)))[0]
@@ -281,7 +281,7 @@ def _check_sum(exponents, scatter, run) -> None:
     if off > max(_SUM * np.abs(exponents).max(), _CLEAR * scatter.max(), _ROUNDING / run.period):
         raise ConvergenceError(
             f"the exponents add up to {exponents.sum():.6g} 1/s, the damping to {run.divergence:.6g} 1/s",
-            code="E-LYAPUNOV-SUM", limit="the same to 2 % of the largest one",
+            code="E-INTEGRATION", limit="the same to 2 % of the largest one",
             remedy="take more steps a period or a smaller tolerance",
         )  # fmt: skip
 
@@ -289,7 +289,7 @@ def _check_sum(exponents, scatter, run) -> None:
 def _bounded(q, v) -> None:
     if not (np.abs(q).max(initial=0.0) < _BEYOND and np.abs(v).max(initial=0.0) < _BEYOND):
         raise ConvergenceError(
-            "the motion grows beyond all bounds and has no attractor", code="E-UNBOUNDED",
+            "the motion grows beyond all bounds and has no attractor", code="E-DIVERGED",
             limit=f"displacements and velocities below {_BEYOND:g}",
             remedy="start elsewhere, or give supports or damping that hold the motion",
         )  # fmt: skip

@@ -104,7 +104,7 @@ def stability(
     frequency = np.atleast_1d(np.array(mesh_frequency, dtype=float))
     if frequency.ndim != 1 or not np.all(np.isfinite(frequency)) or np.any(frequency <= 0.0):
         raise CaseError(
-            "a period needs finite, positive mesh frequencies", code="E-FREQUENCY", key="mesh_frequency",
+            "a period needs finite, positive mesh frequencies", code="E-RANGE", key="mesh_frequency",
             value=frequency.tolist(), limit="> 0 Hz",
         )  # fmt: skip
     if not frequency_ratio >= 1.0:
@@ -222,8 +222,8 @@ def stability_chart(
         Modes left out of a modal basis are too flexible.
     """
     tolerance = checked_tolerance(tolerance)
-    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
-    depth = np.atleast_1d(checked_numbers(depth, "depth", code="E-CHART", unit=""))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
+    depth = np.atleast_1d(checked_numbers(depth, "depth", code="E-RANGE", unit=""))
     frame, series, breaks = _prepared(system, stiffness, harmonics)
     f, d = (grid.ravel() for grid in np.meshgrid(frequency, depth, indexing="ij"))
     multiplier, error = _largest_of_cells(frame, series, breaks, f, d, tolerance)
@@ -266,7 +266,7 @@ def stability_boundary(
     from scipy.optimize import root_scalar
 
     if (frequency is None) == (depth is None):
-        raise CaseError("hold the frequency or the depth", code="E-CHART", limit="exactly one of the two")
+        raise CaseError("hold the frequency or the depth", code="E-RANGE", limit="exactly one of the two")
     tolerance = checked_tolerance(tolerance)
     frame, series, breaks = _prepared(system, stiffness, harmonics)
 
@@ -278,7 +278,7 @@ def stability_boundary(
     ends = np.array([growth(value) for value in between])
     if np.count_nonzero(ends > CIRCLE) != 1:
         raise CaseError(
-            f"largest multipliers {np.exp(ends).tolist()} at {list(between)}", code="E-CHART", key="between",
+            f"largest multipliers {np.exp(ends).tolist()} at {list(between)}", code="E-RANGE", key="between",
             limit="one end stable, the other one not",
         )  # fmt: skip
     if ends.min() < -CIRCLE:
@@ -314,7 +314,7 @@ def _largest_of_cells(
     """Multiplier of largest modulus and error (p,) of pairs of frequency and depth."""
     if not np.all(np.isfinite(depth)) or not np.all(np.isfinite(frequency)) or np.any(frequency <= 0.0):
         raise CaseError(
-            "a chart needs positive frequencies and finite depths", code="E-FREQUENCY", limit="> 0 rad/s"
+            "a chart needs positive frequencies and finite depths", code="E-RANGE", limit="> 0 rad/s"
         )
     eye, mean, fluctuation = np.eye(len(frame.rows)), series.mean, _fluctuation(series)
     multiplier, error = np.empty(len(frequency), complex), np.zeros(len(frequency))
@@ -339,7 +339,7 @@ def _largest_of_cells(
     if np.any(error > 1e3 * tolerance):
         raise ConvergenceError(
             f"the monodromy matrix has an error of {error.max():.1e}, aimed at {tolerance:.1e}",
-            code="E-MONODROMY", remedy="take a looser tolerance or fewer harmonics",
+            code="E-CONVERGENCE", remedy="take a looser tolerance or fewer harmonics",
         )  # fmt: skip
     return multiplier, error
 

@@ -192,7 +192,7 @@ def trajectory(
             taken += 1
             if taken > max_steps:
                 raise ConvergenceError(
-                    f"more than {max_steps} steps up to {t1:.6g} s of {end:.6g} s", code="E-STEPS",
+                    f"more than {max_steps} steps up to {t1:.6g} s of {end:.6g} s", code="E-INTEGRATION",
                     remedy="loosen the tolerance, shorten the time or take method Radau",
                 )  # fmt: skip
             yield t0, t1, dense
@@ -292,7 +292,7 @@ def _smooth_pieces(motion: Flow, law: Contacts, y, t, stop, small, method, toler
                 t, y, law = t1, dense(t1), law.flipped(which)
         if stuck > _CHATTER:
             raise ConvergenceError(
-                f"contact opens and closes without end at {t:.9g} s", code="E-CHATTER",
+                f"contact opens and closes without end at {t:.9g} s", code="E-INTEGRATION",
                 remedy="integrate without events or with a smoothing length",
             )  # fmt: skip
         if not changed:
@@ -303,7 +303,7 @@ def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
     from scipy import integrate
 
     if method not in METHODS or (motion.variational and method != "DOP853"):
-        raise CaseError(f"no integrator {method}", code="E-METHOD", limit=", ".join(METHODS))
+        raise CaseError(f"no integrator {method}", code="E-CHOICE", limit=", ".join(METHODS))
     options = {"rtol": max(tolerance, 3e-14), "atol": atol}
     if first is not None:
         options["first_step"] = min(first, stop - t)
@@ -491,7 +491,7 @@ def stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, float
             if isinstance(series, StepSeries) and len(series.breaks) > 1:
                 rate = float(phase_of(frequency, series.orders)) / (2.0 * np.pi)
                 if rate < 0.0:
-                    raise CaseError("a step series runs backwards", code="E-FREQUENCY", limit="rates above 0")
+                    raise CaseError("a step series runs backwards", code="E-RANGE", limit="rates above 0")
                 if rate:
                     found.append((series.breaks, rate))
     return found

@@ -56,13 +56,13 @@ class StepRule:
         numbers = np.array([self.gamma, self.beta, self.mass, self.force], float)
         if not np.all(np.isfinite(numbers)) or self.beta < 0.0 or max(self.mass, self.force) >= 1.0:
             raise CaseError(
-                f"a step rule with gamma = {self.gamma}, beta = {self.beta}", code="E-STEP-RULE",
+                f"a step rule with gamma = {self.gamma}, beta = {self.beta}", code="E-RANGE",
                 limit="finite numbers, beta of 0 or more, weights below 1",
             )  # fmt: skip
         # below this the rule feeds energy in at every step length
         if self.gamma < 0.5 - self.mass + self.force - 1e-12:
             raise CaseError(
-                f"a step rule with gamma = {self.gamma} has negative damping", code="E-STEP-RULE",
+                f"a step rule with gamma = {self.gamma} has negative damping", code="E-RANGE",
                 limit=f"gamma of {0.5 - self.mass + self.force:.4g} or more", remedy="take gamma = 1/2",
             )  # fmt: skip
 
@@ -94,7 +94,7 @@ def generalised_alpha(radius: float) -> StepRule:
     """
     if not 0.0 <= radius <= 1.0:
         raise CaseError(
-            f"a spectral radius of {radius} at infinite frequency", code="E-STEP-RULE", limit="0 to 1"
+            f"a spectral radius of {radius} at infinite frequency", code="E-RANGE", limit="0 to 1"
         )
     mass, force = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
     return StepRule(0.5 - mass + force, 0.25 * (1.0 - mass + force) ** 2, mass, force)
@@ -319,7 +319,7 @@ def modal_scheme(problem: NonlinearSystem, step: float, *, count: int | None = N
     system = problem.system
     if system.gyroscopic is not None and problem.speed and np.any(system.gyroscopic):
         raise CaseError(
-            "modal steps cannot carry gyroscopic terms", code="E-GYROSCOPIC", key="method",
+            "modal steps cannot carry gyroscopic terms", code="E-CHOICE", key="method",
             remedy='take method "average acceleration" or "generalised alpha"',
         )  # fmt: skip
     system = replace(system, gyroscopic=None)

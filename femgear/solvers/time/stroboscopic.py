@@ -95,10 +95,11 @@ def stroboscopic_map(
     CaseError
         Base frequencies that do not repeat then, steps out of range or beyond the stability limit.
     """
-    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-FREQUENCY", unit="rad/s"))
+    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     period = common_period(frequency, periods)
     if not 4 <= steps <= _MOST_STEPS:
-        raise CaseError(f"{steps} steps in a period", code="E-STEP", key="steps", limit=f"4 to {_MOST_STEPS}")
+        limit = f"4 to {_MOST_STEPS}"
+        raise CaseError(f"{steps} steps in a period", code="E-RANGE", key="steps", limit=limit)
     scheme, _ = step_scheme(problem, frequency, method, period / steps, period / steps)
     theta = (period * np.arange(steps + 1) / steps)[:, None] * frequency
     # the last instant is the first of the next period
@@ -110,17 +111,17 @@ def stroboscopic_map(
 
 def common_period(frequency, periods: int) -> float:
     """``periods`` periods of the first base frequency [s]; all others must repeat then."""
-    periods = checked_count(periods, "periods", code="E-FREQUENCY")
+    periods = checked_count(periods, "periods", code="E-RANGE")
     if not np.all(np.isfinite(frequency)) or not frequency[0] > 0.0:
         raise CaseError(
-            f"{periods} periods of {frequency.tolist()} rad/s", code="E-FREQUENCY", key="frequency",
+            f"{periods} periods of {frequency.tolist()} rad/s", code="E-RANGE", key="frequency",
             limit="one period or more of a positive frequency",
         )  # fmt: skip
     turns = frequency * periods / frequency[0]
     if np.any(np.abs(turns - np.rint(turns)) > 1e-9):
         raise CaseError(
             f"base frequencies {frequency.tolist()} rad/s do not repeat after {periods} periods of the first",
-            code="E-FREQUENCY", key="periods", limit="whole numbers of periods of every base frequency",
+            code="E-RANGE", key="periods", limit="whole numbers of periods of every base frequency",
             remedy="raise the number of periods, or use harmonic balance with two base frequencies",
         )  # fmt: skip
     return float(2.0 * np.pi * periods / frequency[0])
@@ -207,7 +208,7 @@ def stroboscopic_section(
     """
     if points < 1 or skip < 0 or not 0.0 <= phase <= 1.0:
         raise CaseError(
-            f"{points} points after {skip} periods at phase {phase}", code="E-SECTION",
+            f"{points} points after {skip} periods at phase {phase}", code="E-RANGE",
             limit="one point or more, no negative skip, a phase between 0 and 1",
         )  # fmt: skip
     once = stroboscopic_map(problem, frequency, **steps)
@@ -250,13 +251,13 @@ def bifurcation_diagram(
     Raises
     ------
     CaseError
-        No values or some that are not finite (E-VALUES), a start that does not fit (E-START).
+        No values or some that are not finite (E-RANGE), a start that does not fit (E-START).
     """
     tolerance = checked_tolerance(tolerance)
-    parameters = np.atleast_1d(checked_numbers(parameters, "parameters", code="E-VALUES", unit=""))
+    parameters = np.atleast_1d(checked_numbers(parameters, "parameters", code="E-RANGE", unit=""))
     if parameters.ndim != 1 or not len(parameters) or not np.all(np.isfinite(parameters)):
         raise CaseError(
-            f"a bifurcation diagram over parameters of shape {parameters.shape}", code="E-VALUES",
+            f"a bifurcation diagram over parameters of shape {parameters.shape}", code="E-RANGE",
             key="parameters", limit="one or more finite numbers", remedy="list the values to sweep over",
         )  # fmt: skip
     rows = []
@@ -337,18 +338,18 @@ def sweep_response(
     Raises
     ------
     CaseError
-        No frequencies or some that are not positive, numbers out of range (E-TOLERANCE: a tolerance that is
+        No frequencies or some that are not positive, numbers out of range (E-RANGE: a tolerance that is
         not between 0 and 1), a start that does not fit.
     ConvergenceError
         A step whose column equations do not converge.
     """
     tolerance = checked_tolerance(tolerance)
     checked_count(harmonics, "harmonics", code="E-HARMONICS", least=0)
-    frequencies = np.atleast_1d(checked_numbers(frequencies, "frequencies", code="E-FREQUENCY", unit="rad/s"))
+    frequencies = np.atleast_1d(checked_numbers(frequencies, "frequencies", code="E-RANGE", unit="rad/s"))
     valid = frequencies.ndim == 1 and len(frequencies) and np.all(np.isfinite(frequencies))
     if not valid or np.any(frequencies <= 0.0) or not 1 <= least <= most:
         raise CaseError(
-            "a sweep needs positive frequencies and a period or more to settle", code="E-FREQUENCY",
+            "a sweep needs positive frequencies and a period or more to settle", code="E-RANGE",
             key="frequencies", limit="one or more > 0 rad/s, 1 <= least <= most",
             remedy="list the frequencies in the order of the sweep",
         )  # fmt: skip
@@ -368,7 +369,7 @@ def sweep_response(
 
 def sweep_up_and_down(problem, frequencies, **options) -> tuple[SweepResponse, SweepResponse]:
     """A sweep over ascending frequencies and, from its end, back; arguments as for `sweep_response`."""
-    given = checked_numbers(frequencies, "frequencies", code="E-FREQUENCY", unit="rad/s")
+    given = checked_numbers(frequencies, "frequencies", code="E-RANGE", unit="rad/s")
     frequencies = np.sort(np.atleast_1d(given))
     up = sweep_response(problem, frequencies, **options)
     options["start"] = up.displacement[-1], up.velocity[-1]

@@ -129,7 +129,7 @@ def solve_transient(
     ------
     CaseError
         A step beyond the stability limit, instants that do not ascend, unknown methods, a start that
-        does not fit (E-START), more base frequencies than the problem has (E-FREQUENCY).
+        does not fit (E-START), more base frequencies than the problem has (E-RANGE).
     ConvergenceError
         A mass matrix that is not positive definite, an adaptive integrator that gives up.
     """
@@ -140,11 +140,11 @@ def solve_transient(
     frequency = checked_bases(problem, frequency)
     if method in adaptive.METHODS:
         if parameters:
-            raise CaseError(f"method {method} has no {', '.join(parameters)}", code="E-METHOD", key="method")
+            raise CaseError(f"method {method} has no {', '.join(parameters)}", code="E-CHOICE", key="method")
         return _adaptive(problem, frequency, times, start, method, tolerance or _LOCAL, events)
     if events:
         raise CaseError(
-            f"method {method} steps over contact changes", code="E-METHOD", key="events",
+            f"method {method} steps over contact changes", code="E-CHOICE", key="events",
             limit=", ".join(adaptive.METHODS), remedy="take an adaptive method",
         )  # fmt: skip
     scheme, number = step_scheme(problem, frequency, method, times[-1] - times[0], step, **parameters)
@@ -181,11 +181,11 @@ def step_scheme(
     Raises
     ------
     CaseError
-        An unknown method (E-METHOD), a step that is not positive or beyond the stability limit (E-STEP).
+        An unknown method (E-CHOICE), a step that is not positive or beyond the stability limit (E-RANGE).
     """
     made = {"newmark": lambda: StepRule(gamma, beta), "generalised alpha": lambda: generalised_alpha(radius)}
     if method not in RULES and method not in made and method != "modal":
-        raise CaseError(f"no method {method}", code="E-METHOD", key="method", limit=", ".join(METHODS))
+        raise CaseError(f"no method {method}", code="E-CHOICE", key="method", limit=", ".join(METHODS))
     rule = RULES.get(method) or (made[method]() if method in made else None)
     number, step = _steps(problem, np.atleast_1d(frequency), rule, span, step)
     if rule is None:
@@ -218,18 +218,18 @@ def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
     if step is None:
         fastest = max(highest, np.abs(frequency).max(initial=0.0))
         step = 2.0 * np.pi / fastest / _STEPS_A_PERIOD if fastest else span / 100.0
-    step = checked_numbers(step, "step", code="E-STEP", unit="s").item()
+    step = checked_numbers(step, "step", code="E-RANGE", unit="s").item()
     if not (np.isfinite(step) and step > 0.0):
-        raise CaseError(f"a time step of {step} s", code="E-STEP", key="step", limit="above 0 s")
+        raise CaseError(f"a time step of {step} s", code="E-RANGE", key="step", limit="above 0 s")
     number = max(1, int(np.ceil(span / step * (1.0 - 1e-12))))
     step = span / number
     limit = np.inf if rule is None else stability_limit(rule)
     if np.isnan(limit):
-        raise CaseError("a step rule of unknown stability", code="E-STEP-RULE")
+        raise CaseError("a step rule of unknown stability", code="E-RANGE")
     if step > limit * period:
         raise CaseError(
             f"a step of {step:.6g} s is {step / period:.4g} of the shortest natural period, {period:.6g} s",
-            code="E-STEP", key="step", limit=f"h / T up to {limit:.4g}, {limit * period:.6g} s",
+            code="E-RANGE", key="step", limit=f"h / T up to {limit:.4g}, {limit * period:.6g} s",
             remedy="shorten the step, or take average acceleration, which is stable for any",
         )  # fmt: skip
     return number, step
@@ -349,9 +349,9 @@ def _adaptive(problem, frequency, times, start, method, tolerance, events) -> Tr
 
 
 def _checked_times(times) -> np.ndarray:
-    times = checked_numbers(times, "times", code="E-TIMES", unit="s").copy()
+    times = checked_numbers(times, "times", code="E-RANGE", unit="s").copy()
     if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
         raise CaseError(
-            "instants must be finite and ascend", code="E-TIMES", key="times", limit="two instants or more"
+            "instants must be finite and ascend", code="E-RANGE", key="times", limit="two instants or more"
         )
     return times

@@ -75,7 +75,7 @@ def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
     Raises
     ------
     CaseError
-        Stages that leave no single spin (E-KINEMATICS), mesh directions that cannot turn (E-TURNING).
+        Stages that leave no single spin (E-DRIVETRAIN), mesh directions that cannot turn (E-DRIVETRAIN).
     """
     build = drivetrain_model if variant == BENDING else torsional_model
     options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
@@ -89,7 +89,7 @@ def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
 
 def _located(error: CaseError, case: DrivetrainCase) -> CaseError:
     """The error of a model in terms of the case file."""
-    if error.code == "E-TURNING":
+    if error.code == "E-DRIVETRAIN":
         error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
     error.file = case.location(error.key or "")
     return error
@@ -120,7 +120,7 @@ def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duratio
     ------
     CaseError
         A duration that is not above zero (E-RANGE), a torque on no body (E-DRIVETRAIN), stages that leave no
-        single spin (E-KINEMATICS).
+        single spin (E-DRIVETRAIN).
     """
     if not (np.isfinite(duration) and duration > 0.0):
         raise CaseError(f"a run of {duration} s", code="E-RANGE", key="duration", limit="above 0 s, finite")
@@ -142,7 +142,7 @@ def speed_ratios(train: Drivetrain) -> dict[str, float]:
     Raises
     ------
     CaseError
-        Stages that leave no single spin (E-KINEMATICS).
+        Stages that leave no single spin (E-DRIVETRAIN).
     """
     place = coordinates_of(train)
     spin = rigid_rotation(train, place)
@@ -345,7 +345,7 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
     ------
     CaseError
         As `case_model`; bodies that nothing holds across their axis or against tilting (E-MECHANISM);
-        natural frequencies too far apart for double precision (E-SPREAD); steps that cannot follow the
+        natural frequencies too far apart for double precision (E-STIFFNESS); steps that cannot follow the
         meshes (E-RATE); records that are too many (E-RANGE).
     """
     try:
@@ -668,7 +668,7 @@ def check_spread(case: DrivetrainCase, train: Drivetrain) -> None:
     Raises
     ------
     CaseError
-        E-SPREAD, with the softest support where that is the cause, else with the fastest and the slowest
+        E-STIFFNESS, with the softest support where that is the cause, else with the fastest and the slowest
         coordinate.
     """
     from scipy import linalg
@@ -684,7 +684,7 @@ def check_spread(case: DrivetrainCase, train: Drivetrain) -> None:
     own = np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2.0 * math.pi)
     fast = int(np.argmax(own))
     factor = f"a factor of {1.0 / math.sqrt(share):.1g}"
-    shown = {"code": "E-SPREAD", "limit": f"frequencies within {factor}"}
+    shown = {"code": "E-STIFFNESS", "limit": f"frequencies within {factor}"}
     words = "natural frequencies are too far apart for double precision: "
     words += f"{model.system.dofs[fast]} by itself has {own[fast]:.3g} Hz, and "
     soft, (place, name), value = _softest(train)

@@ -144,7 +144,7 @@ def drivetrain_model(
     ------
     CaseError
         Planets whose directions turn but that are unequally spaced or sit in bearings of finite stiffness
-        (E-TURNING); see also `rigid_rotation`.
+        (E-DRIVETRAIN); see also `rigid_rotation`.
     """
     place = coordinates_of(train)
     spin = rigid_rotation(train, place)
@@ -248,7 +248,7 @@ def _check_turning(train: Drivetrain) -> None:
         unequal = [abs(np.exp(1j * order * angles).sum()) for order in (1, 2)]
         if max(unequal) > 1e-6 * len(angles) or math.isfinite(stage.planet_bearing):
             raise CaseError(
-                f"planets of {stage.name} do not allow turning mesh directions", code="E-TURNING",
+                f"planets of {stage.name} do not allow turning mesh directions", code="E-DRIVETRAIN",
                 limit="three planets or more, equally spaced, fixed to their pins (planet_bearing infinite)",
                 remedy="take turning=False, which freezes the carrier angle",
             )  # fmt: skip
@@ -463,7 +463,7 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
     Raises
     ------
     CaseError
-        The stages do not leave exactly one spin (E-KINEMATICS).
+        The stages do not leave exactly one spin (E-DRIVETRAIN).
     """
     turn = {name: first + 4 for name, first in place.body.items()}
     rows = []
@@ -491,7 +491,7 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
     spins = len(rotations) - int(np.count_nonzero(values > 1e-10 * values.max(initial=1.0)))
     if spins != 1 or abs(vectors[-1, 0]) < 1e-12:
         raise CaseError(
-            f"the stages leave {spins} independent rotations", code="E-KINEMATICS", limit="one",
+            f"the stages leave {spins} independent rotations", code="E-DRIVETRAIN", limit="one",
             remedy="check the radii of stages that lie side by side, and what joins the bodies",
         )  # fmt: skip
     spin = np.zeros(place.count)

@@ -92,7 +92,7 @@ def _name(value: object) -> str:
     if not _NAME.fullmatch(value) or value != value.strip() or re.match(r"(planet|shaft)\b", value):
         raise refuse(
             "not a name for a body",
-            code="E-NAME",
+            code="E-CHOICE",
             value=value,
             limit="40 letters, digits, blanks, - or _; planet and shaft are taken as first words",
         )
@@ -140,7 +140,7 @@ def _driver(value: str | None, ends) -> str | None:
     """The driver of a stage; where the ends themselves are wrong, they alone are refused."""
     if value is not None and len(ends) == 2 and value not in ends:
         raise refuse(
-            "the driver is none of the two bodies of its stage", code="E-BODY", value=value,
+            "the driver is none of the two bodies of its stage", code="E-CHOICE", value=value,
             limit=" or ".join(ends),
         )  # fmt: skip
     return value
@@ -505,7 +505,7 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
             near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
             yield CaseError(
                 "there is no such body",
-                code="E-BODY",
+                code="E-CHOICE",
                 key=key,
                 value=name,
                 limit=", ".join(names[:20]),
@@ -513,7 +513,7 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
             )
     for key, first, second in joints(case):
         if first == second:
-            yield CaseError("a body is joined to itself", code="E-BODY", key=key, value=first)
+            yield CaseError("a body is joined to itself", code="E-CHOICE", key=key, value=first)
 
 
 def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -530,7 +530,7 @@ def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
         if one == two and key.startswith("shaft"):
             yield CaseError(
                 f"the shaft closes a loop: {first} and {second} are joined already",
-                code="E-LOOP",
+                code="E-DRIVETRAIN",
                 key=key,
                 limit="one way by shafts from body to body",
                 remedy="leave one of the shafts out",
@@ -542,7 +542,7 @@ def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
         i, name = apart[0]
         yield CaseError(
             f"nothing joins {', '.join(name for _, name in apart)} to {case.body[0].name}",
-            code="E-DISCONNECTED",
+            code="E-DRIVETRAIN",
             key=f"body[{i}].name",
             value=name,
             remedy="add a [[shaft]], a [[parallel]] or a [[planetary]]",
@@ -571,7 +571,7 @@ def _bodies(case: DrivetrainCase) -> Iterator[CaseError]:
             stations = elements.get(one.shaft, 0) - 1
             yield CaseError(
                 "there is no such station",
-                code="E-BODY",
+                code="E-CHOICE",
                 key=f"bearing[{i}].station",
                 value=one.station,
                 limit=f"1 to {stations}"
@@ -944,8 +944,8 @@ def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
     Raises
     ------
     CaseError
-        ``E-FILE``, ``E-FILE-ENC`` (see `femgear.case.text.read_text`); ``E-CSV`` with the number of the line:
-        unknown columns or units, numbers that are none, not finite or beyond the limits of a case file,
+        ``E-FILE``, ``E-FILE-ENC`` (see `femgear.case.text.read_text`), with the number of the line: unknown
+        columns or units, numbers that are none, not finite or beyond the limits of a case file,
         decimal commas beside decimal points, times that do not ascend.
     """
     found = read_columns(path, _DIMENSIONS, least=1, most=MOST_POINTS, remedy=_COLUMNS)

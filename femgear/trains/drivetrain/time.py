@@ -186,10 +186,10 @@ def march_drivetrain(
     Raises
     ------
     CaseError
-        Steps and durations that are none (E-STEP), a start that does not fit (E-START), bearings that hold
+        Steps and durations that are none (E-RANGE), a start that does not fit (E-START), bearings that hold
         the rotation (E-BEARING), a negative stiffness of meshes that separate (E-STIFFNESS).
     ConvergenceError
-        The motion outgrows the numbers (E-DIVERGED); no flanks fit a step (E-CONTACT-STATE).
+        The motion outgrows the numbers (E-DIVERGED); no flanks fit a step (E-CONTACT).
     """
     _check(model, duration, step, records.every)
     count = max(1, round(duration / step))
@@ -221,10 +221,10 @@ def march_drivetrain(
 def _check(model: DrivetrainModel, duration: float, step: float, every: int) -> None:
     if not (np.isfinite(duration) and np.isfinite(step) and 0.0 < step <= duration):
         raise CaseError(
-            f"{duration} s in steps of {step} s", code="E-STEP", limit="0 < step <= duration", key="step"
+            f"{duration} s in steps of {step} s", code="E-RANGE", limit="0 < step <= duration", key="step"
         )
     if int(every) != every or every < 1:
-        raise CaseError(f"every {every} steps", code="E-STEP", key="every", limit="1 or more")
+        raise CaseError(f"every {every} steps", code="E-RANGE", key="every", limit="1 or more")
     check_free_spin(model)
 
 
@@ -519,7 +519,7 @@ def solve_overlaps(flexibility, free, closed, touching, parted=0.0) -> tuple[np.
     Raises
     ------
     ConvergenceError
-        No contacts fit (E-CONTACT-STATE).
+        No contacts fit (E-CONTACT).
     """
     rounding = _OVERLAP_ROUNDING * np.abs(free).max(initial=0.0)
     for number in range(_ROUNDS + _SINGLE):
@@ -534,7 +534,7 @@ def solve_overlaps(flexibility, free, closed, touching, parted=0.0) -> tuple[np.
         closed = closed.copy()
         closed[wrong] = found[wrong]
     raise ConvergenceError(
-        "no contacts of the meshes fit the end of a step", code="E-CONTACT-STATE",
+        "no contacts of the meshes fit the end of a step", code="E-CONTACT",
         remedy="take shorter steps, or the start \"zero\"",
     )  # fmt: skip
 

@@ -138,7 +138,7 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
     Raises
     ------
     CaseError
-        E-CRITICAL-SPEED: a carrier at or above the lowest ``2 pi f_n / n``.
+        E-SPEED: a carrier at or above the lowest ``2 pi f_n / n``.
     """
     wave = ring_modes.nodal_diameter > 0
     critical = 2.0 * np.pi * ring_modes.frequency[wave] / ring_modes.nodal_diameter[wave]
@@ -148,7 +148,7 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
         raise CaseError(
             f"the carrier turns at {fastest * rpm:.6g} rpm, faster than the wave of "
             f"{ring_modes.nodal_diameter[wave][lowest]} nodal diameters around the ring",
-            code="E-CRITICAL-SPEED",
+            code="E-SPEED",
             key="operation.speeds",
             value=f"{fastest * rpm:.6g} rpm of the carrier",
             limit=f"below {critical[lowest] * rpm:.6g} rpm of the carrier",
@@ -230,7 +230,7 @@ def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
         allowed = max(case.operation.speeds) * HIGHEST_RESPONSE / response
         raise CaseError(
             f"{harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
-            code="E-FREQUENCY",
+            code="E-RANGE",
             key="operation.speeds",
             value=f"{max(case.operation.speeds) * 30 / np.pi:.6g} rpm",
             limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed * 30 / np.pi:.4g} rpm here",

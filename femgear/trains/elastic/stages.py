@@ -242,7 +242,7 @@ def solve_dynamics(
     Raises
     ------
     CaseError
-        A carrier that runs around the ring faster than its waves (E-CRITICAL-SPEED).
+        A carrier that runs around the ring faster than its waves (E-SPEED).
     ConvergenceError
     """
     from femgear.solvers.stability.parametric import decisive_harmonics
@@ -290,7 +290,7 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     Raises
     ------
     CaseError
-        E-CRITICAL-SPEED, as there.
+        E-SPEED, as there.
     """
     found = turning_speeds(case, planetary_set(case))
     check_rim_speed(modes.ring.modes, [s.carrier for s in found])

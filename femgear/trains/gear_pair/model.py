@@ -60,10 +60,11 @@ class PairBearings:
     damping_ratio: float = 0.0
 
     def __post_init__(self):
-        values = [checked_numbers(v, "bearings", code="E-PAIR", unit="") for v in (self.mass, self.stiffness)]
+        given = (self.mass, self.stiffness)
+        values = [checked_numbers(one, "bearings", code="E-RANGE", unit="") for one in given]
         if any(v.shape != (2,) or not np.all(np.isfinite(v) & (v > 0.0)) for v in values):
             raise CaseError(
-                f"bearings with masses {self.mass} and stiffnesses {self.stiffness}", code="E-PAIR",
+                f"bearings with masses {self.mass} and stiffnesses {self.stiffness}", code="E-RANGE",
                 limit="two of each, above 0",
             )  # fmt: skip
         _not_negative("damping ratio of the bearings", self.damping_ratio)
@@ -103,23 +104,23 @@ class ImpactPair:
         _not_negative("damping ratio", self.damping_ratio)
         _number("load", self.load)
         for name in ("stiffness", "tooth_error", "eccentricity"):
-            given = checked_numbers(getattr(self, name), name, code="E-PAIR", unit="", kind=complex)
+            given = checked_numbers(getattr(self, name), name, code="E-RANGE", unit="", kind=complex)
             values = np.atleast_1d(given)
             if values.ndim != 1 or not np.all(np.isfinite(values)):
-                raise CaseError(f"{name} {values.tolist()}", code="E-PAIR", key=name, limit="finite numbers")
+                raise CaseError(f"{name} {values.tolist()}", code="E-RANGE", key=name, limit="finite numbers")
             object.__setattr__(self, name, tuple(values.tolist()))
-        teeth = checked_numbers(self.teeth, "teeth", code="E-PAIR", unit="")
+        teeth = checked_numbers(self.teeth, "teeth", code="E-RANGE", unit="")
         whole = teeth.shape == (2,) and np.all(teeth >= 1) and np.all(teeth == np.floor(teeth))
         if len(self.eccentricity) != 2 or not whole or not np.all(np.isfinite(teeth)):
             raise CaseError(
-                f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth", code="E-PAIR",
+                f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth", code="E-RANGE",
                 limit="two of each, whole numbers of teeth, one or more",
             )  # fmt: skip
         object.__setattr__(self, "teeth", tuple(int(z) for z in teeth))
         if len(set(self.frequency)) < len(self.frequency):
             raise CaseError(
                 f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth make two base "
-                "frequencies one", code="E-PAIR", key="eccentricity", limit="every base frequency once",
+                "frequencies one", code="E-RANGE", key="eccentricity", limit="every base frequency once",
                 remedy="give the sum of both to one gear where only the mesh counts, or other teeth",
             )  # fmt: skip
 
@@ -139,10 +140,10 @@ class ImpactPair:
         Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `frequency`; for motions that
         repeat after several tooth periods ``divided`` counts these, and the first base is 1 / divided.
         """
-        divided = checked_count(divided, "divided", code="E-FREQUENCY")
-        ratio = _number("ratio", ratio, code="E-FREQUENCY")
+        divided = checked_count(divided, "divided", code="E-RANGE")
+        ratio = _number("ratio", ratio, code="E-RANGE")
         if not (math.isfinite(ratio) and ratio > 0.0):
-            raise CaseError(f"a frequency ratio of {ratio}", code="E-FREQUENCY", key="ratio", limit="above 0")
+            raise CaseError(f"a frequency ratio of {ratio}", code="E-RANGE", key="ratio", limit="above 0")
         M, C, K, along = self._matrices()
         system = MechanicalSystem(
             M=ratio**2 * M, C=ratio * C, K=K, W=np.eye(len(M))[:, -1:], load=self.load * along,
@@ -211,10 +212,10 @@ def pair_scales(*, inertia, base_radius, stiffness: float, backlash: float) -> P
     """
     given = {"inertia": inertia, "base_radius": base_radius, "stiffness": stiffness, "backlash": backlash}
     values = np.concatenate(
-        [np.ravel(checked_numbers(one, key, code="E-PAIR", unit="")) for key, one in given.items()]
+        [np.ravel(checked_numbers(one, key, code="E-RANGE", unit="")) for key, one in given.items()]
     ).tolist()
     if np.shape(inertia) != (2,) or len(values) != 6 or not all(math.isfinite(v) and v > 0.0 for v in values):
-        raise CaseError(f"a gear pair with the data {values}", code="E-PAIR", limit="all above 0")
+        raise CaseError(f"a gear pair with the data {values}", code="E-RANGE", limit="all above 0")
     mass = 1.0 / sum(r * r / i for r, i in zip(base_radius, inertia))
     return PairScales(0.5 * backlash, math.sqrt(stiffness / mass), 0.5 * stiffness * backlash)
 
@@ -231,7 +232,7 @@ def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tup
     _not_negative("damping ratio", damping_ratio)
     if load == 0.0:
         raise CaseError(
-            "a pair without load has no closed flanks that could part", code="E-PAIR", key="load",
+            "a pair without load has no closed flanks that could part", code="E-RANGE", key="load",
             limit="not 0",
         )  # fmt: skip
     s = (error / load) ** 2
@@ -262,13 +263,13 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
     Raises
     ------
     CaseError
-        A level that is no finite number (E-VALUE).
+        A level that is no finite number (E-RANGE).
     """
     from scipy.optimize import brentq
 
-    number = checked_numbers(level, "level", code="E-VALUE", unit="")
+    number = checked_numbers(level, "level", code="E-RANGE", unit="")
     if number.ndim or not np.isfinite(number):
-        raise CaseError(f"a level of {number.tolist()}", code="E-VALUE", key="level", limit="a finite number")
+        raise CaseError(f"a level of {number.tolist()}", code="E-RANGE", key="level", limit="a finite number")
     away = np.array([lowest_deflection(one) for one in branch.solutions]) - level
     borders = []
     for i in np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:])):
@@ -291,7 +292,7 @@ def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
     return tuple(order if place == base else 0 for place in range(count))
 
 
-def _number(key: str, value, code: str = "E-PAIR") -> float:
+def _number(key: str, value, code: str = "E-RANGE") -> float:
     """One finite number."""
     number = checked_numbers(value, key, code=code, unit="")
     if number.ndim or not np.isfinite(number):
@@ -301,4 +302,4 @@ def _number(key: str, value, code: str = "E-PAIR") -> float:
 
 def _not_negative(name: str, value: float) -> None:
     if _number(name, value) < 0.0:
-        raise CaseError(f"{name} {value}", code="E-PAIR", limit="0 or more")
+        raise CaseError(f"{name} {value}", code="E-RANGE", limit="0 or more")

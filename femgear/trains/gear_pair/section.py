@@ -147,7 +147,7 @@ def cross_check(case: GearPairCase) -> Iterator[CaseError]:
         )  # fmt: skip
     if all(gears.eccentricity) and gears.teeth[0] == gears.teeth[1]:
         yield CaseError(
-            "both gears are eccentric and turn with one frequency", code="E-PAIR", key="gears.eccentricity",
+            "both gears are eccentric and turn with one frequency", code="E-RANGE", key="gears.eccentricity",
             value=", ".join(LENGTH.show(one) for one in gears.eccentricity),
             limit="one of them, or other teeth", remedy="give the sum of both to one gear",
         )  # fmt: skip

@@ -84,7 +84,7 @@ class HelicalSet(RigidSet):
     ------
     CaseError
         Numbers that no set can have, planet angles that are none, unordered or span more than a turn, or
-        radii, centre distance and pressure angles that miss each other by more than 10 % (E-HELICAL).
+        radii, centre distance and pressure angles that miss each other by more than 10 % (E-RANGE).
         `closure` tells by how much they do.
     """
 
@@ -270,8 +270,8 @@ def helical_excitation(
     Raises
     ------
     CaseError
-        Overlap ratios, slices or a hand that cannot be (E-HELICAL), a slice that loses its stiffness
-        (E-MESH-STIFFNESS).
+        Overlap ratios, slices or a hand that cannot be (E-RANGE), a slice that loses its stiffness
+        (E-STIFFNESS).
     """
     count = len(record.stiffness)
     ahead = slice_phases(np.zeros(count), overlap_ratio, slices=slices, hand=hand).reshape(count, slices)
@@ -284,7 +284,7 @@ def helical_excitation(
     stiffness, force, weighted = (values.reshape(-1, values.shape[-1]) for values in filtered)
     if np.any(stiffness <= 0.0):
         raise CaseError(
-            "the spur record has positions without stiffness for a whole slice", code="E-MESH-STIFFNESS",
+            "the spur record has positions without stiffness for a whole slice", code="E-STIFFNESS",
             remedy="give a record whose meshes stay closed",
         )  # fmt: skip
     return MeshExcitation(
@@ -309,9 +309,9 @@ def slice_phases(phases, overlap_ratio, *, slices: int, hand: int = 1) -> np.nda
     phases = np.asarray(phases, float)
     overlap = _overlap(overlap_ratio, len(phases))
     if isinstance(slices, bool) or int(slices) != slices or slices < 1:
-        raise CaseError(f"{slices} slices of the face width", code="E-HELICAL", limit="1 or more")
+        raise CaseError(f"{slices} slices of the face width", code="E-RANGE", limit="1 or more")
     if hand not in (1, -1):
-        raise CaseError(f"a hand of {hand}", code="E-HELICAL", limit="1 or -1")
+        raise CaseError(f"a hand of {hand}", code="E-RANGE", limit="1 or -1")
     height = (np.arange(slices) + 0.5) / slices - 0.5
     return (phases[:, None] + hand * overlap[:, None] * height).ravel()
 
@@ -331,7 +331,7 @@ def _overlap(overlap_ratio, meshes: int) -> np.ndarray:
     overlap = np.asarray(overlap_ratio, float)
     if overlap.shape not in ((), (meshes,)) or not np.all(np.isfinite(overlap)) or np.any(overlap < 0.0):
         raise CaseError(
-            f"overlap ratios {overlap.tolist()}", code="E-HELICAL", key="overlap_ratio",
+            f"overlap ratios {overlap.tolist()}", code="E-RANGE", key="overlap_ratio",
             limit=f"one number of 0 or more, or {meshes}", remedy="give b sin|beta| / (pi m_n)",
         )  # fmt: skip
     return np.broadcast_to(overlap, (meshes,))
@@ -415,7 +415,7 @@ def modal_error_response(
     ------
     CaseError
         Errors or harmonics that do not fit (E-SHAPE), harmonics or frequencies that are none (E-HARMONICS,
-        E-FREQUENCY).
+        E-RANGE).
     ConvergenceError
         An undamped resonance (E-RESONANCE).
     """
@@ -501,7 +501,7 @@ def _frequencies(mesh_frequency) -> np.ndarray:
     frequency = np.atleast_1d(np.asarray(mesh_frequency, float))
     if frequency.ndim != 1 or not np.all(np.isfinite(frequency)) or np.any(frequency < 0.0):
         raise CaseError(
-            f"mesh frequencies of shape {frequency.shape}", code="E-FREQUENCY", key="mesh_frequency",
+            f"mesh frequencies of shape {frequency.shape}", code="E-RANGE", key="mesh_frequency",
             limit="a list of numbers >= 0 Hz",
         )  # fmt: skip
     return frequency

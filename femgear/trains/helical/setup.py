@@ -141,7 +141,7 @@ def section_stiffness(
     Raises
     ------
     CaseError
-        Virtual gears that cannot be made (E-HELICAL-SECTION).
+        Virtual gears that cannot be made (E-GEOMETRY).
     GridError, ContactError
     """
     virtual = virtual_gears(case, gears)
@@ -158,7 +158,7 @@ def virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
     Raises
     ------
     CaseError
-        E-HELICAL-SECTION: they cannot be made.
+        E-GEOMETRY: they cannot be made.
     """
     from femgear.gears.planetary import virtual_set
 
@@ -167,7 +167,7 @@ def virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
     except GeometryError as error:
         raise CaseError(
             f"the virtual gears of the normal section cannot be made: {error.message}",
-            code="E-HELICAL-SECTION",
+            code="E-GEOMETRY",
             key="helical.section",
             value=case.helical.section,
             limit='"transverse" for these teeth',
@@ -273,7 +273,7 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
     CaseError
         E-MECHANISM: torque, thrust or tilting moments that nothing takes up. E-RANGE: stiffnesses too far
         apart, a torque that no teeth carry. E-PERIODS: a static record of several mesh
-        periods. E-HELICAL-SECTION: virtual gears that cannot be made.
+        periods. E-GEOMETRY: virtual gears that cannot be made.
     """
     _check_supports(case, gears)
     if case.helical.mesh_stiffness is not None:
@@ -306,7 +306,7 @@ def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
     try:
         balanced = _balanced(case, data)
     except ConvergenceError as error:
-        if error.code != "E-RIGID-MODE":
+        if error.code != "E-MECHANISM":
             raise
         raise CaseError(
             "the stiffest supports are too stiff beside the softest: rounding hides the soft ones",

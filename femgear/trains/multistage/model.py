@@ -69,7 +69,7 @@ class Member:
     name: str
 
     def __post_init__(self):
-        object.__setattr__(self, "stage", checked_count(self.stage, "stage", code="E-COUPLING"))
+        object.__setattr__(self, "stage", checked_count(self.stage, "stage", code="E-RANGE"))
 
     def __str__(self) -> str:
         return f"stage {self.stage} {self.name}"
@@ -114,9 +114,9 @@ class Stage:
                 f"the {self.fixed} is fixed but has no torsional support", code="E-MECHANISM",
                 key=f"{self.fixed}.torsional_support", limit="above 0, or infinite",
             )  # fmt: skip
-        angle = checked_numbers(self.angle, "angle", code="E-VALUE", unit="rad")
+        angle = checked_numbers(self.angle, "angle", code="E-RANGE", unit="rad")
         if angle.ndim or not np.isfinite(angle):
-            raise CaseError(f"a stage angle of {self.angle} rad", code="E-VALUE", key="angle", limit="finite")
+            raise CaseError(f"a stage angle of {self.angle} rad", code="E-RANGE", key="angle", limit="finite")
         if self.teeth is not None:
             object.__setattr__(self, "teeth", _checked_teeth(self.data, self.teeth))
         if self.phases is not None:
@@ -148,7 +148,7 @@ class StageCoupling:
     Raises
     ------
     CaseError
-        Members that are none or of one stage, stiffnesses out of range (E-COUPLING).
+        Members that are none or of one stage, stiffnesses out of range (E-RANGE).
     """
 
     first: Member
@@ -164,13 +164,13 @@ class StageCoupling:
             _refuse(f"a coupling inside stage {self.first.stage}", "members of two stages")
         units = {"torsional": "N m/rad", "lateral": "N/m"}
         for name, unit in units.items():
-            value = checked_numbers(getattr(self, name), name, code="E-COUPLING", unit=unit)
+            value = checked_numbers(getattr(self, name), name, code="E-RANGE", unit=unit)
             if value.ndim or not (value >= 0.0 and (value or name == "lateral")):
                 lowest = "0 or more" if name == "lateral" else "above 0"
                 _refuse(f"a {name} stiffness of {value.tolist()} {unit}", f"{lowest}, or infinite")
             if STIFFEST[name] < value < math.inf:
                 raise CaseError(
-                    f"a {name} stiffness of {value:g} {unit}", code="E-COUPLING", key=name,
+                    f"a {name} stiffness of {value:g} {unit}", code="E-RANGE", key=name,
                     limit=f"up to {STIFFEST[name]:g} {unit}: beyond, rounding hides all other springs",
                     remedy="take infinite for a rigid coupling",
                 )  # fmt: skip
@@ -191,7 +191,7 @@ class MultistageSet:
     Raises
     ------
     CaseError
-        No stage, members of stages that are not there (E-COUPLING), one member for input and output, or one
+        No stage, members of stages that are not there (E-RANGE), one member for input and output, or one
         that is fixed (E-MECHANISM).
     """
 
@@ -263,7 +263,7 @@ def _checked_teeth(data: PlanarSet, teeth) -> tuple[int, int, int]:
 
 
 def _refuse(message: str, limit: str):
-    raise CaseError(message, code="E-COUPLING", limit=limit)
+    raise CaseError(message, code="E-RANGE", limit=limit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,7 +331,7 @@ def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
     ------
     CaseError
         A stage without teeth (E-TEETH), members that are free or held twice (E-MECHANISM), a speed that is
-        not finite (E-VALUE).
+        not finite (E-RANGE).
     """
     _check_finite("speed", speed, "rad/s")
     weights = _tooth_weights(data)
@@ -487,7 +487,7 @@ def _solved(data: MultistageSet, matrix: np.ndarray, right: np.ndarray) -> np.nd
 
 def _check_finite(name: str, value: float, unit: str) -> None:
     if not math.isfinite(value):
-        raise CaseError(f"a {name} of {value} {unit}", code="E-VALUE", key=name, limit="finite")
+        raise CaseError(f"a {name} of {value} {unit}", code="E-RANGE", key=name, limit="finite")
 
 
 def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float = 0.0) -> MechanicalSystem:
@@ -514,7 +514,7 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
     ------
     CaseError
         A torque on a held member, a train that is not determined or locked (E-MECHANISM), centres joined
-        rigidly between frames of different speeds (E-COUPLING).
+        rigidly between frames of different speeds (E-RANGE).
     """
     from scipy.linalg import block_diag
 
@@ -578,7 +578,7 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
     Raises
     ------
     CaseError
-        Centres joined rigidly between such frames (E-COUPLING).
+        Centres joined rigidly between such frames (E-RANGE).
     """
     if not speed or not any(one.lateral for one in data.couplings):
         return {}
@@ -591,7 +591,7 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
         if math.isinf(one.lateral):
             raise CaseError(
                 f"the centres of {one.first} and {one.second} are one, in frames of different speeds",
-                code="E-COUPLING", key=f"couplings[{number}].lateral", limit="a finite stiffness",
+                code="E-RANGE", key=f"couplings[{number}].lateral", limit="a finite stiffness",
                 remedy="give the stiffness of the shaft",
             )  # fmt: skip
         found[number] = float(relative)

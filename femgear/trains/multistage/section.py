@@ -58,7 +58,7 @@ _ENTRIES = {
 _REMEDIES = {
     "E-COAXIAL": "choose teeth with sun + 2 planet = ring, or profile shifts that close the set",
     "E-FILLET": "reduce the addendum of that gear",
-    "E-POINTED": "change the profile shift of that gear, or reduce its addendum",
+    "E-TIP": "change the profile shift of that gear, or reduce its addendum",
 }
 
 
@@ -224,7 +224,7 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
     for key, member in named:
         if member is not None and _member_of(member).stage > len(case.stage):
             yield CaseError(
-                "there is no such stage", code="E-COUPLING", key=key, value=member,
+                "there is no such stage", code="E-RANGE", key=key, value=member,
                 limit=f"stage 1 to stage {len(case.stage)}",
             )  # fmt: skip
     for n, one in enumerate(case.coupling):

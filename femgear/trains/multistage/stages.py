@@ -157,11 +157,11 @@ def stage_error(stage: Stage, sun_planet, planet_ring) -> np.ndarray:
     Raises
     ------
     CaseError
-        A stage without phases (E-PHASES), waves of different length (E-SHAPE).
+        A stage without phases (E-RANGE), waves of different length (E-SHAPE).
     """
     if stage.phases is None:
         raise CaseError(
-            "the stage has no mesh phases", code="E-PHASES", key="phases",
+            "the stage has no mesh phases", code="E-RANGE", key="phases",
             remedy="give phases, such as those of the gears",
         )  # fmt: skip
     waves = np.array([np.atleast_1d(one) for one in (sun_planet, planet_ring)], complex)
@@ -328,10 +328,10 @@ def _mesh_frequencies(data: MultistageSet, speed: np.ndarray) -> tuple[np.ndarra
     """(F, S) [Hz], proportional to the speed, and whether suns turn forwards against their carriers (S,)."""
     if speed.ndim != 1 or not np.all(np.isfinite(speed)) or np.any(speed == 0.0):
         raise CaseError(
-            "speeds of the input must be finite and not zero", code="E-VALUE", key="speed", limit="rad/s"
+            "speeds of the input must be finite and not zero", code="E-RANGE", key="speed", limit="rad/s"
         )
     if speed.min() < 0.0 < speed.max():
-        raise CaseError("speeds of both signs", code="E-VALUE", key="speed", limit="one sense of rotation")
+        raise CaseError("speeds of both signs", code="E-RANGE", key="speed", limit="one sense of rotation")
     unit = train_speeds(data, math.copysign(1.0, speed[0]))
     return np.abs(speed)[:, None] * unit.mesh_frequency, unit.sun > unit.carrier
 
@@ -363,7 +363,7 @@ def _on_base(series, base: int, bases: int, sense: int):
     """The series with its single order moved to a base."""
     if any(series.orders[1:]):
         raise CaseError(
-            f"a mesh series of orders {series.orders}", code="E-ORDERS", key="meshes",
+            f"a mesh series of orders {series.orders}", code="E-HARMONICS", key="meshes",
             limit="multiples of the stage's own mesh frequency, such as (1,)",
         )  # fmt: skip
     orders = [0] * bases

@@ -69,12 +69,12 @@ def share_load(a_sun, a_ring, b_sun, b_ring, total) -> LoadSharing:
     """
     a_s, a_r, b_s, b_r = (np.atleast_1d(np.asarray(v, float)) for v in (a_sun, a_ring, b_sun, b_ring))
     if not (a_s.shape == a_r.shape == b_s.shape == b_r.shape and a_s.ndim == 1 and len(a_s)):
-        raise ContactError("the four mesh arrays must have one value a planet", code="E-CONTACT-INPUT")
+        raise ContactError("the four mesh arrays must have one value a planet", code="E-SHAPE")
     finite = all(np.isfinite(v).all() for v in (a_s, a_r, b_s, b_r))
     if not (finite and a_s.min() > 0 and a_r.min() > 0 and 0 <= total < np.inf):
         raise ContactError(
             f"lowest stiffness {min(a_s.min(), a_r.min()):.3g} N/m, total force {total} N",
-            code="E-CONTACT-INPUT",
+            code="E-SHAPE",
             limit="finite values, stiffness above zero, total zero or above",
         )
     s, c = 1 / a_s + 1 / a_r, b_s / a_s + b_r / a_r

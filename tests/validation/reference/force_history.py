@@ -117,7 +117,7 @@ def solve_force_history(
             )
             q, v, unknowns = _condensed(system, stiffness, step, total, start, chosen)
     else:
-        raise CaseError(f"no route {route}", code="E-METHOD", key="route", limit=", ".join(ROUTES))
+        raise CaseError(f"no route {route}", code="E-CHOICE", key="route", limit=", ".join(ROUTES))
     return ForceResponse(times, q, v, q @ system.W, route, unknowns)
 
 
@@ -256,12 +256,12 @@ def equidistant(times) -> float:
     times = np.asarray(times, float)
     distance = np.diff(times)
     if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(distance <= 0.0):
-        raise CaseError("two ascending instants or more are needed", code="E-TIMES", key="times")
+        raise CaseError("two ascending instants or more are needed", code="E-RANGE", key="times")
     step = (times[-1] - times[0]) / (len(times) - 1)
     error = np.abs(distance - step).max()
     if error > 1e-6 * step:
         raise CaseError(
-            f"instants {error:.3g} s off an equidistant grid of {step:.6g} s", code="E-TIMES", key="times",
+            f"instants {error:.3g} s off an equidistant grid of {step:.6g} s", code="E-RANGE", key="times",
             limit="equidistant instants", remedy="interpolate the forces on a grid first",
         )  # fmt: skip
     return float(step)

@@ -46,19 +46,19 @@ def solve_free_vibration(
     Raises
     ------
     CaseError
-        Forces, a period or a ``fixed`` out of range (E-SHOOTING), a start that does not fit (E-START).
+        Forces, a period or a ``fixed`` out of range (E-RANGE), a start that does not fit (E-START).
     """
     chosen = ShootingOptions(**{"integration": 1e-12, "tolerance": 1e-10, **options})
-    period = checked_numbers(period, "period", code="E-SHOOTING", unit="s").item()
+    period = checked_numbers(period, "period", code="E-RANGE", unit="s").item()
     if problem.forces or not (np.isfinite(period) and period > 0.0):
         raise CaseError(
             f"free vibration with {len(problem.forces)} harmonic forces and a period of {period} s",
-            code="E-SHOOTING", limit="no forces and a period above 0 s",
+            code="E-RANGE", limit="no forces and a period above 0 s",
         )  # fmt: skip
     n = len(problem.system.M)
     if not 0 <= fixed < n:
         told = f"degree of freedom {fixed} fixed"
-        raise CaseError(told, code="E-SHOOTING", key="fixed", limit=f"0 to {n - 1}")
+        raise CaseError(told, code="E-RANGE", key="fixed", limit=f"0 to {n - 1}")
     if start is None:
         raise CaseError(
             "a free vibration without a start", code="E-START", key="start",

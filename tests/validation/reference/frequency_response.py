@@ -146,13 +146,13 @@ def unit_force(system: MechanicalSystem, *names: str) -> np.ndarray:
     Raises
     ------
     CaseError
-        A name that the system does not have (E-DOF).
+        A name that the system does not have (E-CHOICE).
     """
     columns = np.zeros((len(system.M), len(names)))
     for column, name in enumerate(names):
         if name not in system.dofs:
             raise CaseError(
-                f"no degree of freedom {name!r}", code="E-DOF", limit=", ".join(system.dofs),
+                f"no degree of freedom {name!r}", code="E-CHOICE", limit=", ".join(system.dofs),
             )  # fmt: skip
         columns[system.dofs.index(name), column] = 1.0
     return columns
@@ -173,7 +173,7 @@ def resonance_peaks(frequency, response, *, prominence: float = 0.05) -> tuple[R
     Raises
     ------
     CaseError
-        Arrays that are no response (E-RESPONSE).
+        Arrays that are no response (E-RANGE).
 
     Notes
     -----
@@ -186,7 +186,7 @@ def resonance_peaks(frequency, response, *, prominence: float = 0.05) -> tuple[R
     f, size = np.asarray(frequency, float), np.abs(np.asarray(response))
     if f.ndim != 1 or f.shape != size.shape or not np.all(np.isfinite(size)) or np.any(np.diff(f) <= 0.0):
         raise CaseError(
-            "no response to search for peaks", code="E-RESPONSE",
+            "no response to search for peaks", code="E-RANGE",
             limit="finite values over ascending frequencies, as many of both",
         )  # fmt: skip
     places, found = find_peaks(size, prominence=0.0)

@@ -29,13 +29,13 @@ def kinetic_shares(mass, shape, groups: Mapping[str, Sequence[int]]) -> dict[str
     Raises
     ------
     CaseError
-        Coordinates that are in no group or in two (E-GROUPS).
+        Coordinates that are in no group or in two (E-SHAPE).
     """
     shape = np.asarray(shape)
     places = np.concatenate([np.asarray(rows, int) for rows in groups.values()])
     if not np.array_equal(np.sort(places), np.arange(len(shape))):
         raise CaseError(
-            f"{len(places)} coordinates in groups, of {len(shape)}", code="E-GROUPS",
+            f"{len(places)} coordinates in groups, of {len(shape)}", code="E-SHAPE",
             limit="every coordinate in one group",
         )  # fmt: skip
     energy = (shape.conj() * (np.asarray(mass) @ shape)).real

@@ -98,7 +98,7 @@ def checked_solve(grid: Grid, K, f, *, fixed, values=0.0, springs=None) -> np.nd
     rank_check(grid, fixed, springs=springs)
     f = np.asarray(f, dtype=float)
     if not np.isfinite(f).all():
-        raise FemgearError("the load holds numbers that are not finite", code="E-SOLVE-NAN")
+        raise FemgearError("the load holds numbers that are not finite", code="E-SOLVE")
     free = np.ones(K.shape[0], dtype=bool)
     free[np.asarray(fixed, dtype=int)] = False
     u = np.zeros(f.shape)
@@ -189,7 +189,7 @@ def check_solution(K, u, f, *, fixed=(), tolerance: float = 1e-6) -> float:
     """
     u, f = (np.atleast_2d(np.asarray(a, dtype=float).T).T for a in (u, f))
     if not (np.isfinite(u).all() and np.isfinite(f).all()):
-        raise FemgearError("the load or the solution holds numbers that are not finite", code="E-SOLVE-NAN")
+        raise FemgearError("the load or the solution holds numbers that are not finite", code="E-SOLVE")
     free = np.ones(K.shape[0], dtype=bool)
     free[np.asarray(fixed, dtype=int)] = False
     driven = np.where(free[:, None], 0.0, u)
@@ -200,7 +200,7 @@ def check_solution(K, u, f, *, fixed=(), tolerance: float = 1e-6) -> float:
     if not relative <= tolerance:
         raise FemgearError(
             f"the solution misses equilibrium: relative residual {relative:.2e}",
-            code="E-SOLVE-RESIDUAL",
+            code="E-SOLVE",
             limit=f"{tolerance:g}",
             remedy="check that every part of the body is held and that the material data are sensible",
         )
@@ -209,7 +209,7 @@ def check_solution(K, u, f, *, fixed=(), tolerance: float = 1e-6) -> float:
     if np.any(energy < -1e-9 * size):
         raise FemgearError(
             f"the strain energy is negative ({0.5 * energy.min():.3e} J)",
-            code="E-SOLVE-ENERGY",
+            code="E-SOLVE",
             limit=">= 0 J",
         )
     return relative

@@ -36,7 +36,7 @@ def rim_support_stiffness(sector: Sector, *, foundation=None) -> float:
 
     names = tuple(name for name in TOOTHED_SIDE if name in sector.grid.boundaries)
     if not names:
-        raise GridError("the sector has no teeth", code="E-GRID-BOUNDARY", limit=", ".join(TOOTHED_SIDE))
+        raise GridError("the sector has no teeth", code="E-GRID", limit=", ".join(TOOTHED_SIDE))
     held = ("rim",) if foundation is None else ()
     stiffness = sector.stiffness if foundation is None else sector.stiffness + foundation
     return cyclic_support_stiffness(sector.grid, stiffness, sector.gear.teeth, names, held)

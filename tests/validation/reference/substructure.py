@@ -120,7 +120,7 @@ def _free_shapes(grid, rim):
         found = column[nodes[np.argsort(np.hypot(*grid.points[nodes].T))]].ravel()
         cuts.append(found[found >= 0])
     if len(cuts[0]) != len(cuts[1]):
-        raise GridError("the two cuts of a sector do not match", code="E-GRID-CUT")
+        raise GridError("the two cuts of a sector do not match", code="E-GRID")
     return shapes, *cuts
 
 

@@ -109,7 +109,7 @@ def cyclic_support_stiffness(grid, stiffness, count: int, moved, held=()) -> flo
     from scipy.sparse.linalg import splu
 
     if count < 3:
-        raise GridError(f"{count} sectors", code="E-GRID-COPIES", limit="3 or more")
+        raise GridError(f"{count} sectors", code="E-GRID", limit="3 or more")
     on, fixed = _boundaries(grid, moved, held)
     taken = np.concatenate([on, fixed])
     cuts = []
@@ -118,7 +118,7 @@ def cyclic_support_stiffness(grid, stiffness, count: int, moved, held=()) -> flo
         cuts.append(dof_pairs(nodes[np.argsort(np.hypot(*grid.points[nodes].T))]))
     right, left = cuts
     if len(right) != len(left):
-        raise GridError("the two cuts of a sector do not match", code="E-GRID-CUT")
+        raise GridError("the two cuts of a sector do not match", code="E-GRID")
     own = np.setdiff1d(np.arange(2 * grid.n_nodes), np.concatenate([dof_pairs(taken), left]))
     place = np.full(2 * grid.n_nodes, -1)
     place[own] = np.arange(len(own))
@@ -153,7 +153,7 @@ def _boundaries(grid, moved, held):
     fixed = np.unique(np.concatenate(fixed)) if fixed else np.zeros(0, int)
     if len(np.intersect1d(on, fixed)):
         raise GridError(
-            "a boundary cannot be coupled to the centre node and held", code="E-GRID-BOUNDARY",
+            "a boundary cannot be coupled to the centre node and held", code="E-GRID",
             limit="boundaries without common nodes",
         )  # fmt: skip
     return on, fixed

@@ -60,9 +60,7 @@ def balanced_loads(H, gap, arm, force: float) -> tuple[np.ndarray, float, float]
             )
             return loads, motion, float(residual)
         active = active ^ wrong
-    raise ContactError(
-        f"the contact loads do not settle (daqp ends with flag {flag})", code="E-CONTACT-CONVERGENCE"
-    )
+    raise ContactError(f"the contact loads do not settle (daqp ends with flag {flag})", code="E-CONTACT")
 
 
 def _linear(H, gap, arm, force, active):

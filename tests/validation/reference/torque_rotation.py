@@ -228,9 +228,7 @@ def _near_pairs(pair: GearPair, fraction: float, options: _Division) -> list[_Pa
         )  # fmt: skip
         plans.append(_PairPlan(int(number), sectors, places, slave, middle, a))
     if not plans:
-        raise ContactError(
-            "no tooth pair comes near", code="E-CONTACT-WINDOW", remedy="check the centre distance"
-        )
+        raise ContactError("no tooth pair comes near", code="E-CONTACT", remedy="check the centre distance")
     return plans
 
 
@@ -380,11 +378,11 @@ def _check_windows(plans, contacts, of_pair, deflection, options):
         if any(inside and load > 0 for inside, load in zip(contact.goes_on, part[[0, -1]], strict=True)):
             raise ContactError(
                 f"the contact of tooth pair {plan.number} runs out of the edges that may touch",
-                code="E-CONTACT-WINDOW", remedy="divide the flanks more finely",
+                code="E-CONTACT", remedy="divide the flanks more finely",
             )  # fmt: skip
     if deflection > options.nearest:
         raise ContactError(
             f"a deflection of {1e6 * deflection:.3g} um, tooth pairs were looked for within "
             f"{1e6 * options.nearest:.3g} um",
-            code="E-CONTACT-WINDOW", remedy="reduce the torque",
+            code="E-CONTACT", remedy="reduce the torque",
         )  # fmt: skip
