@@ -140,6 +140,8 @@ class FemgearError(Exception):
         self.limit = limit
         self.remedy = remedy
         self.file = file
+        # mistakes of a case file one by one, where there are several
+        self.problems: tuple[FemgearError, ...] = ()
 
     def __str__(self) -> str:
         where = ": ".join(part for part in (self.file, self.key) if part)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,7 +51,7 @@ MEMBERS = ("sun", "carrier")
 """Members that may stand on a shaft."""
 
 
-def need_set(case: object) -> None:
+def need_set(case: Any) -> None:
     """Refuse a case without a planetary set of its own (E-MODEL)."""
     if not isinstance(case, Case):
         raise CaseError(
@@ -153,13 +153,14 @@ def _name_root_radius(error: GeometryError, case: Case) -> None:
     The limit of one gear is not that of the others, and that of a gear whose profile shift is found only
     shows with that shift.
     """
+    key, remedy = error.key or "", error.remedy or ""
+    most = _largest_root_radius(case, key, ("E-ROOT-RADIUS", "E-FILLET"))
     if error.code == "E-FILLET":
-        if (most := _largest_root_radius(case, error.key, ("E-ROOT-RADIUS", "E-FILLET"))) is not None:
-            error.remedy = error.remedy.replace("root_radius", f"root_radius to {most:.4f} or less", 1)
+        if most is not None:
+            error.remedy = remedy.replace("root_radius", f"root_radius to {most:.4f} or less", 1)
         return
-    most = _largest_root_radius(case, error.key, ("E-ROOT-RADIUS", "E-FILLET"))
     if most is None:
-        most = _largest_root_radius(case, error.key, ("E-ROOT-RADIUS",))
+        most = _largest_root_radius(case, key, ("E-ROOT-RADIUS",))
     if most is None:
         error.limit, error.remedy = None, "reduce the dedendum: no root_radius fits"
     else:
@@ -314,8 +315,9 @@ def _modification(section: ModificationSection, gear: Gear) -> Modification:
     """Form over the roll length [m]; measured deviations are material, which forms count as taken off."""
     if section.kind == "measured profile":
         angles, diameters = section.roll_angles or (), section.diameters or ()
-        rolls = [roll_at(gear, roll_angle=a) for a in angles] + [roll_at(gear, diameter=d) for d in diameters]
-        points = sorted(zip(rolls, section.deviations, strict=True))
+        rolls = [roll_at(gear, roll_angle=a) or 0.0 for a in angles]
+        rolls += [roll_at(gear, diameter=d) or 0.0 for d in diameters]
+        points = sorted(zip(rolls, section.deviations or (), strict=True))
         return MeasuredProfile(tuple(r for r, _ in points), tuple(-e for _, e in points))
     start, end = (
         roll_at(
@@ -326,15 +328,16 @@ def _modification(section: ModificationSection, gear: Gear) -> Modification:
         )
         for name in ("start", "end")
     )
+    amount = section.amount or 0.0
     match section.kind:
-        case "tip relief":
-            return TipRelief(section.amount, start, end, section.exponent)
-        case "root relief":
-            return RootRelief(section.amount, start, end, section.exponent)
+        case "tip relief" | "root relief":
+            # a relief without its start is refused when the case is read
+            relief = TipRelief if section.kind == "tip relief" else RootRelief
+            return relief(amount, start or 0.0, end, section.exponent)
         case "profile slope":
-            return ProfileSlope(section.amount, start, end)
+            return ProfileSlope(amount, start, end)
         case _:
-            return ProfileCrowning(section.amount, start, end)
+            return ProfileCrowning(amount, start, end)
 
 
 def _check_reach(case: Case, profile: MeasuredProfile, gear: Gear, key: str) -> None:

@@ -102,10 +102,10 @@ def _check_supports(case: Case):
 
 
 def _check_numbers(case: Case):
-    dynamics, harmonics = case.dynamics, case.mesh_harmonics
+    dynamics, harmonics, response = case.dynamics, case.mesh_harmonics, case.response_harmonics
     rigid = case.rigid
     # the record of rigid bodies is that of the static positions
-    if rigid and case.static.positions <= 2 * harmonics:
+    if rigid and harmonics is not None and case.static.positions <= 2 * harmonics:
         yield CaseError(
             f"{case.static.positions} positions cannot carry {harmonics} mesh harmonics",
             code="E-RANGE",
@@ -113,12 +113,12 @@ def _check_numbers(case: Case):
             value=case.static.positions,
             limit=f"more than 2 x {harmonics}",
         )
-    if harmonics is not None and case.response_harmonics < 2 * harmonics:
+    if harmonics is not None and response is not None and response < 2 * harmonics:
         yield CaseError(
             "the response needs twice the harmonics of the mesh: the product of both reaches that far",
             code="E-RANGE",
             key="dynamics.response_harmonics",
-            value=case.response_harmonics,
+            value=response,
             limit=f"{2 * harmonics} or more",
         )
     if dynamics.up_to is not None and (rigid or dynamics.mesh_harmonics is not None):
@@ -294,7 +294,7 @@ def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False
     names = [name for name in ("sun", "carrier") if getattr(case, name).support_stiffness == 0.0]
     # the dynamic model has no back flanks
     both_flanks = case.static.back_flanks and not dynamic
-    loose = unheld_members(planetary, names, both_flanks=both_flanks)
+    loose = list(unheld_members(planetary, names, both_flanks=both_flanks))
     if not loose:
         return
     N = planetary.n_planets

@@ -206,12 +206,17 @@ Title = Annotated[str, BeforeValidator(_one_line)]
 
 
 def refuse(
-    message: str, *, code: str, value: object = None, limit: str | None = None, remedy: str | None = None
+    message: str,
+    *,
+    code: str,
+    value: object = None,
+    limit: str | None = None,
+    remedy: str | None = None,
 ) -> PydanticCustomError:
     """Validation error that `femgear.case.problems` turns into a `CaseError` with these fields."""
-    return PydanticCustomError(
-        code, "{message}", {"message": message, "found": value, "limit": limit, "remedy": remedy}
-    )
+    kind: Any = code
+    told = {"message": message, "found": value, "limit": limit, "remedy": remedy}
+    return PydanticCustomError(kind, "{message}", told)
 
 
 def described(value: object) -> str:

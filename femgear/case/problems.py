@@ -11,7 +11,7 @@ import difflib
 import math
 import re
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -53,7 +53,8 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
         With code, key, value, limit and remedy.
     """
     problems = []
-    for item in error.errors(include_url=False):
+    details: Any = error.errors(include_url=False)
+    for item in details:
         key = _dotted(item["loc"], prefix)
         nested = item.get("ctx", {}).get("error")
         if isinstance(nested, ValidationError):

@@ -124,7 +124,7 @@ def _heading(cells, dimensions, name: str, line: int, remedy: str) -> dict[str, 
     for cell in cells:
         match = _HEADING.fullmatch(cell)
         title = " ".join(match["name"].lower().replace("_", " ").split()) if match else ""
-        if title not in dimensions:
+        if match is None or title not in dimensions:
             words = "a column has no known name with its unit"
             raise _problem(words, name, line, value=cell, remedy=remedy)
         try:

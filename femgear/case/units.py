@@ -6,6 +6,7 @@ import functools
 import math
 import re
 from dataclasses import dataclass
+from typing import Any
 
 from femgear.errors import CaseError
 
@@ -108,10 +109,9 @@ def _factor(unit: str, dimension: Dimension, text: str) -> float:
             limit="unit names with * / ^ or blanks, without brackets",
             remedy=example,
         )
-    found = _root(unit)
-    if found is None:
+    found, expected = _root(unit), _root(dimension.si)
+    if found is None or expected is None:
         raise CaseError(f"unknown unit {unit!a}", code="E-UNIT", value=text, remedy=example)
-    expected = _root(dimension.si)
     if found[1] != expected[1]:
         raise CaseError(
             f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}",
@@ -133,7 +133,8 @@ def _root(unit: str) -> tuple[float, dict[str, float]] | None:
         quantity = registry.Quantity(1.0, registry.parse_units(unit)).to_root_units()
     except (pint.errors.PintError, ValueError):
         return None
-    return float(quantity.magnitude), {str(name): float(power) for name, power in quantity._units.items()}
+    exponents: Any = quantity._units
+    return float(quantity.magnitude), {str(name): float(power) for name, power in exponents.items()}
 
 
 @functools.cache

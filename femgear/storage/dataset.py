@@ -66,11 +66,14 @@ def csv_tables(data: xr.Dataset) -> dict[tuple[str, ...], pd.DataFrame]:
         *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
         *((str(name), str(value), "") for name, value in data.attrs.items()),
     ]
-    tables = {(): pd.DataFrame(single, columns=["name", "value", "unit"])} if single else {}
+    tables: dict[tuple[str, ...], pd.DataFrame] = {}
+    if single:
+        tables[()] = pd.DataFrame(single, columns=["name", "value", "unit"])
     for dims in dict.fromkeys(one.dims for one in flat.values() if one.dims):
         chosen = [name for name, one in flat.items() if one.dims == dims]
         frame = flat[chosen].to_dataframe(dim_order=list(dims)).reset_index()
-        tables[dims] = frame.rename(columns={str(name): _header(flat, str(name)) for name in frame})
+        headers = {str(name): _header(flat, str(name)) for name in frame}
+        tables[tuple(map(str, dims))] = frame.rename(columns=headers)
     return tables
 
 

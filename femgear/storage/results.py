@@ -386,7 +386,7 @@ def versions() -> dict[str, str]:
     return {"femgear": __version__, "python": platform.python_version(), **{n: version(n) for n in libraries}}
 
 
-def _plain(value: object) -> object:
+def _plain(value: Any) -> object:
     """JSON value of nested tables, lists, arrays and numbers."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}

@@ -157,11 +157,11 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
     return changed
 
 
-def _change(data: dict, key: str, value: object, name: str) -> None:
+def _change(data: dict, key: str, value: Any, name: str) -> None:
     """Change one entry of the tables of a case file; None takes it out."""
     parts = re.findall(r"\[\d{1,9}\]|[^.\[\]]+", key) or [key]
     *tables, last = parts
-    table = data
+    table: Any = data
     for part, following in zip(tables, parts[1:], strict=True):
         table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
     if last.startswith("["):
@@ -179,7 +179,7 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
         found = table[number] if number < len(table) else None
     else:
         found = table.setdefault(part, {}) if wanted is dict else table.get(part)
-    if not isinstance(found, wanted):
+    if not isinstance(found, (dict, list)) or not isinstance(found, wanted):
         kind = "table" if wanted is dict else "list"
         raise CaseError(f"{part} is not a {kind}", code="E-TYPE", key=key, file=name or None)
     return found
@@ -215,7 +215,7 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
 @cache
 def every_section() -> type[Case]:
     """Model of a planetary set with the sections of all trains, for its keys and their descriptions."""
-    fields = {
+    fields: dict[str, Any] = {
         train.section: (train.model.model_fields[train.section].annotation | None, None)
         for train in reversed(registry.TRAINS)
         if train.section
