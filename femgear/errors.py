@@ -9,11 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 CODES = {
+    "E-ALLOWANCE": "The play takes more from a tooth than it has.",
     "E-ARGUMENTS": "The command line cannot be understood.",
     "E-ASSEMBLY": "Tooth numbers, centre distance and planet angles do not fit each other.",
     "E-BACKLASH": "Flanks overlap, or have less play than what is asked of them needs.",
     "E-BEARING": "A bearing has values or springs that no model can have.",
     "E-CASE": "The case file has several mistakes, or one that has no code of its own.",
+    "E-CENTRE-DISTANCE": "The centre distance leaves no line of action.",
     "E-CHOICE": "The value is none of the choices.",
     "E-CLEARANCE": "The tip of a gear runs into the root of its mate.",
     "E-COAXIAL": "Sun, planet and ring have no common centre distance.",
@@ -63,6 +65,7 @@ CODES = {
     "E-OTHER-CASE": "A result is that of another case.",
     "E-OUTPUT": "The folder of the results cannot be used, or holds something else.",
     "E-PERIODS": "The errors span more mesh periods than the method takes.",
+    "E-POINTED": "A tooth is pointed below its tip.",
     "E-PUBLISHED": "A published line cannot be compared: its speed or harmonic is not computed.",
     "E-RANGE": "A value lies outside what is allowed.",
     "E-RATE": "The steps are too few to follow the motion.",
@@ -71,6 +74,7 @@ CODES = {
     "E-RESULTS-CHANGED": "A results file is not the one that the run wrote.",
     "E-RESULTS-INCOMPLETE": "The run was interrupted.",
     "E-RESULTS-MISSING": "There are no such results.",
+    "E-RIGID-MODE": "Nothing holds a motion that strains an element.",
     "E-RIM": "A rim is too thin, or lies on the wrong side of the teeth.",
     "E-ROOT-RADIUS": "The root radius of the tool does not fit its profile.",
     "E-SHAFT": "The parts make no shaft.",
@@ -87,9 +91,10 @@ CODES = {
     "E-SYMMETRY": "A matrix or an arrangement lacks the symmetry that the method needs.",
     "E-SYSTEM-LIBRARY": "A library or package that a picture needs is not installed.",
     "E-TEETH": "Tooth numbers that no gear or set can have.",
-    "E-TIP": "The tip of a gear is pointed, too high or too low.",
+    "E-TIP": "The tip of a gear is too high or too low, or an entry of it is no length.",
     "E-TOML": "The file is not TOML.",
     "E-TORQUE": "A torque or a history of torques that the method cannot take.",
+    "E-TURNING": "Planets of this stage do not allow turning mesh directions.",
     "E-TYPE": "The value is not of the kind that is needed.",
     "E-UNIT": "A quantity lacks its unit, or has a unit of another kind.",
     "E-VARIABLE": "There is no such variable, or it has no such values.",
@@ -140,8 +145,8 @@ class FemgearError(Exception):
         self.limit = limit
         self.remedy = remedy
         self.file = file
-        # mistakes of a case file one by one, where there are several
-        self.problems: tuple[FemgearError, ...] = ()
+        # the mistakes of a case file one by one, where there are several
+        self.problems: tuple[FemgearError, ...] = (self,)
 
     def __str__(self) -> str:
         where = ": ".join(part for part in (self.file, self.key) if part)

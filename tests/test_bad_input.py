@@ -61,7 +61,7 @@ REFUSED = {
     ),
     "centre distance at which the base circles leave no line of action": (
         [(DISTANCE, 'centre_distance = "45 mm"')],
-        ("E-ASSEMBLY", "set.centre_distance", "found:   '45 mm'", ">= 47.2196 mm", "increase"),
+        ("E-CENTRE-DISTANCE", "set.centre_distance", "found:   '45 mm'", ">= 47.2196 mm", "increase"),
     ),
     "negative backlash": (
         [('# backlash = "0.1 mm"', 'backlash = "-0.1 mm"')],

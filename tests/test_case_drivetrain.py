@@ -223,7 +223,7 @@ def test_wrong_texts(old, new, code, key):
 
 def test_what_only_the_model_can_tell(paper, own):
     error = refused_model(with_value(paper, "planetary[0].planet_bearing", "1e9 N/m"))
-    assert error.code == "E-DRIVETRAIN" and error.key == "simulation.turning"
+    assert error.code == "E-TURNING" and error.key == "simulation.turning"
     assert case_model(
         with_value(with_value(paper, "planetary[0].planet_bearing", "1e9 N/m"), "simulation.turning", False)
     )

@@ -95,7 +95,7 @@ def test_text_of_a_case_gives_it_again(case, printed):
         ("stage[1].gears.teeth", [21, 33, 86], "E-COAXIAL", "stage[1].gears.profile_shifts"),
         ("stage[1].planets", 7, "E-NEIGHBOURS", "stage[1].planets"),
         ("stage[1].gears.addendum", [1.0, 1.0, 1.0], "E-FILLET", "stage[1].gears.addendum"),
-        ("stage[1].gears.profile_shifts", [3.0, 0.0, 0.0], "E-TIP", "stage[1].gears.profile_shifts"),
+        ("stage[1].gears.profile_shifts", [3.0, 0.0, 0.0], "E-POINTED", "stage[1].gears.profile_shifts"),
         ("stage[1].fixed", "planet", "E-CHOICE", "stage[1].fixed"),
         ("stage[1].fixed", "carrier", "E-MECHANISM", "stage[1].carrier.torsional_stiffness"),
         ("stage[1].planet_angles", ["0 deg", "0 deg"], "E-RANGE", "stage[1].planet_angles"),

@@ -135,7 +135,7 @@ def test_check_flags_undercut_with_the_shift_that_avoids_it(check):  # bad input
 
 GEOMETRY = [
     # bad input, text, code, words of the message
-    (34, edited(("sun.tip_diameter", "48 mm")), "E-TIP", "pointed"),
+    (34, edited(("sun.tip_diameter", "48 mm")), "E-POINTED", "pointed"),
     (36, edited(("rack.root_radius", 0.6)), "E-ROOT-RADIUS", "<= 0.2716 modules"),
     (36, edited(("rack.root_radius", 0.38)), "E-FILLET", "planet's root fillet"),
     (37, edited(("sun.profile_shift", -0.5)), "E-CONTACT-RATIO", "contact ratio 0.8283"),
@@ -143,7 +143,7 @@ GEOMETRY = [
     (40, edited(("sun.tip_diameter", "46 mm")), "E-CLEARANCE", "-0.1250 mm"),
     (41, edited(("planet.bore_radius", "30 mm")), "E-RIM", "planet.bore_radius"),
     (41, edited(("ring.outer_radius", "80 mm")), "E-RIM", "ring.outer_radius"),
-    (42, edited(("set.centre_distance", "40 mm")), "E-ASSEMBLY", "47.2196 mm"),
+    (42, edited(("set.centre_distance", "40 mm")), "E-CENTRE-DISTANCE", "47.2196 mm"),
     (43, edited(("set.centre_distance", "50.5 mm")), "E-BACKLASH", "overlap"),
     (44, standard(27, 36, 99, planets=4), "E-ASSEMBLY", "91.428571"),
     (45, standard(20, 30, 80, planets=5), "E-NEIGHBOURS", "at most 4"),
@@ -173,7 +173,7 @@ def test_refusals_name_what_the_file_gives_and_keys_that_exist(check):
     _, _, err = check(TEXT.replace("planets = 3", angles, 1))
     assert "found:   '0, 121, 240 deg'" in err
     # a shift that was left out is not what the user should change
-    for distance, code in (("53 mm", "E-TIP"), ("56 mm", "E-SHIFT")):
+    for distance, code in (("53 mm", "E-POINTED"), ("56 mm", "E-SHIFT")):
         text = TEXT.replace("profile_shift = 0.52681\n", "").replace('"51 mm"', f'"{distance}"')
         _, _, err = check(text.replace("profile_shift = 0.0         # positive", "# positive"))
         assert code in err and ": set.centre_distance: " in err and f"found:   '{distance}'" in err

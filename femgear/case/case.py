@@ -202,7 +202,7 @@ def set_deviations(case: Case) -> SetDeviations:
     Raises
     ------
     GeometryError
-        Modifications that the flanks cannot have (E-MODIFICATION, E-MODIFICATION), with file and line, and
+        Modifications that the flanks cannot have (E-MODIFICATION), with file and line, and
         what `planetary_set` refuses.
     """
     s = planetary_set(case)

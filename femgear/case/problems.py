@@ -244,7 +244,7 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
         )
     if error.code == "E-ASSEMBLY":
         _assembly(error, case)
-    if error.code == "E-BACKLASH":
+    if error.code == "E-ALLOWANCE":
         error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
         error.limit = f"0 mm to {LENGTH.show(2.0 * case.sun.module)}: each gear takes half of it"
         error.remedy = "reduce the backlash"

@@ -39,7 +39,7 @@ def check_set(planetary: PlanetarySet) -> tuple[GeometryWarning, ...]:
     Raises
     ------
     GeometryError
-        E-ASSEMBLY, E-NEIGHBOURS, E-BACKLASH, E-INTERFERENCE, E-FILLET, E-INTERFERENCE, E-CLEARANCE,
+        E-ASSEMBLY, E-NEIGHBOURS, E-BACKLASH, E-INTERFERENCE, E-FILLET, E-CLEARANCE,
         E-CONTACT-RATIO.
     """
     found = [*_planets(planetary), *_neighbours(planetary)]

@@ -86,8 +86,8 @@ class Gear:
     Raises
     ------
     GeometryError
-        A value that no gear can have (E-TEETH, E-GEOMETRY, E-GEOMETRY, E-SHIFT, E-GEOMETRY, E-RIM,
-        E-BACKLASH, E-CUTTER, E-ROOT-RADIUS, E-CUTTER, E-TIP, E-TIP).
+        A value that no gear can have (E-TEETH, E-GEOMETRY, E-SHIFT, E-RIM,
+        E-ALLOWANCE, E-CUTTER, E-ROOT-RADIUS, E-TIP, E-POINTED).
     """
 
     teeth: int
@@ -323,7 +323,7 @@ def _check_numbers(gear: Gear) -> None:
         ("profile_shift", "E-SHIFT", -5.0, 5.0, " modules", "profile shifts are in modules, not in mm"),
         ("face_width", "E-GEOMETRY", 1e-6, 10.0, " m", unit_hint),
         ("rim_radius", "E-RIM", 1e-6, 1000.0, " m", unit_hint),
-        ("thickness_allowance", "E-BACKLASH", 0.0, gear.module, " m", "an allowance thins the tooth"),
+        ("thickness_allowance", "E-ALLOWANCE", 0.0, gear.module, " m", "an allowance thins the tooth"),
     )
     for entry, code, low, high, unit, remedy in limits:
         value = getattr(gear, entry)
@@ -504,7 +504,7 @@ def _check_flank(gear: Gear) -> None:
             "profile_shift",
             f"the tooth is pointed below its tip circle: thickness {2e3 * half * gear.tip_radius:.4f} mm at "
             f"the tip radius {gear.tip_radius * 1e3:.4f} mm",
-            code="E-TIP",
+            code="E-POINTED",
             value=gear.profile_shift,
             limit="tip thickness > 0",
             remedy="change the profile shift or give a tip_diameter that cuts the point off",

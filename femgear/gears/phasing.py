@@ -145,7 +145,7 @@ def mesh_phasing(
     ------
     GeometryError
         Angles at which the planets do not assemble (E-ASSEMBLY, with the nearest that do), no angles
-        (E-RANGE, E-RANGE), or other numbers that describe no set (E-RANGE).
+        (E-RANGE), or other numbers that describe no set (E-RANGE).
     """
     angles = _angles(planet_angles)
     MeshPhasing(sun_teeth, ring_teeth, (0,), rotation, flank, convention, lag)

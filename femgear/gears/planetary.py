@@ -40,7 +40,7 @@ class PlanetarySet:
     Raises
     ------
     GeometryError
-        Numbers that describe no set (E-RANGE, E-RANGE, E-GEOMETRY, E-GEOMETRY, E-ASSEMBLY); whether it
+        Numbers that describe no set (E-RANGE, E-GEOMETRY, E-CENTRE-DISTANCE); whether it
         can be assembled and run is told by `checks.check_set`.
     """
 
@@ -199,7 +199,7 @@ def close_set(
     ------
     GeometryError
         Meshes that ask for different centre distances (E-COAXIAL), shifts not determined (E-SHIFT), an
-        impossible centre distance (E-ASSEMBLY, E-GEOMETRY), or a gear that the shift found spoils.
+        impossible centre distance (E-CENTRE-DISTANCE, E-GEOMETRY), or a gear that the shift found spoils.
     """
     sun, planet, ring = (replace(g, name=n) for g, n in ((sun, "sun"), (planet, "planet"), (ring, "ring")))
     _check_find(find, centre_distance)
@@ -294,14 +294,14 @@ def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> floa
     Raises
     ------
     GeometryError
-        E-ASSEMBLY: the base circles would overlap (``cos(aw) > 1``).
+        E-CENTRE-DISTANCE: the base circles would overlap (``cos(aw) > 1``).
     """
     base = 0.5 * one.module * _tooth_sum(one, two) * math.cos(one.pressure_angle)
     if not centre_distance >= base:
         raise GeometryError(
             f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {one.teeth} and "
             f"{two.teeth} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
-            code="E-ASSEMBLY",
+            code="E-CENTRE-DISTANCE",
             key="set.centre_distance",
             value=centre_distance,
             limit=f">= {math.ceil(base * 1e7) / 1e4:.4f} mm",
@@ -369,7 +369,7 @@ def equal_planet_angles(planets: int) -> tuple[float, ...]:
 
 
 def check_angles(angles: tuple[float, ...]) -> None:
-    """Refuse planet angles [rad] that are none, unordered or in the wrong unit (E-RANGE, E-RANGE)."""
+    """Refuse planet angles [rad] that are none, unordered or in the wrong unit (E-RANGE)."""
     if not 1 <= len(angles) <= 1000:
         equal_planet_angles(len(angles))
     problem = None
@@ -429,7 +429,7 @@ def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...
 
 
 def _check_roles(planetary: PlanetarySet) -> None:
-    """Refuse gears that cannot be sun, planet and ring of one set (E-GEOMETRY, E-GEOMETRY)."""
+    """Refuse gears that cannot be sun, planet and ring of one set (E-GEOMETRY)."""
     sun, planet, ring = planetary.sun, planetary.planet, planetary.ring
     for gear, internal in ((sun, False), (planet, False), (ring, True)):
         if gear.internal is not internal:

@@ -66,7 +66,7 @@ def test_positive_shift_of_an_internal_gear_moves_its_flank_outwards():
 def test_centre_distance_below_the_base_circles_is_refused_with_the_limit():
     with pytest.raises(GeometryError) as caught:
         working_pressure_angle(*pair((27, 40)), 47e-3)
-    assert caught.value.code == "E-ASSEMBLY"
+    assert caught.value.code == "E-CENTRE-DISTANCE"
     assert "47.2196" in caught.value.limit  # 50.25 cos 20 deg
     with pytest.raises(GeometryError):
         working_pressure_angle(*pair((27, 40)), 0.0)

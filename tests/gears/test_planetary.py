@@ -199,7 +199,7 @@ def test_gears_that_do_not_belong_together_are_refused():
     assert caught.value.code == "E-GEOMETRY"
     with pytest.raises(GeometryError) as caught:
         PlanetarySet(sun, planet, ring, 47e-3, (0.0,))
-    assert (caught.value.code, caught.value.key) == ("E-ASSEMBLY", "set.centre_distance")
+    assert (caught.value.code, caught.value.key) == ("E-CENTRE-DISTANCE", "set.centre_distance")
 
 
 def test_mesh_names_follow_the_order_of_the_phases():

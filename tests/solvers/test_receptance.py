@@ -144,7 +144,7 @@ def test_column_without_stiffness_on_a_free_motion_is_refused():
     system = replace(problem.system, W=W)
     with pytest.raises(ConvergenceError, match="strains column") as error:
         reduce_problem(replace(problem, system=system, elements=(springs,)))
-    assert error.value.code == "E-MECHANISM"
+    assert error.value.code == "E-RIGID-MODE"
 
 
 @pytest.mark.parametrize("where", ["constant load", "force of order zero"])

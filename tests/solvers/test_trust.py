@@ -298,7 +298,7 @@ def test_refusals_name_what_is_missing():
     )
     springs = PolynomialSprings([0, 1], [[1.0, 0.1], [1.0, 0.1]])
     loose = NonlinearSystem(bodies, (springs, RadialBearings([[2, 3]], 0.0, 1e-3)))
-    with pytest.raises(ConvergenceError, match="E-MECHANISM") as caught:
+    with pytest.raises(ConvergenceError, match="E-RIGID-MODE") as caught:
         solve_harmonic_balance(loose, 1.0, harmonics=3)
     assert "bearing 1" in caught.value.message and "mesh" not in caught.value.message
 

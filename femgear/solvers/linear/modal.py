@@ -509,7 +509,7 @@ def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
         mesh = int(np.argmax((strain - allowed).max(axis=1)))
         raise ConvergenceError(
             f"a motion without stiffness strains column {mesh + 1} of W: its mean stiffness is missing or "
-            "too small", code="E-MECHANISM", remedy="give every mesh, bearing or spring a mean stiffness",
+            "too small", code="E-RIGID-MODE", remedy="give every mesh, bearing or spring a mean stiffness",
         )  # fmt: skip
     work, allowed = np.abs(system.load @ rigid), _allowed(system.load[:, None], rigid)[0]
     if np.any(work > allowed):

@@ -294,18 +294,18 @@ def reduced(problem: NonlinearSystem) -> Reduction:
     Raises
     ------
     ConvergenceError
-        A motion without stiffness strains an element (E-MECHANISM).
+        A motion without stiffness strains an element (E-RIGID-MODE).
     """
     try:
         return reduce_problem(problem)
     except ConvergenceError as error:
         total = np.abs(problem.reference)
         column = int(np.argmin(total))
-        if error.code != "E-MECHANISM" or total[column] > _NO_STIFFNESS * total.max():
+        if error.code != "E-RIGID-MODE" or total[column] > _NO_STIFFNESS * total.max():
             raise
         raise ConvergenceError(
             f"{element_name(problem, column)} has no linear stiffness, and nothing else holds the motion "
-            "that strains it", code="E-MECHANISM", limit="a stiffness at rest, or a reference in its place",
+            "that strains it", code="E-RIGID-MODE", limit="a stiffness at rest, or a reference in its place",
             remedy="where it stiffens with the deflection pass reduction=reduce_problem(problem, "
             "reference=stiffness of every column at the expected amplitude [N/m]); else give it a stiffness",
         ) from error  # fmt: skip

@@ -201,7 +201,7 @@ def lyapunov_exponents(problem: NonlinearSystem, frequency, *, start=None, **opt
     Raises
     ------
     CaseError
-        Numbers out of range (E-RANGE, E-RANGE), frequencies without the common period, an unknown
+        Numbers out of range (E-RANGE), frequencies without the common period, an unknown
         method.
     ConvergenceError
         A step whose column equations do not converge, a motion beyond all bounds (E-DIVERGED), exponents

@@ -75,7 +75,7 @@ def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
     Raises
     ------
     CaseError
-        Stages that leave no single spin (E-DRIVETRAIN), mesh directions that cannot turn (E-DRIVETRAIN).
+        Stages that leave no single spin (E-DRIVETRAIN), mesh directions that cannot turn (E-TURNING).
     """
     build = drivetrain_model if variant == BENDING else torsional_model
     options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
@@ -89,7 +89,7 @@ def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
 
 def _located(error: CaseError, case: DrivetrainCase) -> CaseError:
     """The error of a model in terms of the case file."""
-    if error.code == "E-DRIVETRAIN":
+    if error.code == "E-TURNING":
         error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
     error.file = case.location(error.key or "")
     return error

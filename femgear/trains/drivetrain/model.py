@@ -144,7 +144,7 @@ def drivetrain_model(
     ------
     CaseError
         Planets whose directions turn but that are unequally spaced or sit in bearings of finite stiffness
-        (E-DRIVETRAIN); see also `rigid_rotation`.
+        (E-TURNING); see also `rigid_rotation`.
     """
     place = coordinates_of(train)
     spin = rigid_rotation(train, place)
@@ -248,7 +248,7 @@ def _check_turning(train: Drivetrain) -> None:
         unequal = [abs(np.exp(1j * order * angles).sum()) for order in (1, 2)]
         if max(unequal) > 1e-6 * len(angles) or math.isfinite(stage.planet_bearing):
             raise CaseError(
-                f"planets of {stage.name} do not allow turning mesh directions", code="E-DRIVETRAIN",
+                f"planets of {stage.name} do not allow turning mesh directions", code="E-TURNING",
                 limit="three planets or more, equally spaced, fixed to their pins (planet_bearing infinite)",
                 remedy="take turning=False, which freezes the carrier angle",
             )  # fmt: skip

@@ -306,7 +306,7 @@ def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
     try:
         balanced = _balanced(case, data)
     except ConvergenceError as error:
-        if error.code != "E-MECHANISM":
+        if error.code != "E-RIGID-MODE":
             raise
         raise CaseError(
             "the stiffest supports are too stiff beside the softest: rounding hides the soft ones",

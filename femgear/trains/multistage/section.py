@@ -58,7 +58,7 @@ _ENTRIES = {
 _REMEDIES = {
     "E-COAXIAL": "choose teeth with sun + 2 planet = ring, or profile shifts that close the set",
     "E-FILLET": "reduce the addendum of that gear",
-    "E-TIP": "change the profile shift of that gear, or reduce its addendum",
+    "E-POINTED": "change the profile shift of that gear, or reduce its addendum",
 }
 
 

@@ -85,7 +85,7 @@ def pointed_tip_shift(teeth: int, pressure_angle: float, *, addendum: float = 1.
     if margin(low) < 0.0 or margin(high) > 0.0:
         raise GeometryError(
             f"no profile shift between 0 and 4 makes the tip of {teeth} teeth just pointed",
-            code="E-TIP",
+            code="E-POINTED",
             value=teeth,
         )
     for _ in range(80):
