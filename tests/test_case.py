@@ -437,7 +437,7 @@ def test_wrong_values(key, value, code, part):
     assert part in str(error)
     assert all(problem.key.startswith(key.split(".")[0]) for problem in getattr(error, "problems", [error]))
     if len(getattr(error, "problems", [error])) == 1:
-        assert error.limit or error.remedy or error.code in ("E-TYPE", "E-DUPLICATE", "E-TYPE")
+        assert error.limit or error.remedy or error.code in ("E-TYPE", "E-DUPLICATE")
 
 
 def test_fixed_member_must_be_named(tmp_path):  # bad input 49

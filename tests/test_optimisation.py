@@ -390,7 +390,7 @@ def test_results_that_are_no_numbers_are_failures(case):
         (lambda c: Variable("sun.mass", "1 kg", "2 kg", "-1 kg"), "E-VARIABLE", "tolerance"),
         (lambda c: Problem(c, [], ROSENBROCK), "E-VARIABLE", "needs a design variable"),
         (lambda c: Problem(c, [X, X], ROSENBROCK), "E-VARIABLE", "given twice"),
-        (lambda c: Problem(c, [Variable("sun.masss", "1 kg", "2 kg")], ROSENBROCK), "E-TYPE", "masss"),
+        (lambda c: Problem(c, [Variable("sun.masss", "1 kg", "2 kg")], ROSENBROCK), "E-KEY-UNKNOWN", "masss"),
         (lambda c: Problem(c, [Variable("sun.mass", "1 mm", "2 mm")], ROSENBROCK), "E-UNIT", "sun.mass"),
         (lambda c: Limit(ROSENBROCK), "E-OBJECTIVE", "Rosenbrock"),
         (lambda c: minimise(Problem(c, [X], ROSENBROCK), method="magic"), "E-CHOICE", "magic"),

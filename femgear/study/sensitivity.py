@@ -191,7 +191,7 @@ def linearise(
         # the mirror image turns the other way and ends at position zero
         position, numbers = -position[::-1], len(position) - 1 - chosen
     load = abs(sun_torque) / solved.gears.sun.base_radius
-    options = {"positions": position, "periods": periods, "contact": contact, "cells": cells}
+    options = {"positions": position, "contact": contact, "cells": cells}
     setup, answers = _solve(solved, load, numbers, options)
     rows = original_rows(order)
     stacked = {name: np.stack([answer[name] for answer in answers]) for name in answers[0] if name != "cells"}
