@@ -502,7 +502,9 @@ def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -
         drawn[:] = dot(drawn, closed[i])
 
 
-def solve_overlaps(flexibility, free, closed, touching, parted=0.0) -> tuple[np.ndarray, np.ndarray]:
+def solve_overlaps(
+    flexibility, free, closed, touching, parted: np.ndarray | float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Overlaps and the contacts that touch (n,), with ``u + flexibility force(u) = free``.
 
     Parameters
