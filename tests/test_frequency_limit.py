@@ -11,7 +11,7 @@ from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_lines
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.trains.elastic.checks import HARMONICS, MEMORY, highest_excitation, limited, missing_level
-from femgear.trains.elastic.stages import _outputs, solve_dynamics, solve_housing, solve_modes
+from femgear.trains.elastic.stages import _outputs, solve_dynamics, solve_housing, solve_modes, solve_response
 from femgear.trains.reading import read_case, with_value, with_values
 from femgear.trains.static.stages import solve_static
 
@@ -69,7 +69,10 @@ def test_six_harmonics_are_warned_of_with_what_is_missing(case, static, modes):
 
 def test_a_limit_below_the_modes_of_the_meshes_is_warned_of(case, static, modes):
     low = with_value(case, "dynamics.up_to", "8 kHz")
-    dynamics = solve_dynamics(low, static, solve_modes(low, static))
+    basis = solve_modes(low, static)
+    dynamics = solve_dynamics(low, static, basis)
+    # what a study takes is what a run computes
+    assert np.array_equal(solve_response(low, basis).deflection, dynamics.response.deflection)
     assert dynamics.excitation_limit == pytest.approx([88 * 90.0, 7 * 1116.0])
     # compared with the default, which reaches the modes of the meshes
     assert dynamics.compared_to == modes.reach > 16e3

@@ -91,7 +91,7 @@ def whole_grid(gear: Gear, *, refine: int = 1) -> Grid:
         loops=tuple(loops),
         faces=(*(f"tooth {k}" for k in range(gear.teeth)), "body 0", "body 1"),
     )
-    return _mesh_plan(plan, 120.0)
+    return _mesh_plan(plan)
 
 
 def _turn(angle: float) -> np.ndarray:

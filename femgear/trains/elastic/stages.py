@@ -295,7 +295,8 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     found = turning_speeds(case, planetary_set(case))
     check_rim_speed(modes.ring.modes, [s.carrier for s in found])
     frequency = np.array([s.mesh_frequency for s in found])
-    return periodic_response(case, modes, frequency, modes.reach, given=case.dynamics.mesh_harmonics)[1]
+    up_to = case.dynamics.up_to or modes.reach
+    return periodic_response(case, modes, frequency, up_to, given=case.dynamics.mesh_harmonics)[1]
 
 
 def turning_speeds(case: Case, gears: PlanetarySet) -> tuple[Speeds, ...]:
