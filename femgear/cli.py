@@ -127,10 +127,14 @@ def check(case: Path, /) -> int:
         TOML case file.
     """
     from femgear.trains.reading import read_case
-    from femgear.trains.registry import train_of
+    from femgear.trains.registry import check_case, train_of
 
     data = read_case(case)
     _print(train_of(data).describe(data))
+    try:
+        check_case(data)
+    except FemgearError as error:
+        print(f"\nfemgear run without --only refuses this case:\n{error}")
     return 0
 
 

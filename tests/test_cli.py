@@ -18,7 +18,7 @@ from femgear.errors import ConvergenceError
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish
 from femgear.trains import registry
-from femgear.trains.reading import open_results, parse_case, with_value
+from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value, with_values
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -449,3 +449,10 @@ def test_export_writes_every_number_with_its_unit(tmp_path, capsys, pipeline):
                 assert table.set_index("name").value[name] == str(one.item())
     assert cli.main(["run", str(CASE), "-o", str(out), "--no-pictures", "--force"]) == 0
     assert (out / "exported" / "modes.csv").exists() or (out / "exported" / "modes_mode.csv").exists()
+
+
+def test_check_says_what_a_run_would_refuse(check):
+    swapped = with_values(read_case(CASE), {"operation.input": "ring", "operation.fixed": "sun"})
+    code, out, _ = check(to_toml(swapped))
+    assert code == 0 and "femgear run without --only refuses this case" in out and "E-FIXED-MEMBER" in out
+    assert "refuses" not in check(TEXT)[1]

@@ -154,3 +154,14 @@ def test_results_of_another_case_are_refused_with_the_entries_that_differ(case, 
     )
     solve_dynamics(held, static, solve_modes(held, static))
     solve_housing(with_value(case, "housing.sensor_angle", "9 deg"), dynamics)
+
+
+def test_datasets_and_results_of_other_stages_are_refused(case, static, modes):
+    for stage in (
+        lambda: solve_modes(case, static.dataset()),
+        lambda: solve_dynamics(case, static, static),
+        lambda: solve_housing(case, modes),
+    ):
+        with pytest.raises(CaseError, match="is needed, not a") as caught:
+            stage()
+        assert caught.value.code == "E-TYPE" and "compute the stage" in caught.value.remedy

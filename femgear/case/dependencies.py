@@ -96,23 +96,33 @@ def ring_entries(case: Case) -> Entries:
     }
 
 
-def check_entries(entries: Entries, case_entries: Entries, result: str) -> None:
-    """Refuse a result of another case.
+def check_entries(result: Any, kind: type, case_entries: Entries, words: str) -> None:
+    """Refuse a result of another case, or what is no such result.
 
     Parameters
     ----------
-    entries : mapping
-        Of the case that the result belongs to.
+    result : kind
+        With the ``entries`` of the case that it belongs to.
+    kind : type
+        Of the result.
     case_entries : mapping
         The same entries of the case at hand.
-    result : str
+    words : str
         What the result is, such as ``"static solution"``.
 
     Raises
     ------
     CaseError
-        E-OTHER-CASE, naming the entries that differ.
+        E-TYPE: another kind of result, or its dataset; E-OTHER-CASE, naming the entries that differ.
     """
+    if not isinstance(result, kind):
+        raise CaseError(
+            f"a {words} is needed, not a {type(result).__name__}",
+            code="E-TYPE",
+            limit=f"a {kind.__name__}",
+            remedy="compute the stage: files of results hold numbers alone, from which no stage goes on",
+        )
+    entries: Entries = result.entries
     keys = sorted(entries.keys() | case_entries.keys())
     differ = [key for key in keys if entries.get(key) != case_entries.get(key)]
     if not differ:
@@ -120,12 +130,12 @@ def check_entries(entries: Entries, case_entries: Entries, result: str) -> None:
     shown = ", ".join(f"{key} ({_show(entries.get(key))})" for key in differ[:4])
     more = f" and {len(differ) - 4} more" if len(differ) > 4 else ""
     raise CaseError(
-        f"the {result} is that of another case, which differs in {shown}{more}",
+        f"the {words} is that of another case, which differs in {shown}{more}",
         code="E-OTHER-CASE",
         key=differ[0],
         value=_show(case_entries.get(differ[0])),
-        limit=f"{_show(entries.get(differ[0]))}, with which the {result} was computed",
-        remedy=f"compute the {result} of this case, or take the case that it belongs to",
+        limit=f"{_show(entries.get(differ[0]))}, with which the {words} was computed",
+        remedy=f"compute the {words} of this case, or take the case that it belongs to",
     )
 
 

@@ -93,7 +93,7 @@ def solve_modes(
     CaseError
         Without torque, or when the ring, which is the housing of this model, is not the fixed member.
     """
-    check_entries(static.entries, static_entries(case), "static solution")
+    check_entries(static, StaticResult, static_entries(case), "static solution")
     check_dynamic_case(case, static.planetary_set)
     steps, entries = steps or Steps(), ring_entries(case)
     bodies = _ring_states(case, static, steps)
@@ -248,8 +248,8 @@ def solve_dynamics(
     from femgear.solvers.stability.parametric import decisive_harmonics
     from femgear.solvers.stability.parametric import stability as floquet_verdict
 
-    check_entries(static.entries, static_entries(case), "static solution")
-    check_entries(modes.entries, modal_entries(case), "modal basis")
+    check_entries(static, StaticResult, static_entries(case), "static solution")
+    check_entries(modes, ModesResult, modal_entries(case), "modal basis")
     gears, basis = static.planetary_set, modes.modes
     all_speeds = turning_speeds(case, gears)
     check_reach(case, modes.reach, fastest_mesh_frequency(case, gears))
@@ -437,7 +437,7 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     """
     from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, heaviside_linear_lines
 
-    check_entries(dynamics.entries, dynamic_entries(case), "dynamic response")
+    check_entries(dynamics, DynamicsResult, dynamic_entries(case), "dynamic response")
     carrier = np.array([s.carrier for s in dynamics.speeds])
     arguments = (dynamics.ring_teeth, carrier, case.housing.sensor_angle)
     lines = exact = fixed_sensor_lines(dynamics.ring_radial, *arguments)

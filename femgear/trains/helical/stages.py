@@ -103,7 +103,7 @@ def solve_helical_modes(
     excitation, whole = None, None
     if case.helical.mesh_stiffness is None:
         static = needed(static, "static")
-        check_entries(static.entries, static_entries(_drive_flanks(case)), "static solution")
+        check_entries(static, StaticResult, static_entries(_drive_flanks(case)), "static solution")
         factor = np.ones(2)
         if case.helical.section == "normal":
             section = section or section_stiffness(case, gears, cache=cache)

@@ -233,7 +233,7 @@ def planar_model(
     )
 
     if static is not None:
-        check_entries(static.entries, static_entries(case), "static solution")
+        check_entries(static, StaticResult, static_entries(case), "static solution")
     planar = case.planar
     data = planar_data(case, gears, static)
     clearance = case.planet.bearing_clearance or None

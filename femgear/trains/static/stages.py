@@ -140,7 +140,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress | None 
     """
     from femgear.gears.deviations import common_period
 
-    check_entries(static.entries, static_entries(case), "static solution")
+    check_entries(static, StaticResult, static_entries(case), "static solution")
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
     influences = _influences(case, static)
     if progress is not None:
