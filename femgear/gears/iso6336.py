@@ -358,12 +358,12 @@ def mesh_stiffness_method_b(
     pressure_angle: float = math.radians(20.0),
     helix_angle: float = 0.0,
     youngs_modulus: float = STEEL_MODULUS,
-    blank_factor: float = 1.0,
 ) -> tuple[float, float]:
     """Single stiffness c' and mean mesh stiffness c_gamma_alpha after ISO 6336-1, method B.
 
-    ``c' = c'_th C_M C_R C_B cos(beta)``, C_M = 0.8, and ``c_gamma_alpha = c' (0.75 eps_alpha + 0.25)``, given
-    for eps_alpha >= 1.2; under it the standard lets c' of spur gears be up to 10 % lower, not applied here.
+    ``c' = c'_th C_M C_R C_B cos(beta)`` with C_M = 0.8, and ``c_gamma_alpha = c' (0.75 eps_alpha + 0.25)``,
+    given for eps_alpha >= 1.2; under it the standard lets c' of spur gears be up to 10 % lower, not applied
+    here. C_R is 1, that of solid discs: multiply both with the `blank_factor` of gears with a web.
 
     Parameters
     ----------
@@ -375,8 +375,6 @@ def mesh_stiffness_method_b(
         Basic rack [modules, rad]; the defaults make C_B = 1.
     youngs_modulus : float
         Of both gears [Pa]; c' is scaled with E/206 GPa.
-    blank_factor : float
-        C_R, 1 for solid discs.
 
     Returns
     -------
@@ -399,5 +397,5 @@ def mesh_stiffness_method_b(
     rack = basic_rack_factor(dedendum=dedendum, pressure_angle=pressure_angle)
     solid = theoretical_single_stiffness(teeth_1, teeth_2, shift_1, shift_2, helix_angle=helix_angle)
     material = youngs_modulus / STEEL_MODULUS
-    single = solid * THEORETICAL_CORRECTION * blank_factor * rack * math.cos(helix_angle) * material
+    single = solid * THEORETICAL_CORRECTION * rack * math.cos(helix_angle) * material
     return single, single * (0.75 * contact_ratio + 0.25)

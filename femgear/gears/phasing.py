@@ -323,21 +323,21 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
     GeometryError
         Harmonics that are no whole numbers from 1 (E-HARMONICS).
     """
-    harmonics = check_harmonics(harmonics)
+    orders = check_harmonics(harmonics)
     turns, N = np.array(phasing.turns), phasing.n_planets
     positions = np.array([phasing.positions] * 2)
     total = np.full(2, phasing.teeth_sum)
-    size = np.abs(planet_sums(turns, positions, total, harmonics, (0, 1, -1)).swapaxes(0, 1))
+    size = np.abs(planet_sums(turns, positions, total, orders, (0, 1, -1)).swapaxes(0, 1))
     plain, turning = size[..., 0], size[..., 1:].max(axis=-1)  # (H, 2)
     both = [np.column_stack([part, part.max(axis=1)]) for part in (plain, turning)]
-    kinds = phase_kinds(turns[0], positions[0], total[0], harmonics)
+    kinds = phase_kinds(turns[0], positions[0], total[0], orders)
     return PhasingTable(
-        harmonics=harmonics,
+        harmonics=orders,
         kind=tuple(KINDS[k] for k in kinds),
-        cyclic=cyclic_harmonic(phasing, harmonics),
+        cyclic=cyclic_harmonic(phasing, orders),
         members=np.stack([both[0], both[1], both[0], both[1]], axis=-1),
-        planets=_planet_resultants(phasing, harmonics),
-        modes=_mode_shares(phase_factors(phasing, harmonics).reshape(-1, 2, N), phasing.planet_angles, size),
+        planets=_planet_resultants(phasing, orders),
+        modes=_mode_shares(phase_factors(phasing, orders).reshape(-1, 2, N), phasing.planet_angles, size),
         separate=bool(abs(np.exp(1j * phasing.planet_angles).mean()) < ZERO),
     )
 

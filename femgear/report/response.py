@@ -6,7 +6,7 @@ They draw datasets of results, of whatever train; helpers for figures over the m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -65,10 +65,8 @@ def mode_shapes(
     Figure
     """
     frequency = modes["frequency"].values
-    if shown is None:
-        elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))
-        shown = elastic[:12]
-    shown = [int(mode) for mode in shown]
+    elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))
+    shown = [int(mode) for mode in (elastic[:12] if shown is None else shown)]
     columns = max(min(4, len(shown)), 1)
     rows = max(-(-len(shown) // columns), 1)
     figure, axes = new_figure(rows=rows, columns=columns, width=2.5 * columns, height=2.75 * rows + 0.5)
@@ -274,7 +272,8 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
         "magnitude [1]",
         "the iteration contracts and the motion is stable up to 1",
     )
-    for ax, place in ((top, "outside upper center"), (bottom, "outside lower center")):
+    places: Any = ("outside upper center", "outside lower center")
+    for ax, place in zip((top, bottom), places):
         figure.legend(*ax.get_legend_handles_labels(), loc=place, ncols=3, fontsize=SIZE - 1, frameon=False)
     return figure
 

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 _QUADRATIC_TRIANGLE = 22  # VTK_QUADRATIC_TRIANGLE: corners, then the middles of 01, 12, 20
 _SPLIT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 """Corners of the four flat triangles of a quadratic one."""
+_SECONDS = 6.0
+"""Length of an animation."""
 _OUTLINE = {
     "boundary_edges": True,
     "feature_edges": False,
@@ -128,7 +130,7 @@ def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, disp
     return Body(name, grid.points @ turn + np.asarray(centre, float), grid.triangles, moved)
 
 
-def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
+def assemble_set(bodies: Sequence[Body | tuple]) -> pv.UnstructuredGrid:
     """All bodies in one grid of VTK quadratic triangles.
 
     Parameters
@@ -148,8 +150,8 @@ def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
         When there is no body, or arrays do not fit together.
     """
     pv = load_pyvista()
-    bodies = [body if isinstance(body, Body) else Body(*body) for body in bodies]
-    if not bodies:
+    bodies = tuple(body if isinstance(body, Body) else Body(*body) for body in bodies)
+    if not len(bodies) > 0:
         raise CaseError("a scene needs at least one body", code="E-SHAPE")
     for body in bodies:
         _check_body(body)
@@ -175,11 +177,12 @@ def _check_body(body: Body) -> None:
     fits = points.ndim == 2 and points.shape[1] == 2 and triangles.ndim == 2 and triangles.shape[1] == 6
     fits = fits and len(points) > 0 and len(triangles) > 0
     fits = fits and 0 <= triangles.min() and triangles.max() < len(points)
-    fits = fits and (body.displacement is None or np.shape(body.displacement) == points.shape)
+    displacement = points if body.displacement is None else np.asarray(body.displacement)
+    fits = fits and displacement.shape == points.shape
     if not fits:
         raise CaseError(
             f"body {body.name!r}: points {points.shape}, triangles {triangles.shape} and displacement "
-            f"{np.shape(body.displacement)} do not fit together",
+            f"{displacement.shape} do not fit together",
             code="E-SHAPE",
             limit="(n, 2), (m, 6) with node numbers below n, (n, 2)",
         )
@@ -337,13 +340,13 @@ def deformed_picture(
     length = np.linalg.norm(u, axis=1)
     radius = np.abs(grid.points).max()
     if scale is None:
-        scale = 0.03 * radius / length.max() if length.max() > 0 else 1.0
+        scale = float(0.03 * radius / length.max()) if length.max() > 0 else 1.0
     surface = linear_surface(grid)
     rest = surface.extract_feature_edges(**_OUTLINE)
     surface.points = grid.points + scale * u
     surface.point_data.clear()
     surface.point_data[colour_label] = colour_factor * length
-    plotter = pv.Plotter(off_screen=True, window_size=(size, size))
+    plotter = pv.Plotter(off_screen=True, window_size=[size, size])
     plotter.enable_anti_aliasing("ssaa")
     plotter.add_mesh(rest, color="#A0A0A0", line_width=1.0, lighting=False)
     add_coloured(plotter, surface, colour_label, size, cmap="cividis")
@@ -399,14 +402,16 @@ def add_coloured(
     points = _font(size)
     # Arial is about half as wide as high; text is placed by its lower left corner in pixels
     left = 0.5 * size - 0.42 * points * len(text)
-    plotter.add_text(text, position=(left, 0.012 * size), font_size=points, color="black", name="bar title")
+    write: Any = plotter.add_text  # its size need not be whole
+    write(text, position=(left, 0.012 * size), font_size=points, color="black", name="bar title")
 
 
 def add_text(plotter: pv.Plotter, text: str, size: int, *, name: str = "title") -> None:
     """Text in the upper left corner; a second call with the same name replaces it."""
     points = _font(size)
     top = size - 2.6 * points * (1 + text.count("\n")) - 0.01 * size
-    plotter.add_text(text, position=(0.02 * size, top), font_size=points, color="black", name=name)
+    write: Any = plotter.add_text  # its size need not be whole
+    write(text, position=(0.02 * size, top), font_size=points, color="black", name=name)
 
 
 def rounded(value: float) -> str:
@@ -421,9 +426,10 @@ def _font(size: int) -> float:
 
 def look_down(plotter: pv.Plotter, half_height: float) -> None:
     """Parallel view on the plane of the set, with room for title and colour bar."""
-    plotter.set_background("white")
-    plotter.view_xy()
-    plotter.enable_parallel_projection()
+    view: Any = plotter  # its methods have decorators that hide what they take
+    view.set_background("white")
+    view.view_xy()
+    view.enable_parallel_projection()
     camera = plotter.camera
     middle = -0.05 * half_height
     camera.focal_point, camera.position = (0.0, middle, 0.0), (0.0, middle, 10 * half_height)
@@ -436,7 +442,7 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
     import imageio.v3 as iio
 
     try:
-        image = plotter.screenshot(filename=None, return_img=True)
+        image = np.asarray(plotter.screenshot(filename=None, return_img=True))
     finally:
         plotter.close()
     stream = io.BytesIO()
@@ -453,14 +459,14 @@ def animate_operating_deflection(
     tangential: np.ndarray | None = None,
     sensor_angle: float = 0.0,
     clockwise: bool = False,
-    mean: bool = False,
-    scale: float | None = None,
     title: str = "",
     frames: int = 48,
-    seconds: float = 6.0,
     size: int = 480,
 ) -> int:
-    """Animate one revolution of the carrier; every frame is a true instant of the periodic motion.
+    """Animate one revolution of the carrier, six seconds; every frame is a true instant of the motion.
+
+    The mean deflection, which turns with the carrier, is left out; the largest displacement takes 9 % of the
+    outer radius.
 
     The number of frames is adjusted so that the meshes, seen frame by frame, pass slowly through a few
     cycles, as under a stroboscope (see `strobe_frames`).
@@ -477,15 +483,9 @@ def animate_operating_deflection(
         Place of the fixed sensor on the housing [rad].
     clockwise : bool
         Whether the carrier turns clockwise.
-    mean : bool
-        Whether to show the mean deflection that turns with the carrier as well.
-    scale : float, optional
-        Magnification; when omitted, the largest displacement takes 9 % of the outer radius.
     title : str
     frames : int
         Number of frames wished for.
-    seconds : float
-        Length of the animation.
     size : int
         Width and height in pixels.
 
@@ -512,11 +512,11 @@ def animate_operating_deflection(
             limit="(H + 1, 2 n_max + 1), equal for both directions",
         )
     _check_suffix(path)
-    field = _Field(radial, tangential, -1.0 if clockwise else 1.0, planetary_set.ring.teeth, mean)
+    field = _Field(radial, tangential, -1.0 if clockwise else 1.0, planetary_set.ring.teeth)
     count = strobe_frames(planetary_set.ring.teeth, frames)
     carrier = field.turn * 2 * np.pi * np.arange(count) / count
-    images = _draw(planetary_set, field, carrier, sensor_angle, scale, title, size)
-    _write(path, images, seconds)
+    images = _draw(planetary_set, field, carrier, sensor_angle, title, size)
+    _write(path, images)
     return count
 
 
@@ -540,7 +540,7 @@ def _check_suffix(path) -> None:
         raise CaseError("unknown kind of animation", code="E-CHOICE", value=str(path), limit=".gif or .mp4")
     if suffix == ".mp4":
         try:
-            import imageio_ffmpeg  # noqa: F401
+            import imageio_ffmpeg  # noqa: F401 # pyright: ignore[reportMissingImports]
         except ImportError:
             raise FemgearError(
                 "MP4 needs the package imageio-ffmpeg, which is not installed",
@@ -557,7 +557,7 @@ class _Field:
     tangential: np.ndarray
     turn: float
     teeth: int
-    mean: bool
+    mean: bool = False
 
     def at(self, angle: np.ndarray, carrier_angle: float) -> tuple[np.ndarray, np.ndarray]:
         """Radial and tangential displacement [m] at housing angles, the carrier at `carrier_angle`."""
@@ -569,7 +569,7 @@ class _Field:
         return (wave @ (time @ self.radial)).real, (wave @ (time @ self.tangential)).real
 
 
-def _draw(planetary_set, field, carrier, sensor_angle, scale, title, size):
+def _draw(planetary_set, field, carrier, sensor_angle, title, size):
     """Frames as arrays (size, size, 3)."""
     pv = load_pyvista()
     outer = planetary_set.ring.rim_radius
@@ -578,11 +578,11 @@ def _draw(planetary_set, field, carrier, sensor_angle, scale, title, size):
     around = np.linspace(0.0, 2 * np.pi, 181)
     largest = max(np.hypot(*field.at(around, c)).max() for c in carrier)
     colour = max(np.abs(field.at(around, c)[0]).max() for c in carrier) * 1e6 or 1.0
-    scale = scale if scale is not None else (0.09 * outer / largest if largest > 0 else 1.0)
+    scale = 0.09 * outer / largest if largest > 0 else 1.0
     text = "radial displacement [µm]"
     ring = pv.PolyData.from_regular_faces(_plane(corners.ravel()), _strip_faces(*corners.shape))
     ring.point_data[text] = np.zeros(corners.size)
-    plotter = pv.Plotter(off_screen=True, window_size=(size, size))
+    plotter = pv.Plotter(off_screen=True, window_size=[size, size])
     plotter.enable_anti_aliasing("ssaa")
     plotter.add_mesh(
         _closed_line(pv, outer * np.exp(1j * around[:-1])), color="#808080", line_width=1.0, lighting=False
@@ -608,7 +608,7 @@ def _draw(planetary_set, field, carrier, sensor_angle, scale, title, size):
                 for mesh, outline in pairs:
                     mesh.points = _plane(centre + outline * np.exp(1j * turn))
             plotter.render()
-            images.append(plotter.screenshot(filename=None, return_img=True)[..., :3])
+            images.append(np.asarray(plotter.screenshot(filename=None, return_img=True))[..., :3])
     finally:
         plotter.close()
     return images
@@ -701,12 +701,12 @@ def _plane(points) -> np.ndarray:
     return np.column_stack([points.real, points.imag, np.zeros(len(points))])
 
 
-def _write(path, images, seconds):
+def _write(path, images):
     """Write frames as GIF or MP4, whole or not at all."""
     import imageio.v3 as iio
 
-    pace = {"fps": max(round(len(images) / seconds), 1)}
+    pace: dict[str, Any] = {"fps": max(round(len(images) / _SECONDS), 1)}
     if Path(path).suffix == ".gif":
-        pace = {"duration": 1000.0 * seconds / len(images), "loop": 0}
+        pace = {"duration": 1000.0 * _SECONDS / len(images), "loop": 0}
     size = sum(image.nbytes for image in images) // 20
     replace_file(path, lambda temporary: iio.imwrite(temporary, images, **pace), size=size)

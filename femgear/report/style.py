@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import os
+from typing import cast
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from femgear.storage.files import replace_file
 
@@ -48,7 +50,7 @@ def new_figure(
         sharey=sharey,
         subplot_kw={"projection": "polar"} if polar else None,
     )
-    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.1)
+    cast(ConstrainedLayoutEngine, figure.get_layout_engine()).set(w_pad=0.08, h_pad=0.1)
     flat = list(axes.ravel())
     for ax in flat:
         ax.tick_params(labelsize=SIZE - 1)

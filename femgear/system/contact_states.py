@@ -53,7 +53,7 @@ def contact_states(meshes: GearMeshes, x, theta) -> ContactStates:
     CaseError
         Meshes that do not separate, no instants, deflections or forces that are not finite (E-CONTACT).
     """
-    if not meshes.separates:
+    if not meshes.separates or meshes.force is None or meshes.deflection is None:
         raise CaseError(
             "meshes that do not separate have no impacts", code="E-CONTACT", limit="separates=True"
         )

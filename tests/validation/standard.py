@@ -38,13 +38,12 @@ def nrel_stiffness() -> tuple[Row, ...]:
     """D6: stiffnesses of the published report."""
     s = nrel_set()
     # the report prints the blank factor C_R = 0.862, of webs a quarter of the face width
-    outer = mesh_stiffness_method_b(
-        18, 36, 0.3890, 0.5039, s.contact_ratio_sun_planet, dedendum=1.25, blank_factor=0.862
+    pairs = (
+        (18, 36, 0.3890, 0.5039, s.contact_ratio_sun_planet),
+        (36, math.inf, 0.5039, 0.1171, s.contact_ratio_planet_ring),
     )
     # the standard takes the ring's shift with the sign of ISO 21771
-    inner = mesh_stiffness_method_b(
-        36, math.inf, 0.5039, 0.1171, s.contact_ratio_planet_ring, dedendum=1.25, blank_factor=0.862
-    )
+    outer, inner = ([0.862 * one for one in mesh_stiffness_method_b(*pair, dedendum=1.25)] for pair in pairs)
     rows = []
     for name, value, ours in (
         ("sun-planet, c'", 12.240, outer[0]),

@@ -294,7 +294,7 @@ class DrivetrainCase(Section, ReadCase):
     """
 
     format: Annotated[int, Count(1, 2**31)] = FORMAT
-    model: Literal[MODEL]
+    model: Literal["drivetrain"]
     title: Title
     body: Annotated[tuple[BodySection, ...], Field(min_length=1, max_length=MOST_PARTS)]
     shaft: Annotated[tuple[ShaftSection, ...], Field(max_length=MOST_PARTS)] = ()
@@ -471,7 +471,7 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
     for one in entries:
         if one.share is not None:
             times = np.unique(np.concatenate([history.times for history in found]))
-            power = sum(ratio[history.body] * history.at(times) for history in found)
+            power = np.sum([ratio[history.body] * history.at(times) for history in found], axis=0)
             found.append(TorqueHistory(one.body, times, -one.share * power / ratio[one.body]))
     return tuple(found)
 
@@ -483,7 +483,7 @@ def cross_check(case: DrivetrainCase) -> list[CaseError]:
     return found if names else [*found, *_chain(case)]
 
 
-def joints(case: DrivetrainCase) -> list[tuple[str, str, str]]:
+def joints(case: DrivetrainCase) -> list[tuple[str, ...]]:
     """Key, and the two bodies, of every shaft and gear stage."""
     found = [(f"shaft[{i}].between", *one.between) for i, one in enumerate(case.shaft)]
     found += [(f"parallel[{i}].between", *one.between) for i, one in enumerate(case.parallel)]
@@ -567,7 +567,7 @@ def _bodies(case: DrivetrainCase) -> Iterator[CaseError]:
                 key=f"bearing[{i}].{'body' if one.body else 'shaft'}",
                 limit="body, or shaft with station",
             )
-        elif one.shaft is not None and not one.station < elements.get(one.shaft, 0):
+        elif one.shaft and one.station and not one.station < elements.get(one.shaft, 0):
             stations = elements.get(one.shaft, 0) - 1
             yield CaseError(
                 "there is no such station",

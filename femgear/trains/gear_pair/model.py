@@ -55,8 +55,8 @@ class PairBearings:
         ``c_i = 2 xi sqrt(k_i m_i)``, see `femgear.system.transmission_errors`.
     """
 
-    mass: tuple[float, float]
-    stiffness: tuple[float, float]
+    mass: tuple[float, ...]
+    stiffness: tuple[float, ...]
     damping_ratio: float = 0.0
 
     def __post_init__(self):
@@ -97,7 +97,7 @@ class ImpactPair:
     stiffness: tuple[complex, ...] = ()
     tooth_error: tuple[complex, ...] = ()
     eccentricity: tuple[complex, complex] = (0.0, 0.0)
-    teeth: tuple[int, int] = (20, 30)
+    teeth: tuple[int, ...] = (20, 30)
     bearings: PairBearings | None = None
 
     def __post_init__(self):

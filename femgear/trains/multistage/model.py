@@ -99,7 +99,7 @@ class Stage:
     """
 
     data: PlanarSet
-    teeth: tuple[int, int, int] | None = None
+    teeth: tuple[int, ...] | None = None
     fixed: str | None = "ring"
     phases: Sequence[float] | np.ndarray | None = None
     angle: float = 0.0
@@ -447,9 +447,8 @@ def _tooth_weights(data: MultistageSet) -> np.ndarray:
             f"no tooth numbers in stage {missing[0]}", code="E-TEETH", key=f"stages[{missing[0] - 1}].teeth",
             remedy="give the teeth of sun, planet and ring",
         )  # fmt: skip
-    return np.array(
-        [(-(1.0 + ring / sun), ring / sun, 1.0) for sun, _, ring in (s.teeth for s in data.stages)]
-    )
+    ratio = np.array([stage.teeth[2] / stage.teeth[0] for stage in data.stages if stage.teeth is not None])
+    return np.column_stack([-(1.0 + ratio), ratio, np.ones(len(ratio))])
 
 
 def _radius_weights(data: MultistageSet) -> np.ndarray:
@@ -529,7 +528,9 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
         K += (columns * stiffness) @ columns.T
     meshes = [free_motions(one.data).T @ mesh_directions(one.data, sign)
               for one, sign in zip(data.stages, stage_flanks(data, torque))]  # fmt: skip
-    W = np.hstack([block_diag(*meshes), *(_ends(data, data.couplings[number]) for number in turning)])
+    W = np.hstack(
+        [np.asarray(block_diag(*meshes)), *(_ends(data, data.couplings[number]) for number in turning)]
+    )
     load = np.concatenate([part.load for part in parts]) + _torque_load(data, torque)
     return MechanicalSystem(
         M=Z.T @ block_diag(*(part.M for part in parts)) @ Z,
@@ -640,7 +641,7 @@ def _centrifugal_stiffness(data: MultistageSet, carrier: np.ndarray) -> np.ndarr
         tangential, turned = T[10 + 3 * np.arange(N)], T[2]
         apart = tangential - turned
         blocks.append(stage.data.planet.mass * speed**2 * (tangential.T @ tangential - apart.T @ apart))
-    return block_diag(*blocks)
+    return np.asarray(block_diag(*blocks))
 
 
 def _gyroscopic(parts: list[MechanicalSystem], ratio: np.ndarray) -> np.ndarray:
@@ -648,7 +649,7 @@ def _gyroscopic(parts: list[MechanicalSystem], ratio: np.ndarray) -> np.ndarray:
     from scipy.linalg import block_diag
 
     still = (np.zeros_like(part.M) if part.gyroscopic is None else part.gyroscopic for part in parts)
-    return block_diag(*(one * matrix for one, matrix in zip(ratio, still)))
+    return np.asarray(block_diag(*(one * matrix for one, matrix in zip(ratio, still))))
 
 
 def _axis(data: MultistageSet, member: Member, axis: int) -> np.ndarray:

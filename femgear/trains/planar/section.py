@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import (
     AfterValidator,
@@ -34,7 +34,7 @@ Clearance = Annotated[float, Quantity(LENGTH, 0.0, 0.01)]
 Torsion = Annotated[float, Quantity(TORSION, 0.0, 1e15)]
 Ratio = Annotated[float, Number(0.0, 1.0, open_high=True)]
 
-FIGURES = (
+FigureName = Literal[
     "mode_shapes",
     "weight_response",
     "carrier_orbit",
@@ -46,7 +46,8 @@ FIGURES = (
     "response_mesh_forces",
     "response_spectrum",
     "contact_over_speed",
-)
+]
+FIGURES: tuple[str, ...] = get_args(FigureName)
 """Figures of a planar case that may be compared with published ones."""
 
 
@@ -120,7 +121,7 @@ class PlanarPublished(Section):
 
     kind: Literal["rotational", "translational", "planet"] | None = None
     frequency: Frequency | None = None
-    figure: Literal[FIGURES] | None = None
+    figure: FigureName | None = None
     comparison: Annotated[str, BeforeValidator(_sentence)] | None = None
     source: Title
 
