@@ -16,7 +16,7 @@ ARGS :=
 help:
 	@echo "make demo      run the reference planetary set ($(CASE)) and write its report"
 	@echo "make test      run the tests"
-	@echo "make lint      check style and formatting (ruff)"
+	@echo "make lint      check style and formatting (ruff) and types (basedpyright)"
 	@echo "make validate  recompute docs/validation.md and run the slow verification tests"
 	@echo "make bench     measure time and memory of every stage"
 	@echo "make clean     delete results, caches and generated grids (.venv stays)"
@@ -35,6 +35,7 @@ test: environment
 lint: environment
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
+	$(PY) -m basedpyright
 
 validate: environment
 	$(PY) tests/validation -o docs/validation.md

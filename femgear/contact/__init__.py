@@ -2,7 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from femgear.contact.assembly import (
+        ContactProblem,
+        MeshWindows,
+        assemble_contact,
+        in_windows,
+        mesh_windows,
+    )
+    from femgear.contact.bodies import Bodies, Sectors, make_bodies, make_sectors
+    from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
+    from femgear.contact.flank_pairs import loaded_image, mirrored_set
+    from femgear.contact.loaded_period import LoadedPeriod, loaded_period
+    from femgear.contact.root_stress import RootStresses, root_ranges, root_stress_cycle
+    from femgear.contact.solve import ContactState, mesh_tangent_matrix, solve_contact, tangent_stiffness
+    from femgear.contact.supports import RIGID, Supports, moving_members
+    from femgear.contact.tooth_loads import deformed_set, load_spectrum, loaded_teeth
 
 __all__ = [
     "RIGID",
