@@ -70,7 +70,8 @@ def _print(blocks) -> None:
         if block.rows:
             table = Table(box=box.SIMPLE_HEAD if block.header else None, show_header=bool(block.header))
             for index, name in enumerate(block.header or block.rows[0]):
-                table.add_column(name if block.header else "", justify="right" if index else "left")
+                side = "right" if index else "left"
+                table.add_column(name if block.header else "", justify=side, overflow="fold")
             for row in block.rows:
                 table.add_row(*row)
             console.print(table)

@@ -204,7 +204,7 @@ def describe_multistage(case: MultistageCase, train: MultistageSet) -> tuple[Blo
         header += ["sun [rpm]", "carrier [rpm]", "mesh [Hz]", "sun [N m]", "carrier [N m]"]
         numbers = speeds.sun / RPM, speeds.carrier / RPM, speeds.mesh_frequency, torques.sun, torques.carrier
         for row, values in zip(rows, zip(*numbers)):
-            row += [f"{value:.3f}" for value in values[:3]] + [f"{value:.1f}" for value in values[3:]]
+            row += [f"{value:.3f}" for value in values[:3]] + [f"{value:.6g}" for value in values[3:]]
         power = 1e-3 * case.operation.torque * case.operation.speed
         notes = (
             f"from {train.input} to {train.output}: ratio {speed_ratio(train):.6g}, {power:.4g} kW, output "
