@@ -144,3 +144,14 @@ def test_an_eccentric_gear_repeats_after_its_turn(case):
     shaft = found.frequency / 4
     gain = shaft**2 / np.abs(1.0 - shaft**2 + 2j * 0.09 * shaft)
     assert found.settled.all() and found.amplitude[:, 0] == pytest.approx(10.0 * gain, rel=1e-3)
+
+
+def test_motions_that_do_not_repeat_have_neither_amplitude_nor_mean(case):
+    """At a damping ratio of 0.09 the period doubles between the ratios 1.4 and 2.0."""
+    ranges = [{"from": 1.2, "to": 2.4, "count": 5}]
+    data = solve_sweep(with_values(case, {"sweep": {"ranges": ranges, "most_periods": 100}})).dataset()
+    settled = data["settled"].values
+    assert settled.any() and not settled.all()
+    for name in ("amplitude", "mean"):
+        assert np.array_equal(np.isfinite(data[name].values), settled)
+    assert np.isfinite(data["lowest"].values).all()

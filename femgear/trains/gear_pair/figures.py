@@ -212,7 +212,7 @@ FIGURES = {
         {
             "amplitude_and_mean": "Amplitude and mean of the relative deflection over the frequency ratio: "
             "harmonic balance, dashed where the motion is not known to be stable; triangles: settled motions "
-            "of the sweeps in time."
+            "of the sweeps in time, without those that do not repeat every tooth period."
         },
         draw_response,
     ),

@@ -95,9 +95,20 @@ class SweepResult:
 
         dims = ("direction", "ratio")
         extremes = both("lowest")[..., 0], both("highest")[..., 0], np.real(both("lines")[..., 0, 0])
-        variables = _motions(dims, *extremes) | _numbers(
+        variables, settled = _motions(dims, *extremes), both("settled")
+        for name in ("amplitude", "mean"):
+            # one period of a motion that needs several is not its amplitude, nor its mean
+            _, values, unit, words = variables[name]
+            values = np.where(settled, values, np.nan)
+            variables[name] = (
+                dims,
+                values,
+                unit,
+                f"{words}; NaN where it does not repeat every tooth period",
+            )
+        variables |= _numbers(
             dims,
-            settled=(both("settled"), "whether the motion repeats"),
+            settled=(settled, "whether the motion repeats"),
             periods=(both("periods"), "periods until then"),
         )
         coords = _ratios(self.case, "ratio", self.up.frequency)
