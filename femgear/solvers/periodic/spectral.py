@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import linalg as sparse_linalg
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.fourier import multiply, pad, product_matrix, sample
@@ -23,6 +24,9 @@ _TAIL_ENERGY = 1e-3
 _STILL = 1e-12
 # Speeds treated together: their receptances and matrices stay in the cache.
 _BATCH = 40
+# Unknowns of one speed above which Krylov steps replace elimination, and the residual that they must reach.
+_DENSE = 1500
+_ROUNDING = 1e-13
 
 
 def solve_spectral(
@@ -203,13 +207,38 @@ def matrices(problem: HarmonicProblem) -> np.ndarray:
 
 
 def solve_direct(problem: HarmonicProblem) -> np.ndarray:
-    """``E`` (n, n_speeds, H + 1) by Gaussian elimination of ``(I + T G) E = S`` at every speed.
+    """Solve ``(I + T G) E = S`` for the harmonics (n, n_speeds, H + 1) of the mesh deflections [m].
+
+    By Gaussian elimination; many unknowns by GMRES (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7,
+    1986, pp. 856-869) without ever forming the matrix, and by elimination where that does not reach rounding.
 
     Raises
     ------
     ConvergenceError
         When the equations are singular: an undamped parametric resonance.
     """
+    n, speeds, size = problem.source.shape
+    if 2 * n * size <= _DENSE:
+        return _eliminated(problem)
+    return np.concatenate([_krylov(problem.take(np.array([i]))) for i in range(speeds)], axis=1)
+
+
+def _krylov(problem: HarmonicProblem) -> np.ndarray:
+    """Harmonics (n, 1, H + 1) [m] of one speed by GMRES, or by elimination."""
+    n, _, size = problem.source.shape
+
+    def image(row: np.ndarray) -> np.ndarray:
+        return row + _rows(apply(problem, np.ascontiguousarray(row.reshape(n, 1, 2 * size)).view(complex)))[0]
+
+    right = _rows(problem.source)[0]
+    operator = sparse_linalg.LinearOperator((len(right), len(right)), matvec=image, dtype=float)  # type: ignore[call-arg]
+    row, _ = sparse_linalg.gmres(operator, right, rtol=0.1 * _ROUNDING, atol=0.0, restart=200, maxiter=4)
+    found = np.ascontiguousarray(row.reshape(n, 1, 2 * size)).view(complex)
+    return found if harmonic_residual(problem, found)[0] <= _ROUNDING else _eliminated(problem)
+
+
+def _eliminated(problem: HarmonicProblem) -> np.ndarray:
+    """Harmonics (n, n_speeds, H + 1) [m] by Gaussian elimination; refuses singular equations."""
     n, speeds, size = problem.source.shape
     operator = matrices(problem)
     diagonal = np.arange(operator.shape[-1])
