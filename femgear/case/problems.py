@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -20,7 +20,7 @@ from femgear.case.fields import described
 from femgear.case.sections import Case, RackSection
 from femgear.case.text import ReadCase
 from femgear.case.units import ANGLE, LENGTH
-from femgear.errors import CaseError, GeometryError
+from femgear.errors import CaseError, Finding, GeometryError, remark
 
 AnyCase = TypeVar("AnyCase", bound=ReadCase)
 
@@ -308,37 +308,23 @@ def _in_transverse_section(error: GeometryError, case: Case) -> None:
     error.message += ")"
 
 
-def added_material(case: Case) -> tuple[str, ...]:
-    """Warnings of reliefs and crownings with a negative amount: most are slips of the sign.
-
-    Parameters
-    ----------
-    case : Case
-    """
-    found = []
+def added_material(case: Case) -> Iterator[Finding]:
+    """Reliefs and crownings with a negative amount: most are slips of the sign."""
     for gear in ("sun", "planet", "ring"):
         for i, one in enumerate(getattr(case, gear).modifications):
             if one.kind in ("tip relief", "root relief", "profile crowning") and one.amount < 0.0:
-                found.append(
-                    f"[W-RELIEF-SIGN] {gear}.modifications[{i}].amount: a {one.kind} of "
-                    f"{one.amount * 1e6:.6g} um adds material; a positive amount takes it off (usual: 0 um "
-                    "or above)"
+                yield Finding(
+                    "W-RELIEF-SIGN",
+                    f"{gear}.modifications[{i}].amount",
+                    f"a {one.kind} of {one.amount * 1e6:.6g} um adds material",
+                    remedy="a positive amount takes it off (usual: 0 um or above)",
                 )
-    return tuple(found)
 
 
-def notices(data: dict) -> tuple[str, ...]:
-    """Remarks on what was read in a way that deserves to be said.
-
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file that was checked.
-    """
-    found = []
+def notices(data: dict) -> Iterator[Finding]:
+    """What the tables of a case file that was checked give in a way that deserves to be said."""
     if (teeth := data["ring"]["teeth"]) < 0:
-        found.append(
+        yield remark(
             f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
             "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
         )
-    return tuple(found)

@@ -10,7 +10,7 @@ import tomllib
 
 from pydantic import BaseModel, PrivateAttr
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 32
@@ -302,7 +302,7 @@ class ReadCase(BaseModel):
     _source: str = PrivateAttr(default="")
     _lines: str = PrivateAttr(default="")
     _name: str = PrivateAttr(default="")
-    _notices: tuple[str, ...] = PrivateAttr(default=())
+    _notices: tuple[Finding, ...] = PrivateAttr(default=())
     _profile_files: dict[str, str] = PrivateAttr(default_factory=dict)
 
     def read_from(self, text: str, lines: str, name: str, *, notices=(), profile_files=None) -> None:
@@ -316,7 +316,7 @@ class ReadCase(BaseModel):
             Text of the user, for line numbers; empty where he wrote none.
         name : str
             Of the file.
-        notices : sequence of str
+        notices : sequence of Finding
         profile_files : dict of str to str, optional
         """
         self._source, self._lines, self._name = text, lines, name
@@ -359,7 +359,7 @@ class ReadCase(BaseModel):
         return self._profile_files
 
     @property
-    def notices(self) -> tuple[str, ...]:
+    def notices(self) -> tuple[Finding, ...]:
         """Remarks on how the file was read."""
         return self._notices
 

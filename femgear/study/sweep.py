@@ -19,7 +19,7 @@ from textwrap import fill
 import numpy as np
 
 from femgear.case.sections import Case
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 from femgear.storage.files import storage_errors, write_text
 from femgear.study.designs import Failure, open_designs
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
@@ -179,11 +179,8 @@ def _warn_of_time(left: int, seconds: float) -> None:
     """Say on standard error how long the cases left will take, at so many seconds each."""
     total = left * seconds
     shown = f"{total / 3600.0:.1f} h" if total > 5400.0 else f"{total / 60.0:.1f} min"
-    print(
-        f"[W-SWEEP] {left} more cases of about {seconds:.2g} s each: {shown}; "
-        "an interrupted sweep goes on where it was",
-        file=sys.stderr,
-    )
+    text = f"{left} more cases of about {seconds:.2g} s each: {shown}"
+    print(Finding("W-SWEEP", "", text, remedy="an interrupted sweep goes on where it was"), file=sys.stderr)
 
 
 def parse_over(text: str) -> tuple[str, Sequence[object]]:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from femgear.errors import CaseError
+    from femgear.errors import CaseError, Finding
     from femgear.report.tables import Block
     from femgear.storage.results import Results
 
@@ -139,9 +139,9 @@ class Train:
     describe : callable
         ``(case) -> blocks``: its title first, its warnings last.
     warnings : callable
-        ``(case) -> sentences``: what is allowed but deserves a look.
+        ``(case) -> findings``: what is allowed but deserves a look.
     result_warnings : callable
-        ``(Results) -> sentences``: what the solvers say against their own results.
+        ``(Results) -> findings``: what the solvers say against their own results.
     figures : callable
         ``() -> {stage: Figures}``; called when something is drawn, so that drawing libraries are loaded late.
         ``""`` are those of the case, whatever is computed of it.
@@ -154,7 +154,7 @@ class Train:
     cross_check : callable
         ``(case) -> problems``: what no entry shows alone.
     notices : callable
-        ``(tables) -> sentences``: what was read in a way that deserves to be said.
+        ``(tables) -> findings``: what was read in a way that deserves to be said.
     """
 
     name: str
@@ -162,14 +162,14 @@ class Train:
     model: type
     stages: tuple[Stage, ...]
     describe: Callable[[Any], tuple[Block, ...]]
-    warnings: Callable[[Any], Iterable[str]]
-    result_warnings: Callable[[Results], Iterable[str]] = lambda results: ()
+    warnings: Callable[[Any], Iterable[Finding]]
+    result_warnings: Callable[[Results], Iterable[Finding]] = lambda results: ()
     figures: Callable[[], Mapping[str, Figures]] = dict
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
     section: str = ""
     own_file: OwnFile | None = None
     cross_check: Callable[[Any], Iterable[CaseError]] = lambda case: ()
-    notices: Callable[[dict], Iterable[str]] = lambda data: ()
+    notices: Callable[[dict], Iterable[Finding]] = lambda data: ()
 
     def stage(self, name: str) -> Stage | None:
         """The stage of a name, None where the train has none of it."""

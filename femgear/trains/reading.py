@@ -24,7 +24,7 @@ from femgear.case.problems import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
 from femgear.case.tables import embed_profiles
 from femgear.case.text import text_with_points
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
 from femgear.trains.protocol import OwnFile, Train
@@ -139,7 +139,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
     except CaseError as error:
         error.key, error.file = ", ".join(values), case.name or None
         raise
-    said: tuple[str, ...] = ()
+    said: tuple[Finding, ...] = ()
     try:
         changed = _build(case_text.parse(text, case.name), text, case.name, numbered=False)
     except CaseError as error:

@@ -47,7 +47,7 @@ from femgear.case.units import (
     TORQUE,
     TORSION,
 )
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 from femgear.system import shaft as shafts
 from femgear.trains.drivetrain.data import (
     ChainBearing,
@@ -855,7 +855,7 @@ def _unfit(key: str, message: str) -> CaseError:
 _CHECKS = (_bodies, _shafts, check_sizes, _torques, _simulation, _size)
 
 
-def notices(case: DrivetrainCase) -> tuple[str, ...]:
+def notices(case: DrivetrainCase) -> tuple[Finding, ...]:
     """Remarks on a case that was checked."""
     found = []
     for i, stage in enumerate(case.parallel):
@@ -872,17 +872,21 @@ def notices(case: DrivetrainCase) -> tuple[str, ...]:
                     (f"planetary[{i}]", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)
                 )
     said = [
-        f"[W-TEETH] {key}.teeth: the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
-        "the radii, mesh frequencies the teeth of the first gear or of the ring"
+        Finding(
+            "W-TEETH",
+            f"{key}.teeth",
+            f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
+            "the radii, mesh frequencies the teeth of the first gear or of the ring",
+        )
         for key, radii, teeth in found
         if abs(teeth / radii - 1.0) > _REMARK
     ]
     if not case.bearing:
-        said.append("[W-BEARING] there is no [[bearing]]")
+        said.append(Finding("W-BEARING", "", "there is no [[bearing]]"))
     return (*said, *_open_backs(case))
 
 
-def _open_backs(case: DrivetrainCase) -> Iterator[str]:
+def _open_backs(case: DrivetrainCase) -> Iterator[Finding]:
     """Meshes whose teeth part but find no back flank."""
     if not case.simulation.contact_loss:
         return
@@ -890,12 +894,14 @@ def _open_backs(case: DrivetrainCase) -> Iterator[str]:
     for i, one in enumerate(case.planetary):
         meshes += [(f"planetary[{i}].sun_mesh", one.sun_mesh), (f"planetary[{i}].ring_mesh", one.ring_mesh)]
     if bare := [key for key, mesh in meshes if mesh.backlash is None]:
-        yield (
-            f"[W-BACKLASH] {', '.join(bare)}: without backlash given there is no back side: with "
-            "simulation.contact_loss these teeth part and meet no back flank"
+        yield Finding(
+            "W-BACKLASH",
+            ", ".join(bare),
+            "without backlash given there is no back side: with "
+            "simulation.contact_loss these teeth part and meet no back flank",
         )
     if not meshes:
-        yield "[W-BACKLASH] simulation.contact_loss: there are no meshes that could part"
+        yield Finding("W-BACKLASH", "simulation.contact_loss", "there are no meshes that could part")
 
 
 def embed_torques(data: dict, name: str) -> dict[str, str]:

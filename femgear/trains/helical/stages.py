@@ -234,7 +234,9 @@ HELICAL = Train(
             ),
             verdict=static_stages.static_verdict,
             describe=lambda results: describe_helical_static(
-                results.static, results.modes if "modes" in results.stages else None
+                results.static,
+                results.modes if "modes" in results.stages else None,
+                module=planetary_set(results.case).sun.module,
             ),
             unavailable=lambda case: (
                 "a given helical.mesh_stiffness takes the place of the static solution"

@@ -13,6 +13,7 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
+from femgear.errors import Finding
 from femgear.report.tables import describe_modes
 from femgear.threads import one_blas_thread
 from femgear.trains.planar.checks import (
@@ -374,7 +375,7 @@ def _figures() -> Mapping[str, Figures]:
     return FIGURES
 
 
-def _result_warnings(results: Results) -> Iterator[str]:
+def _result_warnings(results: Results) -> Iterator[Finding]:
     branch, response = (
         results.stage(name) if name in results.stages else None for name in ("branch", "response")
     )

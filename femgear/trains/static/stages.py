@@ -321,7 +321,7 @@ STATIC = Stage(
     title="Static",
     solve=lambda case, _, context: solve_static(case, cache=context.cache, progress=context.progress),
     verdict=static_verdict,
-    describe=lambda results: describe_static(results.static),
+    describe=lambda results: describe_static(results.static, planetary_set(results.case).sun.module),
     check=planetary_set,
 )
 
