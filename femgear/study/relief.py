@@ -5,9 +5,6 @@ constant under that torque (S. L. Harris, "Dynamic loads on the teeth of spur ge
 `harris_map` computes it over torque, `relief_grid` over amount and length of the relief, `optimise_relief`
 finds the least peak to peak at one torque and says whether it is a minimum. All of them start from
 `design_basis`: what the variants of a design share.
-
-Amount, length, pin and pitch errors are parameters of the deviations as well: functions of one number that
-return deviations, for `femgear.study.sensitivity`.
 """
 
 from __future__ import annotations
@@ -16,7 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -42,8 +39,6 @@ AMOUNT_STEP, LENGTH_STEP = 0.1e-6, 0.05e-3
 """Steps [m] of the points around the optimum, of amount and of length along the path of contact."""
 SMALLEST_GAIN = 1e-4
 """Gain [um] under which a neighbour counts as no better."""
-Parameter = Callable[[float], SetDeviations]
-"""Deviations for a value of one parameter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +174,7 @@ def with_tip_relief(
 
 
 def relief_snippet(gears: PlanetarySet, *, amount: float, length: float, power: float, back: bool) -> str:
-    """Tables of a case file for the tip relief of `relief.with_tip_relief`, to be pasted at its end."""
+    """Tables of a case file for the tip relief of `with_tip_relief`, to be pasted at its end."""
     side = "ring side" if back else "sun side"
     lines = []
     for gear, start, flank in zip((gears.sun, gears.planet), relief_starts(gears, length=length), ("", side)):
@@ -189,93 +184,6 @@ def relief_snippet(gears: PlanetarySet, *, amount: float, length: float, power: 
         lines += [f'amount = "{amount * 1e6:.3f} um"', f'start_diameter = "{diameter:.5f} mm"']
         lines += [f"power = {power:g}", ""]
     return "\n".join(lines)
-
-
-def relief_amount(deviations, planetary_set: PlanetarySet, *, length: float, **options) -> Parameter:
-    """Amount [m] of the tip relief of `with_tip_relief`; options are its ``power`` and ``back``."""
-    return lambda value: with_tip_relief(deviations, planetary_set, amount=value, length=length, **options)
-
-
-def relief_length(deviations, planetary_set: PlanetarySet, *, amount: float, **options) -> Parameter:
-    """Length of the same relief along the path of contact, in lengths of two-pair contact."""
-    return lambda value: with_tip_relief(deviations, planetary_set, amount=amount, length=value, **options)
-
-
-def pin_error(
-    deviations: SetDeviations, *, planet: int, direction: Literal["radial", "tangential"]
-) -> Parameter:
-    """Displacement [m] of one planet's axis, on top of the deviations.
-
-    Parameters
-    ----------
-    deviations : SetDeviations
-    planet : int
-        1 to N.
-    direction : {"radial", "tangential"}
-        Outwards and counter-clockwise positive.
-
-    Raises
-    ------
-    CaseError
-        E-RANGE: no such planet or direction.
-    """
-    N = len(deviations.pin_errors)
-    ways = ("radial", "tangential")
-    if not 1 <= planet <= N or direction not in ways:
-        raise CaseError(
-            "no such pin error", code="E-RANGE", value=(planet, direction), limit=f"1 to {N}, {ways}"
-        )
-    unit = np.zeros((N, 2))
-    unit[planet - 1, ways.index(direction)] = 1.0
-    return lambda value: replace(deviations, pin_errors=deviations.pin_errors + value * unit)
-
-
-def tooth_pitch_error(
-    deviations: SetDeviations,
-    planetary_set: PlanetarySet,
-    *,
-    gear: Literal["sun", "planet", "ring"],
-    tooth: int,
-    planet: int = 1,
-) -> Parameter:
-    """Displacement [m] of one tooth along the reference circle, counter-clockwise, on top of the deviations.
-
-    As one entry of ``cumulative_pitch`` of the case file: the tooth moves as a whole, its left flank towards
-    its mate and its right flank away from it; along the line of action by r_b/r of that.
-
-    Parameters
-    ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
-    gear : {"sun", "planet", "ring"}
-    tooth : int
-        Counter-clockwise from 0, see `gears.deviations`.
-    planet : int
-        Which of them, 1 to N.
-
-    Raises
-    ------
-    CaseError
-        E-RANGE: no such gear, tooth or planet.
-    """
-    s, names = planetary_set, ("sun", "planet", "ring")
-    found = getattr(s, gear) if gear in names else None
-    if found is None or not 0 <= tooth < found.teeth or not 1 <= planet <= s.n_planets:
-        limit = "a tooth 0 to z - 1 of sun, planet 1 to N or ring"
-        raise CaseError("no such tooth", code="E-RANGE", value=(gear, planet, tooth), limit=limit)
-    along = found.base_radius / found.reference_radius
-    place = (planet - 1, tooth) if gear == "planet" else tooth
-    signs = (
-        {"planet_pitch": -1.0, "planet_ring_side_pitch": 1.0} if gear == "planet" else {f"{gear}_pitch": -1.0}
-    )
-
-    def variant(value: float) -> SetDeviations:
-        arrays = {name: np.array(getattr(deviations, name)) for name in signs}
-        for name, sign in signs.items():
-            arrays[name][place] += sign * along * value
-        return replace(deviations, **arrays)
-
-    return variant
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,14 +14,13 @@ every cell (the adjoint of a linear system: M. B. Giles, N. A. Pierce, Flow, Tur
 2000, 393-415). The chain rule goes on through the separations, which cost no contact solution.
 
 What these derivatives are not: cells change sides at the rims of the contacts, where pressures vanish, so
-over a finite step the exact function bends away from them. Extremes over positions and planets have kinks,
-see `peak_to_peak_slopes`.
+over a finite step the exact function bends away from them. Extremes over positions and planets have kinks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,7 +47,7 @@ from femgear.gears.deviations import (
     profile_separation,
     tooth_separation,
 )
-from femgear.study.relief import DesignBasis, pin_error
+from femgear.study.relief import DesignBasis
 from femgear.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -133,7 +132,7 @@ class LinearContact:
     @property
     def mesh_rows(self) -> np.ndarray:
         """Meshes of the solved set in the order of the original, (2N,)."""
-        return original_rows(self.order)
+        return _original_rows(self.order)
 
     @property
     def share(self) -> np.ndarray:
@@ -141,7 +140,7 @@ class LinearContact:
         return self.force[: self.original.n_planets] / self.load
 
 
-def original_rows(order) -> np.ndarray:
+def _original_rows(order) -> np.ndarray:
     """Meshes of the solved set in the order of the original, (2N,)."""
     back = np.argsort(order)
     return np.concatenate([back, back + len(back)])
@@ -193,7 +192,7 @@ def linearise(
     load = abs(sun_torque) / solved.gears.sun.base_radius
     options = {"positions": position, "contact": contact, "cells": cells}
     setup, answers = _solve(solved, load, numbers, options)
-    rows = original_rows(order)
+    rows = _original_rows(order)
     stacked = {name: np.stack([answer[name] for answer in answers]) for name in answers[0] if name != "cells"}
     return LinearContact(
         original=basis.gears,
@@ -342,8 +341,7 @@ def sensitivity(
     linear : LinearContact
         Of the set with the deviations ``variant(value)``.
     variant : callable
-        Deviations (of the set as it is, not mirrored) for a value of the parameter, as those of
-        `femgear.study.relief`.
+        Deviations (of the set as it is, not mirrored) for a value of the parameter.
     value : float
     step : float
         The separations are differentiated centrally over twice this; exact where they are linear in the
@@ -406,65 +404,11 @@ def pin_sensitivities(linear: LinearContact) -> np.ndarray:
     so these derivatives hold beside any other deviations.
     """
     ideal, N = no_deviations(linear.original), linear.original.n_planets
-    found = [
-        [
-            sensitivity(linear, pin_error(ideal, planet=n + 1, direction=way), 0.0, step=1e-6).share
-            for way in ("radial", "tangential")
-        ]
-        for n in range(N)
-    ]
-    return np.moveaxis(np.array(found), 2, 0)
+    found = []
+    for unit in np.eye(2 * N).reshape(2 * N, N, 2):
 
+        def variant(value: float, unit=unit) -> SetDeviations:
+            return replace(ideal, pin_errors=value * unit)
 
-def peak_to_peak_slopes(signal, change, *, step: float) -> tuple[float, float]:
-    """Left and right derivative of a peak to peak value.
-
-    The largest and the smallest of linear functions are convex and concave, so the peak to peak of
-    ``signal + x change`` is convex in x and piecewise straight: its one-sided slopes are those of the
-    positions that hold the extremes (J. M. Danskin, SIAM J. Appl. Math. 14, 1966). They differ where two
-    positions share an extreme, as at the optimum of a relief; left is then below zero, right above. Over a
-    finite step both are secants, which count positions that become the extreme one within it. Between the
-    positions of the record the extreme may lie a little higher.
-
-    Parameters
-    ----------
-    signal : (P,) or (K, P) array
-        Of several signals the largest peak to peak counts.
-    change : array of the same shape
-        Derivative of every value per unit of the parameter.
-    step : float
-        Of the parameter to either side.
-
-    Returns
-    -------
-    left, right : float
-        Per unit of the parameter, left at most right.
-    """
-    return _slopes(lambda y: float(np.ptp(np.atleast_2d(y), axis=1).max()), signal, change, step)
-
-
-def sharing_factor_slopes(share, change, *, step: float) -> tuple[float, float]:
-    """Left and right derivative of the load sharing factor K_gamma = N max share.
-
-    It has a kink where planets share the largest load, as those of an ideal set do: then both slopes
-    point upwards, left below zero and right above. See `peak_to_peak_slopes`.
-
-    Parameters
-    ----------
-    share : (N, P) array
-        Shares at one position or at several.
-    change : (N, P) array
-        Derivative of every share per unit of the parameter.
-    step : float
-        Of the parameter to either side.
-    """
-    return _slopes(lambda y: len(y) * float(y.max()), share, change, step)
-
-
-def _slopes(function, values, change, step):
-    """Secants of a function of the values to the left and to the right."""
-    values, change = np.asarray(values, float), np.asarray(change, float)
-    if not (np.isfinite(step) and step > 0):
-        raise CaseError("a slope needs a step", code="E-RANGE", value=step, limit="over 0")
-    here = function(values)
-    return (here - function(values - step * change)) / step, (function(values + step * change) - here) / step
+        found.append(sensitivity(linear, variant, 0.0, step=1e-6).share)
+    return np.moveaxis(np.array(found).reshape(N, 2, N, -1), 2, 0)
