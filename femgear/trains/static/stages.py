@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.case import material_of, planetary_set, set_deviations
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
 from femgear.case.sections import Case
 from femgear.contact.root_stress import root_ranges
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
     from femgear.contact.root_stress import RootStresses
     from femgear.contact.supports import Supports
-    from femgear.fe.elasticity import Material
     from femgear.gears.planetary import PlanetarySet
 
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
@@ -209,13 +208,6 @@ def nominal_stresses(
             except GeometryError as error:
                 messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
     return NominalStresses(contact, root, "; ".join(dict.fromkeys(messages)))
-
-
-def material_of(case: Case) -> Material:
-    """Material of the gears of a case."""
-    from femgear.fe.elasticity import Material
-
-    return Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
 
 
 def ring_foundation(case: Case, sector: Sector):
