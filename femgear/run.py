@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import finish, record
-from femgear.trains.protocol import Context, Drawn, Progress, Stage
+from femgear.trains.protocol import Context, Drawn, Progress, Stage, one_blas_thread
 from femgear.trains.reading import open_results
 from femgear.trains.registry import check_case, stages_of, train_of
 
@@ -57,8 +57,6 @@ def solve(case: Any, only: str | None = None, *, progress: Progress | None = Non
 
 def _solved(case: Any, only: str | None, context: Context) -> Iterator[tuple[Stage, Any, float]]:
     """Stages of a case with their results and seconds, one after the other."""
-    from femgear.threads import one_blas_thread
-
     if only == "stress":
         case = case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})})
     results, say = {}, context.progress or (lambda name, done, total: None)

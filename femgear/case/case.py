@@ -217,10 +217,10 @@ def set_deviations(case: Case) -> SetDeviations:
         pins[pin.planet - 1] = pin.radial, pin.tangential
     found = replace(
         no_deviations(s),
-        sun=flank_form(case, s.sun),
-        planet_sun_side=flank_form(case, s.planet, "sun side"),
-        planet_ring_side=flank_form(case, s.planet, "ring side"),
-        ring=flank_form(case, s.ring),
+        sun=_flank_form(case, s.sun),
+        planet_sun_side=_flank_form(case, s.planet, "sun side"),
+        planet_ring_side=_flank_form(case, s.planet, "ring side"),
+        ring=_flank_form(case, s.ring),
         # a tooth that stands further on brings its left flank nearer to the mate, its right flank away
         sun_pitch=-_pitch(sun, s.sun),
         planet_pitch=[-displaced for displaced in pitch],
@@ -263,25 +263,8 @@ def _runout(errors: CarrierErrors) -> Runout:
     return Runout(errors.runout_amplitude or 0.0, errors.runout_phase or 0.0)
 
 
-def flank_form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
-    """Form of a flank of a gear; planets have one on the side of the sun and one on that of the ring.
-
-    Parameters
-    ----------
-    case : Case
-    gear : Gear
-    side : str
-        Flank of a planet, "sun side" or "ring side"; sun and ring have "both" alike.
-
-    Returns
-    -------
-    FlankForm
-
-    Raises
-    ------
-    GeometryError
-        E-MODIFICATION, with key, file and line: what the flank cannot have.
-    """
+def _flank_form(case: Case, gear: Gear, side: str = "both") -> FlankForm:
+    """Form of both flanks of sun or ring, or of a planet's flank on the "sun side" or the "ring side"."""
     found = []
     for i, section in enumerate(getattr(case, gear.name).modifications):
         if getattr(section, "flank", "both") not in (side, "both"):
@@ -328,13 +311,7 @@ def _modification(section: ModificationSection, gear: Gear) -> Modification:
 
 
 def _check_reach(case: Case, profile: MeasuredProfile, gear: Gear, key: str) -> None:
-    """Refuse a measured profile that lies beside the flank.
-
-    Raises
-    ------
-    GeometryError
-        E-MODIFICATION, with the file of the profile and both ranges.
-    """
+    """Refuse a measured profile that lies beside the flank, with its file and both ranges."""
     low, high = sorted((gear.form_roll, gear.tip_roll))
     if profile.roll[-1] >= low and profile.roll[0] <= high:
         return

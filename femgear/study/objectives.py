@@ -30,16 +30,15 @@ if TYPE_CHECKING:
     from femgear.trains.static.results import StaticResult, StressResult
 
 Mesh = Literal["largest", "overall", "sun-planet", "planet-ring"]
-MeshKind = Literal["sun-planet", "planet-ring"]
-GearName = Literal["sun", "planet", "ring"]
+_MeshKind = Literal["sun-planet", "planet-ring"]
+_GearName = Literal["sun", "planet", "ring"]
 Range = tuple[float, float, int]
 """First and last input speed [rad/s] and number of speeds."""
 Speeds = tuple[str, str]
 """First and last speed of the input, with their units."""
-MICROMETRES = Dimension("a length", "m", "um", 1e-6)
-FORCE = Dimension("a force", "N", "N", 1.0)
-LEVEL = ACCELERATION
-STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
+_MICROMETRES = Dimension("a length", "m", "um", 1e-6)
+_FORCE = Dimension("a force", "N", "N", 1.0)
+_STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
 NUMBER = Dimension("a number", "1", "1", 1.0)
 STAGES = ("gears", "static", "stress", "dynamics", "housing")
 """In the order of their effort."""
@@ -209,7 +208,7 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
         return peak_to_peak(signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2))
 
     where = "" if value is None else f" at {TORQUE.show(value)}"
-    return Quantity(f"STE peak to peak, {mesh}{where}", MICROMETRES, "static", compute, signal, value)
+    return Quantity(f"STE peak to peak, {mesh}{where}", _MICROMETRES, "static", compute, signal, value)
 
 
 def peak_to_peak(signals: np.ndarray) -> float:
@@ -255,7 +254,7 @@ def mesh_force(
         return float(forces_over_time(chosen, dynamic=of_mean).max())
 
     which = "" if mesh == "all" else f", {mesh}"
-    return Quantity(f"{part} mesh force{which}, {_words(at)}", FORCE, "dynamics", compute)
+    return Quantity(f"{part} mesh force{which}, {_words(at)}", _FORCE, "dynamics", compute)
 
 
 def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
@@ -293,21 +292,21 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     def compute(variant: Variant) -> float:
         return float(np.abs(variant.housing(at).exact.acceleration).max())
 
-    return Quantity(f"housing level, {_words(at)}", LEVEL, "housing", compute)
+    return Quantity(f"housing level, {_words(at)}", ACCELERATION, "housing", compute)
 
 
-def contact_ratio(mesh: MeshKind) -> Quantity:
+def contact_ratio(mesh: _MeshKind) -> Quantity:
     """Transverse contact ratio, from the tip circles."""
     names = {"sun-planet": "contact_ratio_sun_planet", "planet-ring": "contact_ratio_planet_ring"}
     name = _chosen(mesh, names, "mesh")
     return Quantity(f"contact ratio, {mesh}", NUMBER, "gears", lambda v: float(getattr(v.gears, name)))
 
 
-def tip_thickness(gear: GearName) -> Quantity:
+def tip_thickness(gear: _GearName) -> Quantity:
     """Thickness of the teeth on the tip circle, in modules."""
     from femgear.gears.gear import tooth_thickness
 
-    name = _chosen(gear, {g: g for g in get_args(GearName)}, "gear")
+    name = _chosen(gear, {g: g for g in get_args(_GearName)}, "gear")
 
     def compute(variant: Variant) -> float:
         found = getattr(variant.gears, name)
@@ -319,11 +318,11 @@ def tip_thickness(gear: GearName) -> Quantity:
 def contact_pressure() -> Quantity:
     """Largest contact pressure away from the ends of the flanks [Pa]."""
     return Quantity(
-        "contact pressure", STRESS, "static", lambda v: float(v.static().cycle.max_pressure.max())
+        "contact pressure", _STRESS, "static", lambda v: float(v.static().cycle.max_pressure.max())
     )
 
 
-def root_stress(gear: GearName) -> Quantity:
+def root_stress(gear: _GearName) -> Quantity:
     """Largest stress in the roots of a gear [Pa], of a planet in both its meshes."""
     from femgear.contact.root_stress import LOADED
 
@@ -336,7 +335,7 @@ def root_stress(gear: GearName) -> Quantity:
         chosen = [roots[2 * mesh + i] for k, i in wanted for mesh in range(k * n, (k + 1) * n)]
         return max(float(root.stress[:, :, LOADED].max()) for root in chosen)
 
-    return Quantity(f"root stress, {gear}", STRESS, "stress", compute)
+    return Quantity(f"root stress, {gear}", _STRESS, "stress", compute)
 
 
 def _chosen(value, table: dict, key: str):
@@ -376,10 +375,10 @@ _WORDS: dict[str, Callable[[str | None, Speeds | None], Quantity]] = {
     "mesh force": lambda _, speeds: mesh_force(*_given(speeds, "mesh force")),
     "peak mesh force": lambda _, speeds: mesh_force(*_given(speeds, "peak mesh force"), part="peak"),
     "housing": lambda _, speeds: housing_level(*_given(speeds, "housing")),
-    **{f"contact ratio {mesh}": lambda *_, mesh=mesh: contact_ratio(mesh) for mesh in get_args(MeshKind)},
-    **{f"tip thickness {gear}": lambda *_, gear=gear: tip_thickness(gear) for gear in get_args(GearName)},
+    **{f"contact ratio {mesh}": lambda *_, mesh=mesh: contact_ratio(mesh) for mesh in get_args(_MeshKind)},
+    **{f"tip thickness {gear}": lambda *_, gear=gear: tip_thickness(gear) for gear in get_args(_GearName)},
     "contact pressure": lambda *_: contact_pressure(),
-    **{f"root stress {gear}": lambda *_, gear=gear: root_stress(gear) for gear in get_args(GearName)},
+    **{f"root stress {gear}": lambda *_, gear=gear: root_stress(gear) for gear in get_args(_GearName)},
 }
 NAMES = tuple(_WORDS)
 

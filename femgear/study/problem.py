@@ -28,7 +28,7 @@ Vector = Sequence[float] | np.ndarray
 """Values of the design variables in their units, (n,)."""
 Point = tuple[object, ...]
 """Values of the design variables as the case file holds them; empty for the case as it is."""
-DEFAULT_TOLERANCE = 0.1
+_DEFAULT_TOLERANCE = 0.1
 """Over the range of the variable."""
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 _DIGITS = 9
@@ -161,7 +161,7 @@ class Variable:
         if self.integer:
             return 1.0
         if given is None:
-            return DEFAULT_TOLERANCE * (high - low)
+            return _DEFAULT_TOLERANCE * (high - low)
         if isinstance(given, str) and given.strip().endswith("%"):
             share = split(given.strip()[:-1], self.name)[0] / 100.0
             # a share of nothing would be no tolerance
@@ -208,14 +208,8 @@ def start_point(case: Case, variables: Sequence[Variable]) -> np.ndarray:
     return np.array(found)
 
 
-def check_variables(case: Case, variables: Sequence[Variable]) -> None:
-    """Refuse variables that the case file does not know, or whose bounds it refuses.
-
-    Raises
-    ------
-    CaseError
-        E-VARIABLE: none, or one key twice; what `femgear.with_value` refuses.
-    """
+def _check_variables(case: Case, variables: Sequence[Variable]) -> None:
+    """Refuse variables that the case file does not know, keys given twice, and bounds that it refuses."""
     keys = [key for variable in variables for key in variable.keys]
     twice = sorted({key for key in keys if keys.count(key) > 1})
     if not keys or twice:
@@ -307,7 +301,7 @@ class Problem:
     def __post_init__(self):
         for name in ("variables", "also", "limits"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        check_variables(self.case, self.variables)
+        _check_variables(self.case, self.variables)
 
     @property
     def reported(self) -> tuple[Quantity, ...]:

@@ -25,7 +25,7 @@ from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
 from femgear.gears.kinematics import torques
 from femgear.gears.modifications import FlankForm, TipRelief
-from femgear.threads import one_blas_thread
+from femgear.trains.protocol import one_blas_thread
 from femgear.trains.static.stages import flank_compliances, static_supports
 
 if TYPE_CHECKING:
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
 
-LARGEST_LENGTH = 1.3
+_LARGEST_LENGTH = 1.3
 """Longest relief in lengths of two-pair contact; longer ones reach the pitch point of common sets."""
 AMOUNT_STEP, LENGTH_STEP = 0.1e-6, 0.05e-3
 """Steps [m] of the points around the optimum, of amount and of length along the path of contact."""
-SMALLEST_GAIN = 1e-4
+_SMALLEST_GAIN = 1e-4
 """Gain [um] under which a neighbour counts as no better."""
 
 
@@ -62,7 +62,24 @@ class DesignBasis:
     deviations: SetDeviations | None = None
 
     def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
-        """The set as it is solved, mirrored under a negative torque, and its planets by number, (N,)."""
+        """The set as it is solved, mirrored under a negative torque, and its planets by number, (N,).
+
+        Raises
+        ------
+        CaseError
+            E-TORQUE: no torque; E-SUPPORT: bearings with clearance.
+        """
+        if not (np.isfinite(sun_torque) and sun_torque):
+            raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
+        if clearance := self.supports.planet_clearance:
+            raise CaseError(
+                "derivatives and the load sharing of samples know no clearance of the planet bearings",
+                code="E-SUPPORT",
+                key="planet.bearing_clearance",
+                value=f"{clearance * 1e6:.6g} um",
+                limit="0 um",
+                remedy='set it to zero, or solve single cases with static.members = "elastic"',
+            )
         gears, order, deviations = loaded_image(self.gears, sun_torque, self.deviations)
         return replace(self, gears=gears, deviations=deviations), order
 
@@ -119,12 +136,12 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
     CaseError
         E-RANGE: a length outside 0.05 to 1.3.
     """
-    if not 0.05 <= length <= LARGEST_LENGTH:
+    if not 0.05 <= length <= _LARGEST_LENGTH:
         raise CaseError(
             f"a relief of {length} lengths of two-pair contact is not plausible",
             code="E-RANGE",
             value=length,
-            limit=f"0.05 to {LARGEST_LENGTH}",
+            limit=f"0.05 to {_LARGEST_LENGTH}",
         )
     pair = mesh_pairs(planetary_set)[0]
     begin, end = pair.path
@@ -463,7 +480,7 @@ def optimise_relief(
         evaluations=len(known),
         amount_slopes=slopes[0],
         length_slopes=(slopes[1][0] * 1e-6 / unit, slopes[1][1] * 1e-6 / unit),
-        minimum=min(around.values()) >= value - SMALLEST_GAIN,
+        minimum=min(around.values()) >= value - _SMALLEST_GAIN,
     )
 
 
@@ -496,7 +513,7 @@ def _descend(peak: Callable, start, bounds, sizes, step, left: Callable[[], int]
         )
         around = {place: peak(place) for place in _neighbours(found.x, bounds, step)}
         best = min(around, key=around.__getitem__)
-        if around[best] >= found.fun - SMALLEST_GAIN or left() <= 0:
+        if around[best] >= found.fun - _SMALLEST_GAIN or left() <= 0:
             return found.x, float(found.fun), around
         point, size = np.array(best), 2.0 * step
 

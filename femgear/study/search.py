@@ -32,8 +32,7 @@ from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Toleran
 from femgear.study.problem import Point, Problem, Variable, Vector, start_point
 from femgear.study.relief import DesignBasis
 from femgear.study.sensitivity import linearise, sensitivity
-from femgear.threads import one_blas_thread
-from femgear.trains.protocol import Progress
+from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.reading import with_values
 from femgear.trains.static.stages import static_supports
 

@@ -48,35 +48,25 @@ from femgear.gears.deviations import (
     tooth_separation,
 )
 from femgear.study.relief import DesignBasis
-from femgear.threads import one_blas_thread
+from femgear.trains.protocol import one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
 
 @dataclass(frozen=True, eq=False)
-class TouchingCells:
-    """All M loaded cells of the record, position after position, in the numbering of the solved set.
+class _TouchingCells:
+    """All M loaded cells of the record, position after position, in the numbering of the solved set."""
 
-    Parameters
-    ----------
-    at : (M,) int array
-        Which of the positions.
-    mesh : (M,) int array
-    roll_1, roll_2 : (M,) arrays
-        Roll lengths on gear 1 and gear 2 [m].
-    tooth_1, tooth_2 : (M,) int arrays
-        Tooth numbers.
-    weight : (M, 2N) array
-        ``Z = H_AA^-1 J``: load of the cell per unit approach of every mesh [N/m].
-    """
-
+    # number of the position, number of the mesh, (M,)
     at: np.ndarray
     mesh: np.ndarray
+    # roll lengths [m] and tooth numbers on gear 1 and gear 2, (M,)
     roll_1: np.ndarray
     roll_2: np.ndarray
     tooth_1: np.ndarray
     tooth_2: np.ndarray
+    # Z = H_AA^-1 J, load of the cell per unit approach of every mesh [N/m], (M, 2N)
     weight: np.ndarray
 
 
@@ -100,7 +90,7 @@ class LinearContact:
         Transmission error from sun to ring [m].
     deflection, force : (2N, P) arrays
         Of every mesh, in the original order [m], [N].
-    touching : TouchingCells
+    touching : _TouchingCells
     arc_response : (P, 2N) array
         Of the transmission error to ``v = Z^T d gap`` [m/N].
     deflection_response, force_response : (P, 2N, 2N) arrays
@@ -118,7 +108,7 @@ class LinearContact:
     sun_arc: np.ndarray
     deflection: np.ndarray
     force: np.ndarray
-    touching: TouchingCells
+    touching: _TouchingCells
     arc_response: np.ndarray
     deflection_response: np.ndarray
     force_response: np.ndarray
@@ -183,8 +173,11 @@ def linearise(
     ContactError
         As `contact.cycle.walk_mesh_cycle`.
     """
-    chosen = _chosen(basis, sun_torque, positions * periods, only)
     solved, order = basis.loaded(sun_torque)
+    record = positions * periods
+    chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
+    if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
+        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
     position, numbers = cycle_positions(positions, periods=periods), chosen
     if sun_torque < 0:
         # the mirror image turns the other way and ends at position zero
@@ -210,24 +203,6 @@ def linearise(
         force_response=stacked["force_response"],
         residual=float(stacked["residual"].max()),
     )
-
-
-def _chosen(basis: DesignBasis, sun_torque: float, record: int, only) -> np.ndarray:
-    """Numbers of the positions wanted of a record; what `linearise` cannot represent is refused."""
-    if not (np.isfinite(sun_torque) and sun_torque):
-        raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque)
-    chosen = np.arange(record) if only is None else np.atleast_1d(np.asarray(only, int))
-    if not len(chosen) or chosen.min() < 0 or chosen.max() >= record:
-        raise CaseError("no such position", code="E-RANGE", value=only, limit=f"0 to {record - 1}")
-    if basis.supports.planet_clearance:
-        raise CaseError(
-            "bearings with clearance have no derivative here",
-            code="E-SUPPORT",
-            key="planet.bearing_clearance",
-            value=basis.supports.planet_clearance,
-            limit="0 m",
-        )
-    return chosen
 
 
 def _solve(solved: DesignBasis, load: float, numbers, options):
@@ -285,7 +260,7 @@ def _answer(problem, state, members) -> dict:
     }
 
 
-def _touching(solved: PlanetarySet, setup, numbers, cells) -> TouchingCells:
+def _touching(solved: PlanetarySet, setup, numbers, cells) -> _TouchingCells:
     """Where all loaded cells lie on their teeth."""
     N = solved.n_planets
     at = np.repeat(np.arange(len(cells)), [len(c[0]) for c in cells])
@@ -306,7 +281,7 @@ def _touching(solved: PlanetarySet, setup, numbers, cells) -> TouchingCells:
         arc = setup.roll[0][here][:, 0] ** 2 / twice + place_in_window * width
         roll_1[rows] = np.sqrt(twice * arc)
         roll_2[rows] = separation(contact, setup.zeta[here], roll_1[rows])[1]
-    return TouchingCells(at, mesh, roll_1, roll_2, tooth_1, tooth_2, weight)
+    return _TouchingCells(at, mesh, roll_1, roll_2, tooth_1, tooth_2, weight)
 
 
 @dataclass(frozen=True, eq=False)

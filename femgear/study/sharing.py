@@ -22,19 +22,19 @@ import numpy as np
 from femgear.contact.assembly import ROUGH_STIFFNESS, assemble_contact, in_windows, mesh_windows
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.solve import solve_contact
-from femgear.contact.supports import Supports, moving_members
+from femgear.contact.supports import moving_members
 from femgear.errors import CaseError, ContactError
 from femgear.gears.deviations import no_deviations
 from femgear.gears.kinematics import mesh_normals
 from femgear.study.relief import DesignBasis
-from femgear.threads import one_blas_thread
+from femgear.trains.protocol import one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
-SOFTEST = 1e-10
+_SOFTEST = 1e-10
 """Spring on every motion, over the stiffness of a planet: it holds motions that no loaded planet holds."""
-MOST_SAMPLES = 1_000_000
+_MOST_SAMPLES = 1_000_000
 """Of one call."""
 
 
@@ -109,8 +109,9 @@ def sharing_model(
         E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
     ContactError
     """
-    _check_request(basis.supports, sun_torque, position, positions)
     solved, order = basis.loaded(sun_torque)
+    if not 0 <= position < positions:
+        raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {positions - 1}")
     N, load = solved.gears.n_planets, abs(sun_torque) / solved.gears.sun.base_radius
     # planets open and close at small loads, where a line contact changes most
     force = load * np.unique(np.append(np.linspace(0.0, 1.0, loads - 8) ** 1.5, [1 / N, 1e-4, 1e-3, 3e-3]))
@@ -138,23 +139,6 @@ def sharing_model(
         pin=(pin_directions(solved.gears) * mirror)[back],
         coupling_change=float(change),
     )
-
-
-def _check_request(supports: Supports, sun_torque: float, position: int, positions: int) -> None:
-    """Refuse what `sharing_model` cannot represent."""
-    if not (np.isfinite(sun_torque) and sun_torque):
-        raise CaseError("without torque there is nothing to share", code="E-TORQUE", value=sun_torque)
-    if not 0 <= position < positions:
-        raise CaseError("no such position", code="E-RANGE", value=position, limit=f"0 to {positions - 1}")
-    if supports.planet_clearance:
-        raise CaseError(
-            "the load sharing of samples knows no clearance of the planet bearings",
-            code="E-SUPPORT",
-            key="planet.bearing_clearance",
-            value=f"{supports.planet_clearance * 1e6:.6g} um",
-            limit="0 um",
-            remedy='set it to zero, or solve single cases with static.members = "elastic"',
-        )
 
 
 def _paths(solved: DesignBasis, force: float, position: float, contact: str):
@@ -213,9 +197,12 @@ def pin_samples(n_planets: int, *, samples: int, radial: float, tangential: floa
     CaseError
         E-RANGE: no samples or more than a million, negative deviations.
     """
-    if not 1 <= samples <= MOST_SAMPLES:
+    if not 1 <= samples <= _MOST_SAMPLES:
         raise CaseError(
-            "the number of samples is not usable", code="E-RANGE", value=samples, limit=f"1 to {MOST_SAMPLES}"
+            "the number of samples is not usable",
+            code="E-RANGE",
+            value=samples,
+            limit=f"1 to {_MOST_SAMPLES}",
         )
     scale = np.array([radial, tangential], float)
     if not (np.isfinite(scale).all() and (scale >= 0).all()):
@@ -348,7 +335,7 @@ def _newton(model, curves, separation, forces, active):
     matrix[:, np.arange(N), np.arange(N)] += slope / unit
     matrix[:, :N, N:] = -G
     matrix[:, N:, :N] = G.T
-    matrix[:, np.arange(N, N + m), np.arange(N, N + m)] = SOFTEST
+    matrix[:, np.arange(N, N + m), np.arange(N, N + m)] = _SOFTEST
     right = np.zeros((S, N + m))
     right[:, :N] = (slope * forces - value - separation) / unit
     right[:, N] = model.load

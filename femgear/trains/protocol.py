@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,21 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, float, float], None]
 """Called with (stage, done, total)."""
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """One BLAS thread for a block of code, or as ``@one_blas_thread()`` for a function.
+
+    Several threads gain nothing on matrices of a few hundred rows, and wait for one another for many times
+    the work as soon as other processes want the same cores.
+    """
+    # only libraries that are loaded can be limited, and SciPy brings a BLAS of its own
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        yield
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,6 @@ from femgear.case.dependencies import (
 from femgear.case.sections import CarrierSection, Case, MachineSection, SunSection
 from femgear.errors import Finding, remark
 from femgear.report.tables import describe_modes, describe_response
-from femgear.threads import one_blas_thread
 from femgear.trains.elastic.checks import (
     case_warnings,
     check_dynamic_case,
@@ -43,7 +42,7 @@ from femgear.trains.elastic.results import (
     describe_housing,
     mesh_bands,
 )
-from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
 from femgear.trains.static.description import describe_case
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import (

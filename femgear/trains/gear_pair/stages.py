@@ -21,10 +21,9 @@ from femgear.system.contact_states import (
     solution_states,
     state_regions,
 )
-from femgear.threads import one_blas_thread
 from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
 from femgear.trains.gear_pair.section import GearPairCase, build_gear_pair, pair_of, scales_of
-from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
+from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr

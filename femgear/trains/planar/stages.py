@@ -15,7 +15,6 @@ from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
 from femgear.errors import Finding
 from femgear.report.tables import describe_modes
-from femgear.threads import one_blas_thread
 from femgear.trains.planar.checks import (
     bounded_branch,
     check_branch_damping,
@@ -37,7 +36,7 @@ from femgear.trains.planar.results import (
     remarks,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
-from femgear.trains.protocol import Figures, Progress, Stage, Train
+from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
     driving_torque,
     member_speeds,

@@ -20,8 +20,7 @@ from femgear.case.sections import Case
 from femgear.contact.root_stress import root_ranges
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
 from femgear.errors import GeometryError
-from femgear.threads import one_blas_thread
-from femgear.trains.protocol import Progress, Stage
+from femgear.trains.protocol import Progress, Stage, one_blas_thread
 from femgear.trains.static.description import check_motions
 from femgear.trains.static.results import (
     NominalStresses,
