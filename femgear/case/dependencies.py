@@ -48,7 +48,7 @@ def static_entries(case: Case) -> Entries:
         left_out, parts = left_out | _FOUNDATION, parts | _SUPPORTS
     # whatever member the torque is given for: the flanks see that of the sun
     sun = torques(planetary_set(case), member=case.operation.input, torque=case.operation.torque).sun
-    return {"operation.torque": f"{sun:.9g} N m on the sun"} | _entries(case, left_out, parts, kept=_HELIX)
+    return {"operation.torque": f"{sun:.9g} N m on the sun", **_entries(case, left_out, parts, kept=_HELIX)}
 
 
 def state_entries(case: Case) -> Entries:
