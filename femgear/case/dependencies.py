@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 Entries = Mapping[str, object]
 """Values by dotted key."""
 Result = TypeVar("Result")
+_KEPT = 4
+"""Results of every step."""
 FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"})
 """Entries that do nothing but separate flanks: no grid knows them, and derivatives reach them."""
 
@@ -135,16 +137,9 @@ def check_entries(result: Any, kind: type, case_entries: Entries, words: str) ->
 
 
 class Steps:
-    """Results of steps that several cases share: the latest few of each step, by the entries it depends on.
+    """Results of steps that several cases share: the latest few of each, by the entries they depend on."""
 
-    Parameters
-    ----------
-    keep : int
-        Of every step.
-    """
-
-    def __init__(self, *, keep: int = 4):
-        self._keep = keep
+    def __init__(self):
         self._found: dict[str, OrderedDict[str, Any]] = {}
 
     def take(self, step: str, entries: Entries, compute: Callable[[], Result]) -> Result:
@@ -161,7 +156,7 @@ class Steps:
         key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
         if key not in found:
             found[key] = compute()
-            if len(found) > self._keep:
+            if len(found) > _KEPT:
                 found.popitem(last=False)
         found.move_to_end(key)
         return found[key]

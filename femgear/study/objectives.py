@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -222,7 +222,6 @@ def mesh_force(
     *,
     speeds: int = 51,
     part: Literal["dynamic", "peak"] = "dynamic",
-    mesh: Literal["all", "sun-planet", "planet-ring"] = "all",
 ) -> Quantity:
     """Largest mesh force over a range of input speeds, over time and meshes [N].
 
@@ -237,24 +236,14 @@ def mesh_force(
         Number of equidistant speeds.
     part : {"dynamic", "peak"}
         Largest deviation from the mean, or largest force.
-    mesh : {"all", "sun-planet", "planet-ring"}
     """
     at = _range(first, last, speeds)
     of_mean = _chosen(part, {"dynamic": True, "peak": False}, "part")
-    rows = {
-        "all": lambda n: slice(None),
-        "sun-planet": lambda n: slice(n),
-        "planet-ring": lambda n: slice(n, None),
-    }
-    take = _chosen(mesh, rows, "mesh")
 
     def compute(variant: Variant) -> float:
-        force = variant.response(at).force
-        chosen = force[:, take(force.shape[1] // 2)]
-        return float(forces_over_time(chosen, dynamic=of_mean).max())
+        return float(forces_over_time(variant.response(at).force, dynamic=of_mean).max())
 
-    which = "" if mesh == "all" else f", {mesh}"
-    return Quantity(f"{part} mesh force{which}, {_words(at)}", _FORCE, "dynamics", compute)
+    return Quantity(f"{part} mesh force, {_words(at)}", _FORCE, "dynamics", compute)
 
 
 def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
@@ -367,30 +356,28 @@ def _words(at: Range) -> str:
     return f"{at[0] / SPEED.scale:.6g} to {SPEED.show(at[1])} ({at[2]} speeds)"
 
 
-_WORDS: dict[str, Callable[[str | None, Speeds | None], Quantity]] = {
-    "ste": lambda torque, _: transmission_error("largest", torque=torque),
-    "ste overall": lambda torque, _: transmission_error("overall", torque=torque),
-    "ste sun-planet": lambda torque, _: transmission_error("sun-planet", torque=torque),
-    "ste planet-ring": lambda torque, _: transmission_error("planet-ring", torque=torque),
-    "mesh force": lambda _, speeds: mesh_force(*_given(speeds, "mesh force")),
-    "peak mesh force": lambda _, speeds: mesh_force(*_given(speeds, "peak mesh force"), part="peak"),
-    "housing": lambda _, speeds: housing_level(*_given(speeds, "housing")),
-    **{f"contact ratio {mesh}": lambda *_, mesh=mesh: contact_ratio(mesh) for mesh in get_args(_MeshKind)},
-    **{f"tip thickness {gear}": lambda *_, gear=gear: tip_thickness(gear) for gear in get_args(_GearName)},
-    "contact pressure": lambda *_: contact_pressure(),
-    **{f"root stress {gear}": lambda *_, gear=gear: root_stress(gear) for gear in get_args(_GearName)},
+_WORDS: dict[str, Callable[..., Quantity]] = {
+    "ste": transmission_error,
+    **{f"ste {mesh}": partial(transmission_error, mesh) for mesh in get_args(Mesh)[1:]},
+    "mesh force": mesh_force,
+    "peak mesh force": partial(mesh_force, part="peak"),
+    "housing": housing_level,
+    **{f"contact ratio {mesh}": partial(contact_ratio, mesh) for mesh in get_args(_MeshKind)},
+    **{f"tip thickness {gear}": partial(tip_thickness, gear) for gear in get_args(_GearName)},
+    "contact pressure": contact_pressure,
+    **{f"root stress {gear}": partial(root_stress, gear) for gear in get_args(_GearName)},
 }
+_OVER_SPEEDS = ("mesh force", "peak mesh force", "housing")
+"""Quantities that take the first and the last speed."""
 NAMES = tuple(_WORDS)
 
 
-def named_quantity(words: str, *, torque: str | None = None, speeds: Speeds | None = None) -> Quantity:
+def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
     """Quantity of some words, one of `NAMES`.
 
     Parameters
     ----------
     words : str
-    torque : str, optional
-        Of transmission errors, on the input; that of the case when left out.
     speeds : (str, str), optional
         First and last speed of the input, for mesh forces and housing levels.
 
@@ -399,22 +386,15 @@ def named_quantity(words: str, *, torque: str | None = None, speeds: Speeds | No
     CaseError
         E-OBJECTIVE: no such quantity, or no speeds for one that needs them.
     """
-    try:
-        make = _WORDS[" ".join(words.split()).lower()]
-    except KeyError:
+    name = " ".join(words.split()).lower()
+    if name not in _WORDS:
         raise CaseError(
             "no such quantity", code="E-OBJECTIVE", key="objective", value=words, limit=", ".join(NAMES)
-        ) from None
-    return make(torque, speeds)
-
-
-def _given(speeds: Speeds | None, words: str) -> Speeds:
-    """The speeds, refused where they are left out."""
-    if speeds is None:
-        raise CaseError(
-            f"{words} is found over a range of speeds",
-            code="E-OBJECTIVE",
-            key="speeds",
-            remedy='give two speeds of the input, "1000 rpm" and "3500 rpm"',
         )
-    return speeds
+    if name not in _OVER_SPEEDS:
+        return _WORDS[name]()
+    if speeds is None:
+        remedy = 'give two speeds of the input, "1000 rpm" and "3500 rpm"'
+        message = f"{name} is found over a range of speeds"
+        raise CaseError(message, code="E-OBJECTIVE", key="speeds", remedy=remedy)
+    return _WORDS[name](*speeds)

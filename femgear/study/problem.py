@@ -21,7 +21,7 @@ from femgear.case.sections import Case
 from femgear.case.units import LENGTH, Dimension, to_si
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
-from femgear.study.objectives import NUMBER, Quantity, named_quantity
+from femgear.study.objectives import NUMBER, Quantity, Speeds, named_quantity
 from femgear.trains.reading import with_values
 
 Vector = Sequence[float] | np.ndarray
@@ -319,8 +319,8 @@ class Problem:
         return tuple(variable.text(float(value)) for variable, value in zip(self.variables, x, strict=True))
 
 
-def parse_limit(text: str, **options) -> Limit:
-    """Limit of words such as ``"root stress sun <= 300 MPa"``; options as for `named_quantity`.
+def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
+    """Limit of words such as ``"root stress sun <= 300 MPa"``; speeds as for `named_quantity`.
 
     Raises
     ------
@@ -331,7 +331,7 @@ def parse_limit(text: str, **options) -> Limit:
     if not match:
         example = '"contact ratio sun-planet >= 1.3" or "root stress sun <= 300 MPa"'
         raise CaseError("not a limit", code="E-OBJECTIVE", key="--limit", value=text, limit=example)
-    quantity = named_quantity(match[1], **options)
+    quantity = named_quantity(match[1], speeds=speeds)
     if quantity.dimension is NUMBER:
         bound = _number(match[3])
         if not isinstance(bound, float):
@@ -372,9 +372,7 @@ def _number(text: str) -> str | float:
         return text
 
 
-def tip_reliefs(
-    case: Case, *, largest: str | None = None, tolerance: str = "1 um", places: str = "0.1 mm"
-) -> tuple[Case, tuple[Variable, ...]]:
+def tip_reliefs(case: Case, *, largest: str | None = None) -> tuple[Case, tuple[Variable, ...]]:
     """The case with one more linear tip relief on every loaded flank; amounts and starts are the variables.
 
     Sun and ring have one each, planets one for the flank that touches the sun and one for that which touches
@@ -384,11 +382,9 @@ def tip_reliefs(
     Parameters
     ----------
     case : Case
-        Its modifications stay.
+        Its modifications stay; amounts get a tolerance of 1 um, diameters one of 0.1 mm.
     largest : str, optional
         Largest amount, with its unit; a hundredth of the module when left out.
-    tolerance, places : str
-        Tolerances of amounts and of diameters.
 
     Raises
     ------
@@ -422,8 +418,8 @@ def tip_reliefs(
         case = with_values(case, {f"{gear.name}.modifications": [*_tables(case, gear.name), table]})
         key = f"{gear.name}.modifications[{number}]"
         variables += [
-            Variable(f"{key}.amount", "0 um", f"{1e6 * most:.6g} um", tolerance=tolerance),
-            Variable(f"{key}.start_diameter", low, high, tolerance=places),
+            Variable(f"{key}.amount", "0 um", f"{1e6 * most:.6g} um", tolerance="1 um"),
+            Variable(f"{key}.start_diameter", low, high, tolerance="0.1 mm"),
         ]
     return case, tuple(variables)
 

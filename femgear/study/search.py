@@ -44,6 +44,8 @@ _STEP = 1e-4
 """Half the difference of separations, over the range of the variable: their round-off is 1e-12 of that."""
 _SMALLEST, _LEAST = 1e-4, 1e-5
 """Box, over the ranges, and gain, over the objective of the case, at which a descent ends."""
+_MOST_STEPS = 60
+"""Of a descent."""
 
 
 @dataclass(frozen=True)
@@ -419,9 +421,7 @@ def has_derivatives(problem: Problem) -> bool:
     return bool(sided and clear and deviations and not any(v.integer for v in problem.variables))
 
 
-def descend(
-    evaluations: Evaluations, start: Vector, *, radius: float = 0.15, max_steps: int = 60
-) -> tuple[bool, str]:
+def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) -> tuple[bool, str]:
     """Minimum of a transmission error from a start, by successive linear programs.
 
     Parameters
@@ -432,7 +432,6 @@ def descend(
         In the units of the variables.
     radius : float
         Half the first box, over the ranges of the variables.
-    max_steps : int
 
     Returns
     -------
@@ -445,7 +444,7 @@ def descend(
     low, high = problem.bounds.T
     scale = evaluations.scale(problem.objective)
     x, cost = np.array(start, float), evaluations.cost(start)
-    for _ in range(max_steps):
+    for _ in range(_MOST_STEPS):
         try:
             value, slopes = signals(evaluations, x)
         except StorageError:
@@ -470,7 +469,7 @@ def descend(
             if ratio > 0.01:
                 x, cost = trial, new
                 break
-    return False, f"{max_steps} steps were not enough"
+    return False, f"{_MOST_STEPS} steps were not enough"
 
 
 def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndarray, float]:

@@ -145,7 +145,6 @@ def linearise(
     periods: int = 1,
     only=None,
     contact: str = "profile",
-    cells: int = 36,
 ) -> LinearContact:
     """Contact of all drive flanks and what it answers to small separations of any cell.
 
@@ -159,7 +158,7 @@ def linearise(
         Positions in a mesh period, and mesh periods in the record.
     only : sequence of int, optional
         Numbers of the positions wanted; all of the record when left out.
-    contact, cells
+    contact : {"profile", "line_of_action"}
         As for `contact.cycle.walk_mesh_cycle`.
 
     Returns
@@ -183,7 +182,7 @@ def linearise(
         # the mirror image turns the other way and ends at position zero
         position, numbers = -position[::-1], len(position) - 1 - chosen
     load = abs(sun_torque) / solved.gears.sun.base_radius
-    options = {"positions": position, "contact": contact, "cells": cells}
+    options = {"positions": position, "contact": contact, "cells": 36}
     setup, answers = _solve(solved, load, numbers, options)
     rows = _original_rows(order)
     stacked = {name: np.stack([answer[name] for answer in answers]) for name in answers[0] if name != "cells"}

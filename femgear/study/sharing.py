@@ -13,7 +13,6 @@ again with one unknown a planet. What is lost is the change of C with the loads,
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -79,7 +78,6 @@ def sharing_model(
     positions: int = 8,
     contact: str = "profile",
     loads: int = 40,
-    progress: Callable[[int, int], None] | None = None,
 ) -> SharingModel:
     """Load-deflection curves of all planets at one position, from the contact problem at several loads.
 
@@ -95,8 +93,6 @@ def sharing_model(
         As for `contact.cycle.walk_mesh_cycle`.
     loads : int
         Points of a curve.
-    progress : callable, optional
-        Called with (loads done, loads).
 
     Returns
     -------
@@ -119,8 +115,6 @@ def sharing_model(
     deflection, coupling = np.zeros((N, len(force))), np.zeros((len(force), N, N))
     for k, one in enumerate(force):
         deflection[:, k], coupling[k] = _paths(solved, max(one, 1e-9 * load), at, contact)
-        if progress is not None:
-            progress(k + 1, len(force))
     mean = int(np.abs(force - load / N).argmin())
     between = coupling[mean]
     change = np.abs(coupling[1:] - between).max() / (deflection[:, mean] / force[mean]).min()
@@ -218,8 +212,6 @@ class Sharing:
     ----------
     share : (S, N) array
         Shares in the sun's torque.
-    motions : (S, 1 + m) array
-        Rotation of the sun as an arc, and free motions [m].
     residual : float
         Largest violation: separation of loaded planets over the largest deflection, imbalance and overlap
         likewise.
@@ -228,7 +220,6 @@ class Sharing:
     """
 
     share: np.ndarray
-    motions: np.ndarray
     residual: float
     one_by_one: int
 
@@ -296,7 +287,7 @@ def sharing_of_samples(model: SharingModel, pins, *, max_steps: int = 40) -> Sha
             code="E-CONTACT",
             limit="1e-6",
         )
-    return Sharing(forces / model.load, motions, residual, len(left))
+    return Sharing(forces / model.load, residual, len(left))
 
 
 @dataclass(frozen=True)
