@@ -180,82 +180,79 @@ def _problem(name: str, line: int | None, message: str, *, value=None, limit=Non
 
 
 def embed_points(
-    table: dict,
+    data: dict,
+    entry: str,
     name: str,
-    key: str,
+    *,
     read: Callable[[str], Mapping[str, list[float]]],
     units: Mapping[str, str],
-) -> str:
-    """Put the points of the ``file`` of a table, which lies beside the case file or below, in its place.
+    plain: Callable[[dict], bool],
+) -> dict[str, str]:
+    """Put the points of every ``file`` of a list of tables in its place.
 
     Parameters
     ----------
-    table : dict
-        Modified.
-    name, key : str
-        Of the case file, and of the table in it.
+    data : dict
+        Tables of a case file; modified.
+    entry : str
+        Dotted key of the list, such as ``"sun.modifications"``.
+    name : str
+        Of the case file: files lie in its folder or below.
     read : callable
         ``(path) -> SI values by entry``.
     units : mapping of str to str
         SI unit of each entry.
+    plain : callable
+        ``(table) -> bool``: others contradict themselves, stay as they are, and are refused with the others.
 
     Returns
     -------
-    str
-        Name of the file.
+    dict of str to str
+        The files by the key of their table, such as ``"sun.modifications[0]"``.
 
     Raises
     ------
     CaseError
         A path that leads out of the folder (E-FILE), and what `read` raises, with the key.
     """
-    file, key = table.pop("file"), f"{key}.file"
+    section, _, last = entry.partition(".")
+    tables, found = data.get(section), {}
+    tables = tables.get(last) if isinstance(tables, dict) else None
+    for i, table in enumerate(tables if isinstance(tables, list) else ()):
+        if isinstance(table, dict) and isinstance(table.get("file"), str) and plain(table):
+            key, file = f"{entry}[{i}]", table.pop("file")
+            points = _embedded(file, name, f"{key}.file", read)
+            table |= {
+                one: [f"{value:.13g} {units[one]}" for value in values] for one, values in points.items()
+            }
+            found[key] = text.printable(file)
+    return found
+
+
+def _embedded(file: str, name: str, key: str, read: Callable[[str], Mapping[str, list[float]]]):
+    """What `read` finds in a file beside the case file or below."""
     path = PurePath(file)
     if path.is_absolute() or ".." in path.parts or not path.parts:
         message = "the file must lie in the folder of the case or below"
-        found, remedy = text.printable(file), "copy it there and name it relative to the case file"
-        raise CaseError(message, code="E-FILE", key=key, value=found, file=name or None, remedy=remedy)
+        shown, remedy = text.printable(file), "copy it there and name it relative to the case file"
+        raise CaseError(message, code="E-FILE", key=key, value=shown, file=name or None, remedy=remedy)
     try:
-        points = read(os.path.join(os.path.dirname(name), file))
+        return read(os.path.join(os.path.dirname(name), file))
     except CaseError as error:
         error.key = key
         raise
-    for entry, values in points.items():
-        table[entry] = [f"{value:.13g} {units[entry]}" for value in values]
-    return text.printable(file)
 
 
 def embed_profiles(data: dict, name: str) -> dict[str, str]:
-    """Put the points of every ``file`` of a measured profile in its place.
+    """Put the points of every ``file`` of a measured profile in its place; see `embed_points`."""
 
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file; modified.
-    name : str
-        Name of the case file: files are looked for in its folder and below.
+    def plain(table: dict) -> bool:
+        return table.get("kind") == "measured profile" and "deviations" not in table
 
-    Returns
-    -------
-    dict of str to str
-        The files by the key of their modification, such as ``"sun.modifications[0]"``.
-
-    Raises
-    ------
-    CaseError
-        As `read_profile`, or a path that leads out of the folder (E-FILE).
-    """
     found = {}
     for gear in ("sun", "planet", "ring"):
-        section = data.get(gear)
-        tables = section.get("modifications") if isinstance(section, dict) else None
-        for i, table in enumerate(tables if isinstance(tables, list) else ()):
-            if not (isinstance(table, dict) and isinstance(table.get("file"), str)):
-                continue
-            if table.get("kind") != "measured profile" or "deviations" in table:
-                continue
-            key = f"{gear}.modifications[{i}]"
-            found[key] = embed_points(table, name, key, read_profile, _PROFILE_UNITS)
+        entry = f"{gear}.modifications"
+        found |= embed_points(data, entry, name, read=read_profile, units=_PROFILE_UNITS, plain=plain)
     return found
 
 

@@ -905,36 +905,13 @@ def _open_backs(case: DrivetrainCase) -> Iterator[Finding]:
 
 
 def embed_torques(data: dict, name: str) -> dict[str, str]:
-    """Put the points of every ``file`` of a torque in its place.
+    """Put the points of every ``file`` of a torque in its place; see `femgear.case.tables.embed_points`."""
 
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file; modified.
-    name : str
-        Name of the case file: files are looked for in its folder and below.
+    def plain(table: dict) -> bool:
+        return not table.keys() & {"torque", "times", "torques", "share"}
 
-    Returns
-    -------
-    dict of str to str
-        The files by the key of their entry, such as ``"operation.torque[0]"``.
-
-    Raises
-    ------
-    CaseError
-        As `read_torques`, or a path that leads out of the folder (E-FILE).
-    """
-    operation, found = data.get("operation"), {}
-    tables = operation.get("torque") if isinstance(operation, dict) else None
-    for i, table in enumerate(tables if isinstance(tables, list) else ()):
-        # contradicting entries stay as they are, and are refused with the others
-        if not (isinstance(table, dict) and isinstance(table.get("file"), str)):
-            continue
-        if table.keys() & {"torque", "times", "torques", "share"}:
-            continue
-        key = f"operation.torque[{i}]"
-        found[key] = embed_points(table, name, key, read_torques, {"times": "s", "torques": "N m"})
-    return found
+    units = {"times": "s", "torques": "N m"}
+    return embed_points(data, "operation.torque", name, read=read_torques, units=units, plain=plain)
 
 
 def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
