@@ -298,9 +298,8 @@ def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False
     if not loose:
         return
     N = planetary.n_planets
-    if len(loose) > 1:
-        message = f"{N} planets cannot hold a floating sun and a floating carrier at once"
-    else:
+    message = f"{N} planets cannot hold a floating sun and a floating carrier at once"
+    if len(loose) == 1:
         angles = ", ".join(f"{math.degrees(angle):.6g}" for angle in planetary.planet_angles[:12])
         where = f"{N} planet{'s' * (N > 1)} at {angles} deg"
         message = f"{where} cannot hold a floating {loose[0]}: their forces leave it free to move aside"
