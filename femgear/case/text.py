@@ -7,6 +7,7 @@ import os
 import re
 import stat
 import tomllib
+from html import escape
 
 from pydantic import BaseModel, PrivateAttr
 
@@ -333,8 +334,6 @@ class ReadCase(BaseModel):
 
     def _repr_html_(self) -> str:
         """The text of the case, for notebooks."""
-        from html import escape
-
         return f"<details><summary>{escape(repr(self))}</summary><pre>{escape(self._source)}</pre></details>"
 
     @property

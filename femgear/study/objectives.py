@@ -18,7 +18,9 @@ from femgear.case.case import planetary_set
 from femgear.case.dependencies import Steps, static_entries
 from femgear.case.sections import Case
 from femgear.case.units import ACCELERATION, SPEED, TORQUE, Dimension, to_si
+from femgear.contact.root_stress import LOADED
 from femgear.errors import CaseError
+from femgear.gears.gear import tooth_thickness
 from femgear.trains.elastic import stages as elastic_stages
 from femgear.trains.reading import with_value
 from femgear.trains.static import stages as static_stages
@@ -293,8 +295,6 @@ def contact_ratio(mesh: _MeshKind) -> Quantity:
 
 def tip_thickness(gear: _GearName) -> Quantity:
     """Thickness of the teeth on the tip circle, in modules."""
-    from femgear.gears.gear import tooth_thickness
-
     name = _chosen(gear, {g: g for g in get_args(_GearName)}, "gear")
 
     def compute(variant: Variant) -> float:
@@ -313,8 +313,6 @@ def contact_pressure() -> Quantity:
 
 def root_stress(gear: _GearName) -> Quantity:
     """Largest stress in the roots of a gear [Pa], of a planet in both its meshes."""
-    from femgear.contact.root_stress import LOADED
-
     places = {"sun": ((0, 0),), "planet": ((0, 1), (1, 0)), "ring": ((1, 1),)}
     wanted = _chosen(gear, places, "gear")
 

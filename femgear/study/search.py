@@ -23,6 +23,8 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
+from scipy.optimize import differential_evolution, linprog, minimize
+from scipy.stats.qmc import LatinHypercube
 
 from femgear.case.case import set_deviations
 from femgear.case.dependencies import FLANK_ENTRIES
@@ -280,8 +282,6 @@ def _descents(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple
 
 def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tuple[bool, str]:
     """Differential evolution, then the simplex."""
-    from scipy.optimize import differential_evolution
-
     problem, count = run.problem, options.sample_count(run.problem)
     integral = np.array([variable.integer for variable in problem.variables])
     population = np.vstack([x0, samples_of(problem, max(count, 5) - 2, options.seed)])
@@ -345,8 +345,6 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
 
 def samples_of(problem: Problem, count: int, seed: int) -> np.ndarray:
     """Middle of the bounds, and a Latin hypercube of ``count`` points."""
-    from scipy.stats.qmc import LatinHypercube
-
     low, high = problem.bounds.T
     spread = LatinHypercube(len(low), rng=seed).random(max(count, 1))
     return low + (high - low) * np.vstack([np.full(len(low), 0.5), spread])
@@ -371,8 +369,6 @@ def polish(
     rounds : int
         Simplexes one after the other.
     """
-    from scipy.optimize import minimize
-
     low, high = run.problem.bounds.T
     width, n = high - low, len(low)
     unit = [(0.0, 1.0)] * n
@@ -474,8 +470,6 @@ def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) ->
 
 def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndarray, float]:
     """Step within the box, and the largest peak to peak that the linearisation promises there."""
-    from scipy.optimize import linprog
-
     n, (K, P) = len(x), value.shape
     width = high - low
     # unknowns: n moves over their ranges, K highs, K lows, t

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import cho_solve
 
 from femgear.contact.assembly import (
     ROUGH_STIFFNESS,
@@ -232,8 +233,6 @@ def _solve(solved: DesignBasis, load: float, numbers, options):
 
 def _answer(problem, state, members) -> dict:
     """Solution of one position and its linear answer to separations of the touching cells."""
-    from scipy.linalg import cho_solve
-
     N, active = problem.n_planets, np.flatnonzero(state.active)
     of_mesh = problem.mesh[active, None] == np.arange(2 * N)
     lower = factor(problem.compliance[np.ix_(active, active)])

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+# only libraries that are loaded can be limited to one thread, and SciPy brings a BLAS of its own
+import scipy.linalg  # noqa: F401
+
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
@@ -27,8 +30,6 @@ def one_blas_thread() -> Iterator[None]:
     Several threads gain nothing on matrices of a few hundred rows, and wait for one another for many times
     the work as soon as other processes want the same cores.
     """
-    # only libraries that are loaded can be limited, and SciPy brings a BLAS of its own
-    import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
