@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from femgear.case.deviations import ModificationSection
     from femgear.case.sections import CarrierSection
 
-MEMBERS = ("sun", "carrier")
+_ON_SHAFTS = ("sun", "carrier")
 """Members that may stand on a shaft."""
 
 
@@ -347,7 +347,7 @@ def with_shafts(case: Case) -> Case:
         Parts that make no shaft (E-SHAFT), with file and line.
     """
     found = {}
-    for name in MEMBERS:
+    for name in _ON_SHAFTS:
         section = getattr(case, name)
         if not section.support_shaft:
             continue
@@ -364,7 +364,7 @@ def with_shafts(case: Case) -> Case:
 def shaft_lines(case: Case) -> tuple[str, ...]:
     """What the shafts of a case hold, in sentences, with the beam of Timoshenko beside."""
     lines = []
-    for name in MEMBERS:
+    for name in _ON_SHAFTS:
         section = getattr(case, name)
         if section.support_shaft:
             beam = 1.0 / timoshenko_flexibility(_steps(section), material_of(case))[0, 0]

@@ -82,8 +82,8 @@ def parse(text: str, name: str) -> dict:
     Raises
     ------
     CaseError
-        ``E-TOML`` (syntax, with line and column), ``E-TOML`` (with both lines), ``E-TOML``,
-        ``E-FINITE`` (with keys and lines).
+        ``E-TOML``: syntax, with line and column; a key given twice, with both lines; nested too deeply.
+        ``E-FINITE``, with keys and lines.
     """
     if _LONG_KEY.search(text):
         raise _too_deep(name)

@@ -207,13 +207,13 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
 
     def compute(variant: Variant) -> float:
         cycle = variant.static(value).cycle
-        return peak_to_peak(signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2))
+        return _peak_to_peak(signal(cycle.sun_arc, cycle.deflection, len(cycle.deflection) // 2))
 
     where = "" if value is None else f" at {TORQUE.show(value)}"
     return Quantity(f"STE peak to peak, {mesh}{where}", _MICROMETRES, "static", compute, signal, value)
 
 
-def peak_to_peak(signals: np.ndarray) -> float:
+def _peak_to_peak(signals: np.ndarray) -> float:
     """Largest peak to peak of the rows."""
     return float(np.ptp(signals, axis=1).max())
 

@@ -187,7 +187,7 @@ def split(value: object, key: str) -> tuple[float, str]:
     return number, unit
 
 
-def current(case: Case, variable: Variable) -> float | None:
+def _current(case: Case, variable: Variable) -> float | None:
     """Value that the case has now, in the unit of the variable; None where its file leaves the entry out."""
     table: Any = case_text.parse(case.source, case.name)
     for part in re.findall(r"\[(\d+)\]|([^.\[\]]+)", variable.keys[0]):
@@ -203,7 +203,7 @@ def start_point(case: Case, variables: Sequence[Variable]) -> np.ndarray:
     found = []
     for variable in variables:
         low, high = variable.bounds
-        value = current(case, variable)
+        value = _current(case, variable)
         found.append(0.5 * (low + high) if value is None else min(max(value, low), high))
     return np.array(found)
 
@@ -325,7 +325,7 @@ def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
     Raises
     ------
     CaseError
-        E-OBJECTIVE: no such text; E-OBJECTIVE; E-UNIT.
+        E-OBJECTIVE: no limit, no such quantity, or no number; E-UNIT.
     """
     match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text, re.DOTALL)
     if not match:

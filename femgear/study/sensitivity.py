@@ -338,7 +338,7 @@ def sensitivity(
             mirrored_deviations(deviations, linear.original, linear.solved, linear.order)
             for deviations in (low, high)
         )
-    change = (separations(linear, high) - separations(linear, low)) / (2.0 * step)
+    change = (_separations(linear, high) - _separations(linear, low)) / (2.0 * step)
     return _sensitivity(linear, change)
 
 
@@ -357,7 +357,7 @@ def _sensitivity(linear: LinearContact, change: np.ndarray) -> Sensitivity:
     )
 
 
-def separations(linear: LinearContact, deviations: SetDeviations) -> np.ndarray:
+def _separations(linear: LinearContact, deviations: SetDeviations) -> np.ndarray:
     """What deviations of the solved set add to the separations of the touching cells, (M,) [m]."""
     s, t, N = linear.solved, linear.touching, linear.solved.n_planets
     total = body_separation(deviations, s, linear.solved_position)[t.mesh, t.at]

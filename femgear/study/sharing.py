@@ -131,7 +131,7 @@ def sharing_model(
         deflection=deflection[back],
         coupling=between[np.ix_(back, back)],
         approach=np.column_stack([np.ones(N), free])[back],
-        pin=(pin_directions(solved.gears) * mirror)[back],
+        pin=(_pin_directions(solved.gears) * mirror)[back],
         coupling_change=float(change),
     )
 
@@ -162,7 +162,7 @@ def _paths(solved: DesignBasis, force: float, position: float, contact: str):
     return state.motions[:N] + state.motions[N:], between
 
 
-def pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
+def _pin_directions(planetary_set: PlanetarySet) -> np.ndarray:
     """Separation of every path per unit radial and tangential displacement of its pin, (N, 2).
 
     ``(n_sp - n_pr) . u`` with the normals of `gears.kinematics.mesh_normals`.
