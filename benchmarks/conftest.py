@@ -17,7 +17,7 @@ def pytest_addoption(parser):
 
 @pytest.fixture(scope="session", autouse=True)
 def one_thread():
-    from femgear.threads import one_blas_thread
+    from femgear.trains.protocol import one_blas_thread
 
     with one_blas_thread():
         yield

@@ -13,7 +13,7 @@ from numbers import Integral
 
 import numpy as np
 
-from femgear.errors import GeometryError
+from femgear.errors import Finding, GeometryError
 from femgear.gears.profile import (
     ISO_53_C,
     BasicRack,
@@ -32,27 +32,24 @@ PRESSURE_ANGLE_RANGE = (math.radians(5.0), math.radians(45.0))
 
 
 @dataclass(frozen=True)
-class GeometryWarning:
-    """Something that works but deserves a look.
+class GeometryWarning(Finding):
+    """A finding on gears, with the number that drew it.
 
     Parameters
     ----------
-    code, key, message : str
-        Stable identifier, entry of the case file, and a sentence with the numbers.
+    code, key, text : str
+        As of `femgear.errors.Finding`.
     value : float
         The number that drew the warning.
     limit : str
         What would not be warned about.
     """
 
-    code: str
-    key: str
-    message: str
     value: float
     limit: str
 
     def __str__(self) -> str:
-        return f"[{self.code}] {self.key}: {self.message} (usual: {self.limit})"
+        return f"{super().__str__()} (usual: {self.limit})"
 
 
 @dataclass(frozen=True)

@@ -134,7 +134,8 @@ def _warnings(warnings) -> str:
     """List of all warnings, empty without any."""
     if not warnings:
         return ""
-    return '<ul class="warnings">\n' + "".join(f"<li>{escape(text)}</li>\n" for text in warnings) + "</ul>\n"
+    items = "".join(f"<li>{escape(str(warning))}</li>\n" for warning in warnings)
+    return '<ul class="warnings">\n' + items + "</ul>\n"
 
 
 def _section(name: str, numbers, pictures, train: Train, results: Results) -> str:

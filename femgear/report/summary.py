@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from femgear.report.tables import Block
 
 if TYPE_CHECKING:
+    from femgear.errors import Finding
     from femgear.storage.results import Results
     from femgear.trains.protocol import Train
 
@@ -29,8 +30,8 @@ def describe_results(train: Train, results: Results) -> tuple[Block, ...]:
     return (*blocks, Block("Time", ("stage", "[s]"), tuple(timings)))
 
 
-def case_warnings(train: Train, case) -> tuple[str, ...]:
-    """What a case is allowed to be but deserves a look: sentences that begin with ``[W-...]``.
+def case_warnings(train: Train, case) -> tuple[Finding, ...]:
+    """What a case is allowed to be but deserves a look, each once.
 
     Raises
     ------
@@ -40,6 +41,6 @@ def case_warnings(train: Train, case) -> tuple[str, ...]:
     return tuple(dict.fromkeys(train.warnings(case)))
 
 
-def result_warnings(train: Train, results: Results) -> tuple[str, ...]:
-    """What the solvers say against their own results, in sentences."""
+def result_warnings(train: Train, results: Results) -> tuple[Finding, ...]:
+    """What the solvers say against their own results, each once."""
     return tuple(dict.fromkeys(train.result_warnings(results)))

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.errors import Finding, remark
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -110,10 +112,8 @@ def chosen(count: int) -> Iterator[int]:
     return (i for i in range(count) if count <= MANY or i < MANY // 2 or i >= count - MANY // 2)
 
 
-def response_warnings(data: xr.Dataset) -> Iterator[str]:
-    """What the solver says against the periodic responses of dynamics.nc, in sentences."""
-    if warnings := str(data.attrs.get("warnings", "")):
-        yield from (f"[{text.strip()}" for text in warnings.split("[") if text)
+def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """What the solver says against the periodic responses of dynamics.nc."""
     speed = data["speed"].values
     for bad, text in (
         (~data["converged"].values.astype(bool), "the periodic solution did not converge at"),
@@ -122,4 +122,4 @@ def response_warnings(data: xr.Dataset) -> Iterator[str]:
         if bad.any():
             shown = ", ".join(f"{value:.6g}" for value in speed[bad][:_NAMED])
             rest = np.count_nonzero(bad) - _NAMED
-            yield f"{text} {shown} rpm{f' and {rest} more speeds' if rest > 0 else ''}"
+            yield remark(f"{text} {shown} rpm{f' and {rest} more speeds' if rest > 0 else ''}")

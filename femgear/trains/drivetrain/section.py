@@ -47,7 +47,7 @@ from femgear.case.units import (
     TORQUE,
     TORSION,
 )
-from femgear.errors import CaseError
+from femgear.errors import CaseError, Finding
 from femgear.system import shaft as shafts
 from femgear.trains.drivetrain.data import (
     ChainBearing,
@@ -855,7 +855,7 @@ def _unfit(key: str, message: str) -> CaseError:
 _CHECKS = (_bodies, _shafts, check_sizes, _torques, _simulation, _size)
 
 
-def notices(case: DrivetrainCase) -> tuple[str, ...]:
+def notices(case: DrivetrainCase) -> tuple[Finding, ...]:
     """Remarks on a case that was checked."""
     found = []
     for i, stage in enumerate(case.parallel):
@@ -872,17 +872,21 @@ def notices(case: DrivetrainCase) -> tuple[str, ...]:
                     (f"planetary[{i}]", 1.0 + 2.0 * planet / sun, stage.ring_teeth / stage.sun_teeth)
                 )
     said = [
-        f"[W-TEETH] {key}.teeth: the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
-        "the radii, mesh frequencies the teeth of the first gear or of the ring"
+        Finding(
+            "W-TEETH",
+            f"{key}.teeth",
+            f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}; speeds follow "
+            "the radii, mesh frequencies the teeth of the first gear or of the ring",
+        )
         for key, radii, teeth in found
         if abs(teeth / radii - 1.0) > _REMARK
     ]
     if not case.bearing:
-        said.append("[W-BEARING] there is no [[bearing]]")
+        said.append(Finding("W-BEARING", "", "there is no [[bearing]]"))
     return (*said, *_open_backs(case))
 
 
-def _open_backs(case: DrivetrainCase) -> Iterator[str]:
+def _open_backs(case: DrivetrainCase) -> Iterator[Finding]:
     """Meshes whose teeth part but find no back flank."""
     if not case.simulation.contact_loss:
         return
@@ -890,45 +894,24 @@ def _open_backs(case: DrivetrainCase) -> Iterator[str]:
     for i, one in enumerate(case.planetary):
         meshes += [(f"planetary[{i}].sun_mesh", one.sun_mesh), (f"planetary[{i}].ring_mesh", one.ring_mesh)]
     if bare := [key for key, mesh in meshes if mesh.backlash is None]:
-        yield (
-            f"[W-BACKLASH] {', '.join(bare)}: without backlash given there is no back side: with "
-            "simulation.contact_loss these teeth part and meet no back flank"
+        yield Finding(
+            "W-BACKLASH",
+            ", ".join(bare),
+            "without backlash given there is no back side: with "
+            "simulation.contact_loss these teeth part and meet no back flank",
         )
     if not meshes:
-        yield "[W-BACKLASH] simulation.contact_loss: there are no meshes that could part"
+        yield Finding("W-BACKLASH", "simulation.contact_loss", "there are no meshes that could part")
 
 
 def embed_torques(data: dict, name: str) -> dict[str, str]:
-    """Put the points of every ``file`` of a torque in its place.
+    """Put the points of every ``file`` of a torque in its place; see `femgear.case.tables.embed_points`."""
 
-    Parameters
-    ----------
-    data : dict
-        Tables of a case file; modified.
-    name : str
-        Name of the case file: files are looked for in its folder and below.
+    def plain(table: dict) -> bool:
+        return not table.keys() & {"torque", "times", "torques", "share"}
 
-    Returns
-    -------
-    dict of str to str
-        The files by the key of their entry, such as ``"operation.torque[0]"``.
-
-    Raises
-    ------
-    CaseError
-        As `read_torques`, or a path that leads out of the folder (E-FILE).
-    """
-    operation, found = data.get("operation"), {}
-    tables = operation.get("torque") if isinstance(operation, dict) else None
-    for i, table in enumerate(tables if isinstance(tables, list) else ()):
-        # contradicting entries stay as they are, and are refused with the others
-        if not (isinstance(table, dict) and isinstance(table.get("file"), str)):
-            continue
-        if table.keys() & {"torque", "times", "torques", "share"}:
-            continue
-        key = f"operation.torque[{i}]"
-        found[key] = embed_points(table, name, key, read_torques, {"times": "s", "torques": "N m"})
-    return found
+    units = {"times": "s", "torques": "N m"}
+    return embed_points(data, "operation.torque", name, read=read_torques, units=units, plain=plain)
 
 
 def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.threads import one_blas_thread
 from femgear.trains.drivetrain.checks import (
     BENDING,
     TORSIONAL,
@@ -51,7 +50,7 @@ from femgear.trains.drivetrain.section import (
     torque_histories,
 )
 from femgear.trains.drivetrain.time import PASS_BAND, DrivetrainRun, Records, march_drivetrain
-from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
+from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results

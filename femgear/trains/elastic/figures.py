@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set
+from femgear.case.case import material_of, planetary_set
 from femgear.housing.orders import BandAnalysis, analyse_band
 from femgear.housing.orders import order_spectrum as _spectrum
 from femgear.report.response import (
@@ -55,7 +55,7 @@ from femgear.report.style import (
 from femgear.trains.protocol import Drawn, Figures
 from femgear.trains.static.figures import FIGURES as STATIC
 from femgear.trains.static.figures import PICTURE_FLANK_ELEMENTS, PICTURE_REFINE
-from femgear.trains.static.stages import material_of, ring_foundation
+from femgear.trains.static.stages import ring_foundation
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,7 +1,7 @@
 """A planetary set in tables, and what deserves a look: gears, meshes, phasing, operation, static solution.
 
 The phases of the meshes decide which of their harmonics sun and ring hear, and which kinds of modes these
-excite; neighbouring tooth numbers are listed with what they would change in that. The sentences of
+excite; neighbouring tooth numbers are listed with what they would change in that. The findings of
 `set_warnings` hold for any planetary set, those of `static_warnings` for any static solution; `check_motions`
 refuses one whose displacements are not small.
 """
@@ -9,13 +9,13 @@ refuses one whose displacements are not small.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations, shaft_lines
-from femgear.errors import ContactError
+from femgear.errors import ContactError, Finding
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import tooth_thickness
@@ -26,6 +26,8 @@ from femgear.report.tables import MANY, Block
 from femgear.storage.dataset import RPM
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from femgear.case.sections import Case
     from femgear.contact.cycle import MeshCycle
     from femgear.gears.planetary import PlanetarySet
@@ -38,7 +40,9 @@ ROWS = 8
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
 
 
-def describe_case(case: Case, *, model: tuple[Block, ...] = (), warnings: Sequence[str]) -> tuple[Block, ...]:
+def describe_case(
+    case: Case, *, model: tuple[Block, ...] = (), warnings: Sequence[Finding]
+) -> tuple[Block, ...]:
     """Geometry, operation and warnings of a planetary set.
 
     Parameters
@@ -46,7 +50,7 @@ def describe_case(case: Case, *, model: tuple[Block, ...] = (), warnings: Sequen
     case : Case
     model : tuple of Block
         What a train adds about its model.
-    warnings : sequence of str
+    warnings : sequence of Finding
 
     Returns
     -------
@@ -60,21 +64,20 @@ def describe_case(case: Case, *, model: tuple[Block, ...] = (), warnings: Sequen
         *describe_phasing(planetary),
         _operation(case, planetary),
         *model,
-        Block("Warnings", notes=tuple(warnings) or ("none",)),
+        Block("Warnings", notes=tuple(map(str, warnings)) or ("none",)),
     )
 
 
-def set_warnings(case: Case) -> tuple[str, ...]:
-    """What is allowed in any planetary set but deserves a look, in sentences."""
+def set_warnings(case: Case) -> tuple[Finding, ...]:
+    """What is allowed in any planetary set but deserves a look."""
     planetary = planetary_set(case)
-    found = [str(warning) for warning in check_set(planetary)] + list(case.notices)
-    found += [str(warning) for warning in check_deviations(set_deviations(case), planetary)]
+    found = [*check_set(planetary), *case.notices, *check_deviations(set_deviations(case), planetary)]
     if case.operation.torque == 0:
-        found.append(
-            "[W-TORQUE] operation.torque: without torque no tooth touches; only static results exist"
-        )
+        text = "without torque no tooth touches; only static results exist"
+        found.append(Finding("W-TORQUE", "operation.torque", text))
     if case.operation.torque < 0:
-        found.append("[W-TORQUE] operation.torque: a negative torque loads the other flanks")
+        text = "a negative torque loads the other flanks"
+        found.append(Finding("W-TORQUE", "operation.torque", text))
     return tuple(found)
 
 
@@ -106,50 +109,59 @@ def check_motions(cycle: MeshCycle, module: float) -> None:
             )
 
 
-def static_warnings(cycle: MeshCycle, module: float) -> tuple[str, ...]:
-    """What is wrong with a static result in an engineer's eyes, in sentences."""
-    found = []
-    if cycle.max_pressure.max(initial=0.0) > 4e9:
-        found.append(
-            f"[W-PRESSURE] the contact pressure reaches {cycle.max_pressure.max() * 1e-6:.0f} MPa: no steel "
-            "carries that, and the model stays elastic"
+def static_warnings(data: xr.Dataset, module: float) -> Iterator[Finding]:
+    """What is wrong with the contents of static.nc in an engineer's eyes.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    module : float
+        Of the gears, of helical ones in their transverse section [m].
+    """
+    names = ("mesh_force", "back_force", "max_pressure", "member_motion", "ste")
+    force, back, pressure, motion, approach = (data[name].values for name in names)
+    if pressure.max(initial=0.0) > 4e9:
+        text = (
+            f"the contact pressure reaches {pressure.max() * 1e-6:.0f} MPa: no steel carries that, and the "
+            "model stays elastic"
         )
-    moved = np.abs(cycle.member_motion).max(initial=0.0)
-    if np.abs(cycle.deflection).max(initial=0.0) > 0.05 * module:
-        found.append(_deflection_warning(cycle, moved))
+        yield Finding("W-PRESSURE", "", text)
+    moved = np.abs(motion).max(initial=0.0)
+    if np.abs(approach).max(initial=0.0) > 0.05 * module:
+        yield Finding("W-DEFLECTION", "", _deflection(approach, moved, members=len(motion)))
     if moved > 0.05 * module:
-        found.append(
-            f"[W-MOTION] a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points "
-            "and arms are those of the unmoved set"
+        text = (
+            f"a member moves by {moved * 1e6:.0f} um, more than 5 % of the module: contact points and arms "
+            "are those of the unmoved set"
         )
-    edges = (cycle.force > 0) & (cycle.max_pressure <= 0)
-    if edges.any():
-        found.append(
-            "[W-EDGE] at some positions every contact of a mesh lies at the end of a flank: its pressure has "
-            "no limit and is not given"
+        yield Finding("W-MOTION", "", text)
+    if ((force > 0) & (pressure <= 0)).any():
+        text = (
+            "at some positions every contact of a mesh lies at the end of a flank: its pressure has no limit "
+            "and is not given"
         )
-    if cycle.open_planets.any() and cycle.force.any():
-        planets = ", ".join(str(n + 1) for n in np.flatnonzero(cycle.open_planets.any(axis=1)))
-        found.append(f"[W-OPEN] planet {planets} carries nothing at some positions")
-    if cycle.wedged.any():
-        found.append("[W-WEDGED] some meshes are loaded on both flanks at once")
-    if ((cycle.back_force > 0) & ~cycle.wedged).any():
-        found.append(
-            "[W-BACK] some meshes carry on their back flanks alone: planets work against one another"
-        )
-    return tuple(found)
+        yield Finding("W-EDGE", "", text)
+    unloaded = (force + back)[: len(force) // 2] <= 0.0
+    if unloaded.any() and force.any():
+        planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded.any(axis=1)))
+        yield Finding("W-OPEN", "", f"planet {planets} carries nothing at some positions")
+    if ((force > 0) & (back > 0)).any():
+        yield Finding("W-WEDGED", "", "some meshes are loaded on both flanks at once")
+    if ((back > 0) & ~(force > 0)).any():
+        text = "some meshes carry on their back flanks alone: planets work against one another"
+        yield Finding("W-BACK", "", text)
 
 
-def _deflection_warning(cycle: MeshCycle, moved: float) -> str:
+def _deflection(approach: np.ndarray, moved: float, *, members: int) -> str:
     """Approach of the flanks beyond 5 % of the module: of teeth and bodies, or of moving members as well."""
-    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(cycle.deflection, 2))
-    if not cycle.member_names:
+    sun, ring = (np.abs(half).max() * 1e6 for half in np.split(approach, 2))
+    if not members:
         return (
-            f"[W-DEFLECTION] the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: "
-            "small displacements no longer hold"
+            f"the teeth deflect by {max(sun, ring):.0f} um, more than 5 % of the module: small displacements "
+            "no longer hold"
         )
     return (
-        f"[W-DEFLECTION] the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
+        f"the flanks approach by {sun:.0f} um between sun and planets and by {ring:.0f} um "
         "between planets and ring, more than 5 % of the module: small displacements no longer hold. This is "
         "not the deflection of the teeth alone: it contains the motion of the members, up to "
         f"{moved * 1e6:.0f} um, and between planets and ring that of the ring on its foundation; "

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.case import material_of, planetary_set, set_deviations
 from femgear.gears.modifications import form_deviation
 from femgear.gears.phasing import MeshPhasing, PhasingTable, phase_factors, phasing_table
 from femgear.report.style import (
@@ -41,7 +41,6 @@ from femgear.report.style import (
     periodic,
 )
 from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.stages import material_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,6 +13,7 @@ import numpy as np
 
 from femgear.case.dependencies import Entries
 from femgear.contact.root_stress import BACK, LOADED, RootCycle
+from femgear.errors import Finding
 from femgear.report.tables import Block
 from femgear.storage.dataset import dataset
 from femgear.trains.static.description import static_warnings
@@ -48,9 +49,9 @@ class StaticResult:
     period_message: str = ""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Finding, ...]:
         """What an engineer should not overlook in this result."""
-        return static_warnings(self.cycle, self.planetary_set.sun.module)
+        return tuple(static_warnings(self.dataset(), self.planetary_set.sun.module))
 
     def dataset(self) -> xr.Dataset:
         """Contents of static.nc."""
@@ -61,7 +62,7 @@ class StaticResult:
             for name, (dims, unit, words) in CYCLE_VARIABLES.items()
         }
         teeth, planets = cycle.tooth_load.shape[1], gears.n_planets
-        return dataset(
+        found = dataset(
             variables,
             coords={
                 "mesh": ("mesh", list(gears.mesh_names), "1", "gear mesh"),
@@ -89,9 +90,10 @@ class StaticResult:
                 "pressure_cells": cycle.unknowns,
                 "unknowns": np.array([body.unknowns for body in bodies]),
                 "message": cycle.message,
-                "warnings": " ".join(self.warnings),
             },
         )
+        found.attrs["warnings"] = " ".join(map(str, static_warnings(found, gears.sun.module)))
+        return found
 
 
 @dataclass(frozen=True)
@@ -381,8 +383,8 @@ def _row(root: RootCycle, points: int) -> dict[str, np.ndarray]:
     }
 
 
-def describe_static(data: xr.Dataset) -> Block:
-    """Transmission errors, stiffnesses and load sharing of static.nc."""
+def describe_static(data: xr.Dataset, module: float) -> Block:
+    """Transmission errors, stiffnesses and load sharing of static.nc, of gears with a module [m]."""
     rows = []
     for mesh in data.mesh.values:
         one = data.sel(mesh=mesh)
@@ -415,8 +417,7 @@ def describe_static(data: xr.Dataset) -> Block:
     notes += _stiffness_notes(elastic=data.sizes.get("member", 0) > 0)
     if data.attrs.get("mesh_periods", 1) > 1:
         notes.append(str(data.attrs["period"]))
-    if warnings := str(data.attrs.get("warnings", "")):
-        notes += [f"[{text.strip()}" for text in warnings.split("[") if text]
+    notes += map(str, static_warnings(data, module))
     return Block("Static", header, tuple(rows), tuple(notes))
 
 

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.case import material_of, planetary_set, set_deviations
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
 from femgear.case.sections import Case
 from femgear.contact.root_stress import root_ranges
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
 from femgear.errors import GeometryError
-from femgear.threads import one_blas_thread
-from femgear.trains.protocol import Progress, Stage
+from femgear.trains.protocol import Progress, Stage, one_blas_thread
 from femgear.trains.static.description import check_motions
 from femgear.trains.static.results import (
     NominalStresses,
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
     from femgear.contact.root_stress import RootStresses
     from femgear.contact.supports import Supports
-    from femgear.fe.elasticity import Material
     from femgear.gears.planetary import PlanetarySet
 
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
@@ -211,13 +209,6 @@ def nominal_stresses(
     return NominalStresses(contact, root, "; ".join(dict.fromkeys(messages)))
 
 
-def material_of(case: Case) -> Material:
-    """Material of the gears of a case."""
-    from femgear.fe.elasticity import Material
-
-    return Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
-
-
 def ring_foundation(case: Case, sector: Sector):
     """Elastic foundation of one sector of the ring, a sparse matrix [N/m]."""
     from femgear.fe.elasticity import foundation
@@ -321,7 +312,7 @@ STATIC = Stage(
     title="Static",
     solve=lambda case, _, context: solve_static(case, cache=context.cache, progress=context.progress),
     verdict=static_verdict,
-    describe=lambda results: describe_static(results.static),
+    describe=lambda results: describe_static(results.static, planetary_set(results.case).sun.module),
     check=planetary_set,
 )
 
