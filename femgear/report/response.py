@@ -1,4 +1,4 @@
-"""Figures of modes and periodic responses: mode shapes, spectra of the transmission error, sweeps over speed.
+"""Figures of modes and periodic responses: shapes, Campbell diagram, transmission errors, sweeps over speed.
 
 They draw datasets of results, of whatever train; helpers for figures over the mesh period stand beside them.
 """
@@ -275,6 +275,38 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     places: Any = ("outside upper center", "outside lower center")
     for ax, place in zip((top, bottom), places):
         figure.legend(*ax.get_legend_handles_labels(), loc=place, ncols=3, fontsize=SIZE - 1, frameon=False)
+    return figure
+
+
+def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str) -> Figure:
+    """Draw natural frequencies over the speed with lines of excitation: a Campbell diagram.
+
+    Parameters
+    ----------
+    speed : (p,) array
+        In `speed_unit`.
+    frequency : (p, m) array
+        [Hz]
+    orders : (k,) array
+        Slopes of the lines [Hz per unit of speed].
+    order_names : sequence of str
+    critical : sequence of (speed, frequency)
+        Intersections to mark.
+    speed_unit : str
+    """
+    figure, (ax,) = new_figure(height=5.4)
+    for one in np.transpose(frequency):
+        ax.plot(speed, one, linewidth=1.6, color=BLUE, label="mode")
+    for i, (order, text) in enumerate(zip(orders, order_names)):
+        dash = (0, (6, 2) + (1, 2) * i)
+        ax.plot(speed, order * speed, color=GREY, linewidth=1.2, linestyle=dash, label=text)
+    if len(critical):
+        at = np.asarray(critical, float).T
+        ax.plot(*at, "o", color=BLACK, markerfacecolor="none", markersize=7, label="critical speed")
+    ax.set_xlim(np.min(speed), np.max(speed))
+    ax.set_ylim(0, 1.05 * np.nanmax(frequency))
+    label(ax, f"speed [{speed_unit}]", "natural frequency [Hz]")
+    legend_below(figure, columns=4)
     return figure
 
 

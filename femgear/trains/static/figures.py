@@ -638,7 +638,7 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     from femgear.contact.flank_pairs import mirrored_set
     from femgear.contact.tooth_loads import deformed_set
     from femgear.fe.grid import copy_nodes, rotated_copies
-    from femgear.report.scene import assemble_set, deformed_picture, placed, write_vtu
+    from femgear.report.scene import assemble_set, deformed_picture, placed, whole_field, write_vtu
 
     static, case = drawn.results.get("static"), drawn.case
     if static is None or not static.cycle.force.any():
@@ -662,14 +662,8 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         sector = getattr(sectors, body.kind)
         count = sector.gear.teeth
         numbers, whole = copy_nodes(sector.grid, count), rotated_copies(sector.grid, count)
-        displacement = np.zeros((len(whole.points), 2))
-        for k in range(count):
-            angle = 2 * np.pi * k / count
-            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-            displacement[numbers[k]] = body.displacement[k] @ turn.T
-        bodies.append(
-            placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=displacement)
-        )
+        moved = whole_field(np.asarray(body.displacement), numbers)
+        bodies.append(placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=moved))
     if side < 0:
         bodies = [_reflected(body) for body in bodies]
     grid = assemble_set(bodies)
