@@ -126,7 +126,7 @@ def open_journal(
         path.parent.mkdir(parents=True, exist_ok=True)
     with exclusive_lock(path.with_name(f".{path.name}.lock")):
         with storage_errors(path):
-            stream = open(path, "a+b")  # noqa: SIM115
+            stream = open(path, "a+b")
         with stream:
             journal = Journal(path, stream)
             journal._read(path, stream, header)
