@@ -27,6 +27,7 @@ from femgear.report.style import (
     new_figure,
     periodic,
     rpm,
+    xy,
 )
 
 if TYPE_CHECKING:
@@ -91,11 +92,11 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
         largest = max(largest, np.hypot(x, y), abs(turn) * radius)
     factor = scale * outer / largest if largest > 0 else 0.0
     circle = np.exp(1j * _CIRCLE)
-    ax.plot(*_xy(outer * circle), color="0.8", linewidth=1.0, label="at rest")
+    ax.plot(*xy(outer * circle), color="0.8", linewidth=1.0, label="at rest")
     rigid = _motion(shape, "ring")
     shift, turn = factor * (rigid[0] + 1j * rigid[1]), factor * rigid[2]
     ax.plot(
-        *_xy((outer + factor * ring) * circle + shift),
+        *xy((outer + factor * ring) * circle + shift),
         color=BLACK,
         linewidth=1.8,
         label="ring, outer surface",
@@ -103,8 +104,8 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
     if "ring: rotation" in shape:
         # a rigid ring shows its rotation by a mark in its rim
         mark = np.array([0.9, 1.0]) * outer
-        ax.plot(*_xy(1j * mark), color="0.8", linewidth=1.0)
-        ax.plot(*_xy(shift + 1j * mark * np.exp(1j * turn)), color=BLACK, linewidth=1.8)
+        ax.plot(*xy(1j * mark), color="0.8", linewidth=1.0)
+        ax.plot(*xy(shift + 1j * mark * np.exp(1j * turn)), color=BLACK, linewidth=1.8)
     for name, (centre, radius, colour, text) in bodies.items():
         x, y, turn = _motion(shape, name)
         moved = centre + factor * (x + 1j * y)
@@ -112,11 +113,11 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
         if name == "carrier":
             _draw_carrier(ax, planetary_set, moved, factor * turn, colour)
             continue
-        ax.plot(*_xy(centre + radius * circle), color="0.8", linewidth=1.0)
-        ax.plot(*_xy(np.array([centre, centre + spoke])), color="0.8", linewidth=1.0)
-        ax.plot(*_xy(moved + radius * circle), color=colour, linewidth=1.6, label=text)
+        ax.plot(*xy(centre + radius * circle), color="0.8", linewidth=1.0)
+        ax.plot(*xy(np.array([centre, centre + spoke])), color="0.8", linewidth=1.0)
+        ax.plot(*xy(moved + radius * circle), color=colour, linewidth=1.6, label=text)
         ax.plot(
-            *_xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6
+            *xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6
         )
     span = 1.24 * outer
     ax.set_xlim(-span, span)
@@ -131,8 +132,8 @@ def _draw_carrier(ax, planetary_set, moved, turn, colour):
     pins = planetary_set.centre_distance * np.exp(1j * np.asarray(planetary_set.planet_angles, float))
     pins = moved + pins * np.exp(1j * turn)
     for pin in pins:
-        ax.plot(*_xy(np.array([moved, pin])), color=colour, linewidth=1.2, linestyle="--", label="carrier")
-    ax.plot(*_xy(pins), "o", color=colour, markersize=3)
+        ax.plot(*xy(np.array([moved, pin])), color=colour, linewidth=1.2, linestyle="--", label="carrier")
+    ax.plot(*xy(pins), "o", color=colour, markersize=3)
 
 
 def _bodies(planetary_set):
@@ -157,11 +158,6 @@ def _ring_radial(modes, mode):
     n = modes["circumferential"].values
     value = modes["ring_shape_real"].values[mode] + 1j * modes["ring_shape_imag"].values[mode]
     return (np.exp(1j * np.outer(_CIRCLE, n)) @ value).real
-
-
-def _xy(points):
-    """Coordinates of complex points."""
-    return points.real, points.imag
 
 
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:

@@ -122,6 +122,11 @@ def png_bytes(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
+def xy(points):
+    """Split complex points into both coordinates."""
+    return points.real, points.imag
+
+
 def family(name: str) -> str:
     """Kind of a mesh from its label: ``"planet-ring"`` where the ring takes part."""
     return "planet-ring" if "ring" in name else "sun-planet"

@@ -1,35 +1,30 @@
-"""Figures of gears, their phasing and their static results: deviations, transmission errors, tooth stresses.
+"""Figures of static.nc and stress.nc: errors, stiffnesses, loads, the deformed set, stresses of one tooth.
 
-By what they show:
-
-- static.nc: what the gears themselves do over one mesh period, errors, stiffnesses, loads, and the deformed
-  set;
-- stress.nc: one tooth on its way through the mesh, along its roots, with pressures and load spectra;
-- deviations as measuring machines draw them: profiles over the roll angle, pitches over the teeth;
-- mesh phasing: phases round the carrier, what they cancel and excite, spectra of the mesh forces.
-
-`FIGURES` at the end ties the pictures of the report to their captions.
+What the gears do over one mesh period, and one tooth on its way through the mesh, with the stresses along its
+roots, contact pressures and load spectra. `FIGURES` at the end ties the pictures of the report, charts of
+deviations among them, to their captions.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.case import planetary_set, set_deviations
-from femgear.gears.modifications import form_deviation
-from femgear.gears.phasing import MeshPhasing, PhasingTable, phase_factors, phasing_table
+from femgear.contact.bodies import make_sectors
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.contact.flank_pairs import mirrored_set
+from femgear.contact.tooth_loads import deformed_set
+from femgear.fe.grid import copy_nodes, rotated_copies
+from femgear.report.scene import Body, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.style import (
     BLACK,
     BLUE,
     COLOURS,
     GREY,
-    ORANGE,
     SIZE,
     VERMILION,
     distinct_lines,
@@ -41,24 +36,19 @@ from femgear.report.style import (
     periodic,
 )
 from femgear.trains.protocol import Drawn, Figures
+from femgear.trains.static.charts import four_panels, has_pitches, has_profiles, pitch_chart, profile_chart
 from femgear.trains.static.stages import material_of
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
+_POSITION = "position in the mesh period [1]"
 
-POSITION = "position in the mesh period [1]"
-
-TENSION, COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
+_TENSION, _COMPRESSION = "root of the loaded flank, largest stress", "root of the back flank, lowest stress"
 # tangent of the critical section after ISO 6336-3, external and internal gears
-CRITICAL_SLOPE = {False: 30.0, True: 60.0}
-KINDS = ("sun-planet", "planet-ring")
-
-_CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 121))
+_CRITICAL_SLOPE = {False: 30.0, True: 60.0}
+_KINDS = ("sun-planet", "planet-ring")
 
 # pictures need no converged stresses: a sector of some thousand nodes keeps the files small
 PICTURE_FLANK_ELEMENTS = 6
@@ -78,7 +68,7 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     drawn = distinct_lines(names, static["ste"])
     for i, (text, row) in enumerate(drawn):
         left.plot(*periodic(static["position"], static["ste"][row] * 1e6), label=text, **line_style(i))
-    label(left, POSITION, "transmission error [µm]", "each mesh, along its line of action")
+    label(left, _POSITION, "transmission error [µm]", "each mesh, along its line of action")
     planets = [f"sun to ring over planet {p}" for p in static["planet"].values]
     position, overall = periodic(static["position"], static["ste_overall"] * 1e6)
     rows = list(zip(planets, range(len(planets))))
@@ -86,7 +76,7 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
         rows = [("sun to ring over every planet (identical)", 0)]
     for i, (text, row) in enumerate(rows):
         right.plot(position, overall[row], label=text, **line_style(i + len(drawn)))
-    label(right, POSITION, "sum of both meshes [µm]", "sun to ring")
+    label(right, _POSITION, "sum of both meshes [µm]", "sun to ring")
     right.set_xlim(0, position[-1])
     legend_below(figure, columns=2)
     return figure
@@ -115,7 +105,7 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
     for kind, width in (("tangent (thick)", 2.2), ("secant (thin)", 0.9)):
         axes[-1].plot([], [], color=BLACK, linewidth=width, label=kind)
     axes[-1].set_xlim(0, position[-1])
-    label(axes[-1], POSITION)
+    label(axes[-1], _POSITION)
     # N/m over m of width is 1e-9 N/(mm µm)
     factor = 1e-3 / face_width if face_width else 0.0
     for ax, kind in zip(axes, kinds):
@@ -149,7 +139,7 @@ def load_sharing(static: xr.Dataset) -> Figure:
         ax.set_ylim(0.94 * equal, 1.06 * equal)
     ax.set_xlim(0, position[-1])
     title = f"largest departure from equal shares: {spread:.3g} %" if spread > 1e-6 else "equal shares"
-    label(ax, POSITION, "share of the torque [%]", title)
+    label(ax, _POSITION, "share of the torque [%]", title)
     legend_below(figure, columns=4)
     return figure
 
@@ -195,7 +185,7 @@ def _equal(rows) -> bool:
 
 
 def root_stress_history(stress: xr.Dataset) -> Figure:
-    """Root stresses of one tooth of every gear from mesh to mesh, on the planet with the largest tension.
+    """Draw the root stresses of one tooth of every gear from mesh to mesh, on the planet with the largest.
 
     Parameters
     ----------
@@ -203,26 +193,26 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
         With ``root_tension`` and ``root_compression`` [Pa] and ``root_path`` [1] (mesh, gear, step); where
         it has ``iso_root_stress`` [Pa] (mesh, gear), the nominal stress is drawn too.
     """
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharex=True, sharey=True)
-    for ax, (title, row, _) in zip(axes, _four_gears(stress)):
-        path = row["root_path"].values
-        ax.plot(path, row["root_tension"].values * 1e-6, color=VERMILION, label=TENSION)
-        ax.plot(path, row["root_compression"].values * 1e-6, color=BLUE, linestyle="--", label=COMPRESSION)
+    gears = _four_gears(stress)
+
+    def draw(number: int, ax) -> str:
+        title, row = gears[number]
+        path, tension, compression = (
+            row[f"root_{name}"].values for name in ("path", "tension", "compression")
+        )
+        ax.plot(path, tension * 1e-6, color=VERMILION, label=_TENSION)
+        ax.plot(path, compression * 1e-6, color=BLUE, linestyle="--", label=_COMPRESSION)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
         _nominal(ax, row, "iso_root_stress", "σ_F0 of ISO 6336-3")
-        largest = float(row["root_tension"].max()) * 1e-6
-        lowest = float(row["root_compression"].min()) * 1e-6
-        label(ax, title=f"{title}: {largest:.3g} and {lowest:.3g} MPa")
-    for ax in axes[2:]:
-        label(ax, "path from the pitch point [base pitches]")
-    for ax in axes[::2]:
-        label(ax, y="stress [MPa]")
-    legend_below(figure, columns=2)
-    return figure
+        if number > 1:
+            label(ax, "path from the pitch point [base pitches]")
+        return f"{title}: {tension.max() * 1e-6:.3g} and {compression.min() * 1e-6:.3g} MPa"
+
+    return four_panels(draw, "stress [MPa]", columns=2, sharex=True)
 
 
 def root_stress_profile(stress: xr.Dataset) -> Figure:
-    """Stress along both roots of a tooth when its tension is largest, on the planet where that is largest.
+    """Draw the stress along both roots of a tooth when its tension is largest, on the planet where that is.
 
     Parameters
     ----------
@@ -230,26 +220,24 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
         With ``root_profile`` (mesh, gear, root, point) [Pa], ``root_arc`` [m] and ``root_slope`` [rad]
         (mesh, gear, point).
     """
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
-    for ax, (title, row, internal) in zip(axes, _four_gears(stress)):
+    gears = _four_gears(stress)
+
+    def draw(number: int, ax) -> str:
+        title, row = gears[number]
         arc, slope = row["root_arc"].values * 1e3, np.degrees(row["root_slope"].values)
         for side, colour, dash in (("loaded", VERMILION, "-"), ("back", BLUE, "--")):
-            values = row["root_profile"].sel(root=side).values * 1e-6
-            ax.plot(
-                arc, values, dash, color=colour, marker="o", markersize=3, label=f"root of the {side} flank"
-            )
+            values, text = row["root_profile"].sel(root=side).values * 1e-6, f"root of the {side} flank"
+            ax.plot(arc, values, dash, color=colour, marker="o", markersize=3, label=text)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
-        angle = CRITICAL_SLOPE[internal]
         known = np.isfinite(arc)
-        place = _crossing(slope[known], arc[known], angle)
+        place = _crossing(slope[known], arc[known], _CRITICAL_SLOPE[title == "ring"])
         if place is not None:
             text = "critical section of ISO 6336-3 (tangent 30°, internal gears 60°)"
             ax.axvline(place, color=GREY, linewidth=1.2, linestyle=":", label=text)
-        label(ax, "arc from the end of the flank [mm]", title=title)
-    for ax in axes[::2]:
-        label(ax, y="stress [MPa]")
-    legend_below(figure, columns=3)
-    return figure
+        label(ax, "arc from the end of the flank [mm]")
+        return title
+
+    return four_panels(draw, "stress [MPa]", columns=3)
 
 
 def contact_pressure(stress: xr.Dataset) -> Figure:
@@ -267,7 +255,7 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
     # at the end of a flank the pressure grows as cells shrink: it only decides where there is no other
     edge = stress["pressure_distribution"].max(("pair", "cell", "position")).values
     planet = _worst_planet(stress, stress["contact_pressure"].max("position").values, edge)
-    for upper, lower, kind in zip(axes[:2], axes[2:], KINDS):
+    for upper, lower, kind in zip(axes[:2], axes[2:], _KINDS):
         row = _mesh_of(stress, kind, planet)
         path, place, pressure = _along_path(row)
         upper.plot(path, pressure.max(axis=0), color=VERMILION, label="largest pressure")
@@ -326,7 +314,7 @@ def load_spectrum(stress: xr.Dataset) -> Figure:
     edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
     time = stress["load_time_share"].values
     planet = _worst_planet(stress, (edges[1:] * (time > 0.0)).max(axis=1), time @ edges[1:])
-    for ax, kind in zip(axes, KINDS):
+    for ax, kind in zip(axes, _KINDS):
         row = _mesh_of(stress, kind, planet)
         time, cycles = (100 * row[f"load_{name}_share"].values for name in ("time", "cycle"))
         ax.stairs(time, edges, fill=True, color=BLUE, alpha=0.75, label="share of the time under load")
@@ -374,7 +362,7 @@ def _worst_planet(stress: xr.Dataset, *measures: np.ndarray) -> int:
     """Planet (from 0) whose meshes have the largest of a measure (mesh,); the next measure decides ties."""
     kinds = [family(str(name)) for name in stress["mesh"].values]
     of_planets = [
-        np.max([measure[[kind == wanted for kind in kinds]] for wanted in KINDS], axis=0)
+        np.max([measure[[kind == wanted for kind in kinds]] for wanted in _KINDS], axis=0)
         for measure in measures
     ]
     left = np.arange(len(of_planets[0]))
@@ -391,17 +379,16 @@ def _nominal(ax, row: xr.Dataset, name: str, text: str) -> None:
         ax.axhline(row[name].item() * 1e-6, color=BLACK, linewidth=1.2, linestyle="-.", label=text)
 
 
-def _four_gears(stress: xr.Dataset):
-    """Title, rows and whether it is internal, of sun, planet on both sides, and ring."""
+def _four_gears(stress: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Name sun, planet on both sides, and ring of the planet with the largest tension, with their rows."""
     tension = stress["root_tension"].max([dim for dim in stress["root_tension"].dims if dim != "mesh"])
     n = _worst_planet(stress, tension.values)
-    sides = (
-        ("sun", f"planet {n + 1}, sun side"),
-        (f"planet {n + 1}, ring side", "ring"),
-    )
-    for kind, titles in zip(KINDS, sides):
-        for gear, title in enumerate(titles):
-            yield title, _mesh_of(stress, kind, n).isel(gear=gear), title == "ring"
+    titles = ("sun", f"planet {n + 1}, sun side"), (f"planet {n + 1}, ring side", "ring")
+    return [
+        (title, _mesh_of(stress, kind, n).isel(gear=gear))
+        for kind, pair in zip(_KINDS, titles)
+        for gear, title in enumerate(pair)
+    ]
 
 
 def _crossing(slope, arc, angle) -> float | None:
@@ -411,188 +398,6 @@ def _crossing(slope, arc, angle) -> float | None:
         return None
     i = above[0]
     return float(arc[i] + (arc[i + 1] - arc[i]) * (angle - slope[i]) / (slope[i + 1] - slope[i]))
-
-
-def has_profiles(deviations: SetDeviations, planetary_set: PlanetarySet) -> bool:
-    """Whether any loaded flank differs from its involute, so that `profile_chart` shows something."""
-    d, s = deviations, planetary_set
-    forms = ((d.sun, s.sun), (d.planet_sun_side, s.planet), (d.planet_ring_side, s.planet), (d.ring, s.ring))
-    return any(form_deviation(form, gear, _stations(form, gear)).any() for form, gear in forms)
-
-
-def has_pitches(deviations: SetDeviations) -> bool:
-    """Whether any tooth stands off its place, so that `pitch_chart` shows something."""
-    d = deviations
-    return any(p.any() for p in (d.sun_pitch, d.planet_pitch, d.planet_ring_side_pitch, d.ring_pitch))
-
-
-def _four_flanks(draw: Callable[[int, Any], str]) -> Figure:
-    """Deviations of the flanks of sun, planets (twice) and ring, drawn one each on common axes.
-
-    ``draw`` is called with the number of the flank and its axes, and returns the title.
-    """
-    figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6, sharey=True)
-    for number, ax in enumerate(axes):
-        label(ax, title=draw(number, ax))
-    for ax in axes[::2]:
-        label(ax, y="deviation [µm], material positive")
-    low, high = axes[0].get_ylim()
-    axes[0].set_ylim(min(low, -1.0), max(high, 1.0))
-    legend_below(figure, columns=5)
-    return figure
-
-
-def profile_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
-    """Profiles of the four kinds of loaded flanks over the roll angle, positive with more material.
-
-    Parameters
-    ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
-
-    Returns
-    -------
-    Figure
-        The involute is the zero line; the part that meets the mate is marked.
-    """
-    d, s = deviations, planetary_set
-    active = active_rolls(s)
-    flanks = (
-        ("sun", d.sun, s.sun),
-        ("planet, sun side", d.planet_sun_side, s.planet),
-        ("planet, ring side", d.planet_ring_side, s.planet),
-        ("ring", d.ring, s.ring),
-    )
-
-    def draw(number: int, ax) -> str:
-        name, form, gear = flanks[number]
-        roll = _stations(form, gear)
-        ax.plot(_degrees(gear, roll), -1e6 * form_deviation(form, gear, roll), color=BLUE, label="profile")
-        ax.axhline(0.0, color=BLACK, linewidth=0.8, label="involute")
-        ax.axvspan(*_degrees(gear, np.array(active[number])), color="0.93", label="meets the mate")
-        for place, end, dash in (("form circle", gear.form_roll, ":"), ("tip circle", gear.tip_roll, "--")):
-            ax.axvline(float(_degrees(gear, end)), color=GREY, linestyle=dash, label=place)
-        label(ax, "roll angle [deg]")
-        return name
-
-    return _four_flanks(draw)
-
-
-def pitch_chart(deviations: SetDeviations, planetary_set: PlanetarySet) -> Figure:
-    """Cumulative pitch deviations of the loaded flanks over the tooth number, positive with more material.
-
-    Parameters
-    ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
-
-    Returns
-    -------
-    Figure
-        Along the line of action; a line for each planet and flank that has any.
-    """
-    d, N = deviations, planetary_set.n_planets
-    rows = (
-        ("sun", [("sun", d.sun_pitch)]),
-        ("planets, sun side", [(f"planet {n + 1}", d.planet_pitch[n]) for n in range(N)]),
-        ("planets, ring side", [(f"planet {n + 1}", d.planet_ring_side_pitch[n]) for n in range(N)]),
-        ("ring", [("ring", d.ring_pitch)]),
-    )
-
-    def draw(number: int, ax) -> str:
-        title, lines = rows[number]
-        for i, (name, values) in enumerate(lines):
-            # sun, ring and planets differ in the common legend
-            style = line_style(i if len(lines) > 1 else N + (title == "ring"))
-            ax.step(np.arange(len(values)), -1e6 * values, where="mid", label=name, **style)
-        label(ax, "tooth number [1]")
-        return title
-
-    return _four_flanks(draw)
-
-
-def active_rolls(planetary_set: PlanetarySet) -> tuple[tuple[float, float], ...]:
-    """Roll lengths [m] of the parts of the flanks that rigid gears use: sun, planet twice, ring.
-
-    From the path of contact: ``r_b tan(alpha_w)`` and the path coordinate, which runs down the flank of a
-    driven external gear.
-    """
-    s = planetary_set
-    sun_side, ring_side = (
-        math.tan(s.working_pressure_angle_sun_planet),
-        math.tan(s.working_pressure_angle_planet_ring),
-    )
-    (a, b), (c, e) = s.path_sun_planet, s.path_planet_ring
-    planet = s.planet.base_radius
-    return (
-        (s.sun.base_radius * sun_side + a, s.sun.base_radius * sun_side + b),
-        (planet * sun_side - b, planet * sun_side - a),
-        (planet * ring_side + c, planet * ring_side + e),
-        (s.ring.base_radius * ring_side + c, s.ring.base_radius * ring_side + e),
-    )
-
-
-def _stations(form, gear: Gear) -> np.ndarray:
-    """Roll lengths close enough for curves, the corners of all laws and the measured points among them."""
-    low, high = sorted((gear.form_roll, gear.tip_roll))
-    corners = [getattr(m, "roll", None) or (m.start, m.end) for m in form.modifications]
-    extra = [roll for pair in corners for roll in pair if roll is not None and low < roll < high]
-    return np.unique(np.concatenate([np.linspace(low, high, 301), extra]))
-
-
-def _degrees(gear: Gear, roll):
-    return np.degrees(np.asarray(roll) / gear.base_radius)
-
-
-def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 4)) -> Figure:
-    """Phases of sun and ring meshes as hands of a dial at every planet, one picture a harmonic.
-
-    Parameters
-    ----------
-    phasing : MeshPhasing
-    harmonics : sequence of int
-        A hand upwards has phase zero; phase grows counter-clockwise.
-    """
-    table, factors = phasing_table(phasing, list(harmonics)), phase_factors(phasing, list(harmonics))
-    columns = min(4, len(harmonics))
-    rows = -(-len(harmonics) // columns)
-    figure, axes = new_figure(rows=rows, columns=columns, width=2.9 * columns, height=3.4 * rows + 0.5)
-    centres = np.exp(1j * phasing.planet_angles)
-    nearest = np.abs(np.diff([*centres, centres[0]])).min() if phasing.n_planets > 1 else 1.0
-    dial = min(0.44 * nearest, 0.42)
-    for ax in axes:
-        ax.set_axis_off()
-        ax.set_aspect("equal")
-    for h, (ax, row) in enumerate(zip(axes, factors)):
-        ax.plot(*_xy(_CIRCLE), color="0.85", linewidth=1.0)
-        for n, centre in enumerate(centres):
-            ax.plot(*_xy(centre + dial * _CIRCLE), color=GREY, linewidth=1.0)
-            number = centre * (1.0 + 1.35 * dial)
-            ax.text(*_xy(number), str(n + 1), ha="center", va="center", fontsize=SIZE - 2)
-            ends = centre + 0.9j * dial * row[[n, phasing.n_planets + n]]
-            ax.plot(*_xy(np.array([centre, ends[0]])), color=BLUE, linewidth=3.6, label="sun mesh")
-            ax.plot(*_xy(np.array([centre, ends[1]])), color=ORANGE, linewidth=1.6, label="ring mesh")
-        ax.text(0.0, 0.0, _verdict(table, h), ha="center", va="center", fontsize=SIZE - 2)
-        ax.set_title(f"harmonic {table.harmonics[h]}: {table.kind[h]}", fontsize=SIZE - 1)
-        ax.set_xlim(-1.05 - 1.6 * dial, 1.05 + 1.6 * dial)
-        ax.set_ylim(-1.05 - 1.6 * dial, 1.05 + 1.6 * dial)
-    legend_below(figure, columns=2)
-    return figure
-
-
-def _verdict(table: PhasingTable, row: int) -> str:
-    """What is left of the mesh forces on sun and ring."""
-    torque, lateral = table.members[row, :2, :2].max(axis=0)
-    left = [
-        f"{name} {100 * size:.0f} %"
-        for name, size in (("torque", torque), ("lateral", lateral))
-        if size > 1e-9
-    ]
-    return "\n".join(left) or "nothing on\nsun and ring"
-
-
-def _xy(points):
-    return np.real(points), np.imag(points)
 
 
 def _static_figures(drawn: Drawn) -> dict[str, Figure]:
@@ -633,13 +438,6 @@ def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
 
 def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     """The whole set deformed by the static loads of position zero, as VTU and picture."""
-    from femgear.contact.bodies import make_sectors
-    from femgear.contact.cycle import walk_mesh_cycle
-    from femgear.contact.flank_pairs import mirrored_set
-    from femgear.contact.tooth_loads import deformed_set
-    from femgear.fe.grid import copy_nodes, rotated_copies
-    from femgear.report.scene import assemble_set, deformed_picture, placed, whole_field, write_vtu
-
     static, case = drawn.results.get("static"), drawn.case
     if static is None or not static.cycle.force.any():
         return []
@@ -673,8 +471,8 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     return ["deformed_set.vtu", "deformed_set.png"]
 
 
-def _reflected(body):
-    """A body seen from behind: y reversed, and the triangles turned round with it."""
+def _reflected(body: Body) -> Body:
+    """Turn a body to be seen from behind: y reversed, and the triangles turned round with it."""
     flip = np.array([1.0, -1.0])
     return replace(
         body,
