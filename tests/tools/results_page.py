@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Write the tables of docs/results.md: every variable of every results file with dimensions, unit and text.
 
-They are read from the datasets of small runs and, of static.nc and stress.nc, from the declarations. What
-stands between the tables is written by hand and stays::
+They are read from the datasets of small runs and, of static.nc and stress.nc, from the declarations. The last
+column and what stands between the tables are written by hand and stay::
 
     python tests/tools/results_page.py -o docs/results.md
 """
@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import femgear
@@ -63,60 +63,79 @@ RUNS = {
             "response.to": 1.0,
             "response.harmonics": 3,
             "sweep": {"ranges": [{"from": 0.9, "to": 1.0, "count": 2}], "steps": 40, "most_periods": 20},
-            "chaos": {"from": 2.2, "to": 1.8, "count": 2, "points": 8, "skip": 10, "steps": 40, "sections": [2.2]},
+            "chaos": {
+                "from": 2.2,
+                "to": 1.8,
+                "count": 2,
+                "points": 8,
+                "skip": 10,
+                "steps": 40,
+                "sections": [2.2],
+            },
         },
     ),
 }
 TABLE = re.compile(r"(?s)(<!-- table (\w+) (\w+) -->\n).*?(<!-- end -->\n)")
-ROW = "| {} | {} | {} | {} |\n"
-HEAD = ROW.format("variable", "dimensions", "unit", "meaning") + "|---|---|---|---|\n"
-PARTS = (("_real", ", real part"), ("_imag", ", imaginary part"))
+ROW = "| {} | {} | {} | {} | {} |\n"
+HEAD = ROW.format("variable", "dimensions", "unit", "meaning", "remark") + "|---|---|---|---|---|\n"
 
 
-def tables() -> dict[tuple[str, str], str]:
-    """Table of every file by train and stage."""
+Variables = Mapping[str, tuple[str, str, str]]
+"""Dimensions, unit and text of variables, texts without a unit."""
+
+
+def variables() -> dict[tuple[str, str], Variables]:
+    """Variables of every file by train and stage."""
     declared = {"static": STATIC_VARIABLES, "stress": STRESS_VARIABLES}
-    found = {("elastic", stage): table(texts) for stage, texts in declared.items()}
+    found: dict[tuple[str, str], Variables] = {("elastic", stage): one for stage, one in declared.items()}
     for train, (name, changes) in RUNS.items():
         case = with_values(femgear.read_case(ROOT / "cases" / f"{name}.toml"), changes)
         for stage, result in femgear.solve(case).items():
             if stage not in declared:
-                found[train, stage] = table(dict(_variables(result.dataset())))
+                found[train, stage] = {
+                    name: (
+                        " ".join(one.dims),
+                        "" if one.dtype.kind in "OUS" else one.attrs["units"],
+                        one.attrs["long_name"],
+                    )
+                    for name, one in result.dataset().data_vars.items()
+                }
     return found
 
 
-def _variables(data) -> Iterator[tuple[str, tuple[str, str, str]]]:
-    """Dimensions, unit and text of the variables of a dataset; texts have no unit."""
-    for name, one in data.data_vars.items():
-        unit = "" if one.dtype.kind in "OUS" else one.attrs["units"]
-        yield name, (" ".join(one.dims), unit, one.attrs["long_name"])
-
-
-def table(variables: Mapping[str, tuple[str, str, str]]) -> str:
-    """Rows of a table; real and imaginary part share one."""
-    rows = {}
-    for name, (dims, unit, text) in variables.items():
-        for suffix, words in PARTS:
-            if name.endswith(suffix) and f"{name.removesuffix(suffix)}_real" in variables:
-                text = text.removesuffix(words)
-        rows.setdefault((re.sub("_(real|imag)$", "", name), dims, unit, text), []).append(f"`{name}`")
-    return HEAD + "".join(
-        ROW.format(", ".join(names), dims.replace(" ", ", "), unit, _cell(text))
+def table(entries: Variables, remarks: Mapping[str, str]) -> str:
+    """Rows of a table, real and imaginary part in one; remarks by the first name of a row."""
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for name, (dims, unit, text) in entries.items():
+        whole = re.sub("_(real|imag)$", "", name)
+        if f"{whole}_real" in entries:
+            text = re.sub(", (real|imaginary) part$", "", text)
+        rows.setdefault((whole, dims, unit, text), []).append(name)
+    lines = (
+        ROW.format(
+            ", ".join(f"`{name}`" for name in names),
+            dims.replace(" ", ", "),
+            unit,
+            text.replace("|", "\\|").replace("<", "&lt;"),
+            remarks.get(names[0], ""),
+        )
         for (_, dims, unit, text), names in rows.items()
     )
+    return HEAD + "".join(line.replace("|  |", "| |") for line in lines)
 
 
-def _cell(text: str) -> str:
-    return " ".join(text.replace("|", "\\|").split()).replace("<", "&lt;")
-
-
-def page(text: str, found: Mapping[tuple[str, str], str]) -> str:
+def page(text: str, found: Mapping[tuple[str, str], Variables]) -> str:
     """Text of the page with its tables written anew; each of them must be there, once."""
-    places = [match[1:3] for match in re.findall(TABLE, text)]
-    missing = set(found) ^ set(places)
-    if missing or len(places) != len(found):
-        raise SystemExit(f"tables that are missing, unknown or given twice: {sorted(missing) or places}")
-    return TABLE.sub(lambda match: f"{match[1]}{found[match[2], match[3]]}{match[4]}", text)
+    places = [match[1:3] for match in TABLE.findall(text)]
+    if sorted(places) != sorted(found):
+        wrong = sorted(set(found) ^ set(places)) or places
+        raise SystemExit(f"tables that are missing, unknown or given twice: {wrong}")
+
+    def written(match: re.Match) -> str:
+        rows = re.findall(r"(?m)^\| `(\w+)`.*\|(?: (.*))? \|$", match[0])
+        return f"{match[1]}{table(found[match[2], match[3]], dict(rows))}{match[4]}"
+
+    return TABLE.sub(written, text)
 
 
 def main() -> int:
@@ -124,7 +143,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path)
     output = parser.parse_args().output
-    text = page(PAGE.read_text(encoding="utf-8"), tables())
+    text = page(PAGE.read_text(encoding="utf-8"), variables())
     if output is None:
         print(text)
     else:
