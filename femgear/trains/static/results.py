@@ -13,7 +13,7 @@ import numpy as np
 
 from femgear.case.dependencies import Entries
 from femgear.contact.root_stress import BACK, LOADED, RootCycle
-from femgear.report.tables import Block
+from femgear.report.tables import Block, tabulate
 from femgear.storage.dataset import dataset, declared
 from femgear.trains.static.description import static_warnings
 
@@ -107,6 +107,19 @@ STRESS_VARIABLES = {
     "iso_root_stress": ("mesh gear", "Pa", "nominal root stress sigma_F0, ISO 6336-3 method B"),
 }
 """Variables of stress.nc; records of one mesh period have none of single teeth, longer ones no pressures."""
+
+
+_STRESS_COLUMNS = (
+    "[MPa]",
+    "FE",
+    "ISO 6336",
+    "FE/ISO",
+    "position",
+    "arc [mm]",
+    "tangent [°]",
+    "range",
+    "cycles",
+)
 
 
 @dataclass(frozen=True)
@@ -348,31 +361,16 @@ def _by_gear(rows) -> np.ndarray:
 
 def describe_static(data: xr.Dataset) -> Block:
     """Tabulate transmission errors, stiffnesses and load sharing of static.nc."""
-    rows = []
-    for mesh in data.mesh.values:
-        one = data.sel(mesh=mesh)
-        ste = one.ste.values
-        rows.append(
-            (
-                str(mesh),
-                f"{ste.mean() * 1e6:.4f}",
-                f"{np.ptp(ste) * 1e6:.4f}",
-                f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
-                f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
-                f"{one.mesh_force.values.mean():.3f}",
-                f"{one.max_pressure.values.max() / 1e6:.1f}" if one.max_pressure.values.any() else "-",
-            )
-        )
     share = data.load_share.values
-    header = (
-        "mesh",
-        "STE mean [um]",
-        "STE p-p [um]",
-        "k mean [N/um]",
-        "k p-p [N/um]",
-        "force [N]",
-        "p max [MPa]",
-    )
+    columns = {
+        "mesh": lambda one: str(one.mesh.item()),
+        "STE mean [um]": lambda one: f"{one.ste.values.mean() * 1e6:.4f}",
+        "STE p-p [um]": lambda one: f"{np.ptp(one.ste.values) * 1e6:.4f}",
+        "k mean [N/um]": lambda one: f"{one.mesh_stiffness.values.mean() / 1e6:.3f}",
+        "k p-p [N/um]": lambda one: f"{np.ptp(one.mesh_stiffness.values) / 1e6:.3f}",
+        "force [N]": lambda one: f"{one.mesh_force.values.mean():.3f}",
+        "p max [MPa]": lambda one: f"{p.max() / 1e6:.1f}" if (p := one.max_pressure.values).any() else "-",
+    }
     notes = [
         f"load share of a planet {share.min():.4f} to {share.max():.4f} "
         f"(equal sharing {1 / data.sizes['planet']:.4f}); contact: {data.attrs.get('contact', 'unknown')}",
@@ -382,11 +380,11 @@ def describe_static(data: xr.Dataset) -> Block:
         notes.append(str(data.attrs["period"]))
     if warnings := str(data.attrs.get("warnings", "")):
         notes += [f"[{text.strip()}" for text in warnings.split("[") if text]
-    return Block("Static", header, tuple(rows), tuple(notes))
+    return tabulate("Static", [data.sel(mesh=mesh) for mesh in data.mesh.values], columns, notes)
 
 
 def _stiffness_notes(*, elastic: bool) -> list[str]:
-    """What the columns k and STE of the static table contain."""
+    """Tell what the columns k and STE of the static table contain."""
     held = "k: tangent stiffness dF/dx of teeth and bodies"
     if not elastic:
         return [f"{held}, held at their bores and at the outer surface of the ring"]
@@ -408,21 +406,6 @@ def describe_stress(data: xr.Dataset) -> Block:
         meshes = [i for i, name in enumerate(names) if ("ring" in name) == (kind == "planet-ring")]
         contact.append(_contact_row(kind, data.isel(mesh=meshes)))
         roots += [_root_row(title, data.isel(mesh=meshes, gear=g)) for g, title in enumerate(titles)]
-    header = (
-        "[MPa]",
-        "FE",
-        "ISO 6336",
-        "FE/ISO",
-        "position",
-        "arc [mm]",
-        "tangent [°]",
-        "range",
-        "cycles",
-    )
-    return Block("Stresses", header, (*contact, *roots), _notes(data))
-
-
-def _notes(data: xr.Dataset) -> tuple[str, ...]:
     notes = [
         "ISO 6336: nominal stresses sigma_H0 and sigma_F0 (method B) with equal load on all planets and no "
         "load factors; FE: largest contact pressure away from flank ends, and largest tension in the root",
@@ -434,10 +417,11 @@ def _notes(data: xr.Dataset) -> tuple[str, ...]:
         notes.append(f"outside the range of ISO 6336: {data.attrs['iso']}")
     if not data.attrs.get("repeats", 1):
         notes.append("the record does not repeat: stress ranges are those that it shows")
-    return tuple(notes)
+    return Block("Stresses", _STRESS_COLUMNS, (*contact, *roots), tuple(notes))
 
 
 def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:
+    """Write the largest contact pressure of a kind of mesh."""
     pressure = data["contact_pressure"].values
     mesh, position = np.unravel_index(pressure.argmax(), pressure.shape)
     found, nominal = float(pressure[mesh, position]), float(data["iso_contact_stress"][mesh])
@@ -446,28 +430,25 @@ def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:
 
 
 def _root_row(title: str, data: xr.Dataset) -> tuple[str, ...]:
+    """Write the largest root stress of a gear in its worst mesh."""
     mesh = int(data["root_worst"].values.argmax())
-    one = data.isel(mesh=mesh)
-    found = float(one["root_worst"])
-    low, high = (float(one[f"root_range_{name}"]) for name in ("minimum", "maximum"))
-    place = ["-"] * 3
+    one = {name: float(values) for name, values in data.isel(mesh=mesh).items() if not values.dims}
+    found, place = one["root_worst"], ["-"] * 3
     if found:
-        place = [
-            f"{float(one['root_worst_position']):.3f}",
-            f"{float(one['root_worst_arc']) * 1e3:.3f}",
-            f"{np.degrees(float(one['root_worst_slope'])):.1f}",
-        ]
+        arc, slope = one["root_worst_arc"] * 1e3, np.degrees(one["root_worst_slope"])
+        place = [f"{one['root_worst_position']:.3f}", f"{arc:.3f}", f"{slope:.1f}"]
+    low, high = one["root_range_minimum"] * 1e-6, one["root_range_maximum"] * 1e-6
     return (
         f"root {title}",
-        *_compared(found, float(one["iso_root_stress"])),
+        *_compared(found, one["iso_root_stress"]),
         *place,
-        f"{low * 1e-6:.1f} to {high * 1e-6:.1f}",
-        f"{float(one['load_cycles']):g}",
+        f"{low:.1f} to {high:.1f}",
+        f"{one['load_cycles']:g}",
     )
 
 
 def _compared(found: float, nominal: float) -> tuple[str, str, str]:
-    """Both values in MPa and their ratio; a dash where there is none."""
+    """Write both values in MPa and their ratio; a dash where there is none."""
     known = np.isfinite(nominal)
     ratio = f"{found / nominal:.2f}" if known and nominal else "-"
     return f"{found * 1e-6:.1f}", f"{nominal * 1e-6:.1f}" if known else "-", ratio
