@@ -286,7 +286,7 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
 
 
 def _motion(field: np.ndarray, z_ring: int, carrier_speed, mesh_frequency) -> tuple[int, np.ndarray]:
-    """Direction +1, 0 or -1 of the carrier and the speed that orders count (...) [rad/s], always positive."""
+    """Find the direction +1, 0 or -1 of the carrier and the speed that orders count (...) [rad/s]."""
     checked_count(z_ring, "ring teeth", code="E-TEETH")
     speed = np.asarray(carrier_speed, dtype=float)
     direction = np.unique(np.sign(speed))
@@ -331,7 +331,7 @@ def _top_order(field: np.ndarray, z_ring: int, max_order: int | None) -> int:
 
 
 def _checked_field(field) -> tuple[np.ndarray, np.ndarray]:
-    """The field as a complex array and its circumferential orders n = -n_max..n_max."""
+    """Check the field, and tell its circumferential orders n = -n_max..n_max."""
     field = np.asarray(field, dtype=complex)
     if field.ndim < 2 or field.size == 0 or field.shape[-1] % 2 == 0 or not np.all(np.isfinite(field)):
         raise CaseError(
@@ -358,7 +358,7 @@ def _checked_angle(angle: float) -> float:
 
 
 def _heard_orders(heard: np.ndarray, z_ring: int, direction: int, top: int) -> np.ndarray:
-    """Two-sided lines -top..top: every component added at order h z_ring - direction n."""
+    """Collect two-sided lines -top..top: every component added at order h z_ring - direction n."""
     n_max = heard.shape[-1] // 2
     two_sided = np.zeros((*heard.shape[:-2], 2 * top + 1), dtype=complex)
     if direction == 0:
@@ -374,7 +374,7 @@ def _heard_orders(heard: np.ndarray, z_ring: int, direction: int, top: int) -> n
 
 
 def _folded(two_sided: np.ndarray) -> np.ndarray:
-    """Single-sided amplitudes of Re sum_k c_k exp(i k x): c_k + conj(c_-k), real at order 0."""
+    """Fold to single-sided amplitudes of Re sum_k c_k exp(i k x): c_k + conj(c_-k), real at order 0."""
     top = two_sided.shape[-1] // 2
     lines = two_sided[..., top:] + np.conj(two_sided[..., top::-1])
     lines[..., 0] = np.real(two_sided[..., top])
@@ -382,7 +382,7 @@ def _folded(two_sided: np.ndarray) -> np.ndarray:
 
 
 def _sampled_components(field: np.ndarray, n: np.ndarray, points: int, first_point: float) -> np.ndarray:
-    """Components that P points tell apart: sum over all n of one residue modulo P, phase at point 0."""
+    """Find the components that P points tell apart: sums over one residue of n modulo P, phase at point 0."""
     at_first = field * np.exp(1j * n * first_point)
     sampled = np.zeros((*field.shape[:-1], points), dtype=complex)
     for residue in np.unique(n % points):
@@ -393,7 +393,7 @@ def _sampled_components(field: np.ndarray, n: np.ndarray, points: int, first_poi
 def _interpolated_orders(
     sampled: np.ndarray, z_ring: int, direction: int, top: int, away: float
 ) -> np.ndarray:
-    """Two-sided lines -top..top of the linear interpolation: components and all their images."""
+    """Collect two-sided lines -top..top of the linear interpolation: components and all their images."""
     points = sampled.shape[-1]
     order = np.arange(-top, top + 1)
     two_sided = np.zeros((*sampled.shape[:-2], order.size), dtype=complex)
@@ -404,7 +404,7 @@ def _interpolated_orders(
 
 
 def _between_points(sampled: np.ndarray, points: int, away: float) -> np.ndarray:
-    """Value of the linear interpolation at the angle `away` from point 0."""
+    """Evaluate the linear interpolation at the angle `away` from point 0."""
     at_points = np.fft.ifft(sampled, axis=-1) * points
     place = away * points / (2 * np.pi)
     i = int(np.floor(place))
@@ -412,14 +412,14 @@ def _between_points(sampled: np.ndarray, points: int, away: float) -> np.ndarray
 
 
 def _synthesised(lines: np.ndarray, samples: int) -> np.ndarray:
-    """Re sum_k lines[k] exp(2 pi i k t), t in equal steps of one revolution."""
+    """Sum Re sum_k lines[k] exp(2 pi i k t), t in equal steps of one revolution."""
     spectrum = lines * (samples / 2)
     spectrum[..., 0] *= 2
     return np.fft.irfft(spectrum, samples, axis=-1)
 
 
 def _window_components(n: np.ndarray, width: float) -> np.ndarray:
-    """Fourier components c_n of the window on the circle."""
+    """Compute the Fourier components c_n of the window on the circle."""
     v = n * width / (2 * np.pi)
     # sinc(v)/(1 - v^2) = (sinc(v - 1) + sinc(v + 1))/2 + sinc(v): no division at |v| = 1
     return width / (4 * np.pi) * (np.sinc(v) + (np.sinc(v - 1) + np.sinc(v + 1)) / 2)

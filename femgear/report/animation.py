@@ -102,7 +102,7 @@ class _Field:
     teeth: int
 
     def at(self, angle: np.ndarray, carrier_angle: float) -> tuple[np.ndarray, np.ndarray]:
-        """Radial and tangential displacement [m] at housing angles, the carrier at `carrier_angle`."""
+        """Compute radial and tangential displacement [m] at housing angles for an angle of the carrier."""
         h, n_max = np.arange(self.radial.shape[0]), self.radial.shape[1] // 2
         # the mesh frequency is the ring's number of teeth times the carrier's, whichever way it turns
         time = np.exp(1j * h * self.teeth * carrier_angle * self.turn) * (h > 0)
@@ -176,7 +176,7 @@ def gear_outline(gear: Gear) -> np.ndarray:
 
 
 def _ring_corners(planetary_set):
-    """Points of the ring (around, across) from the teeth to the outer circle, complex."""
+    """Place the points of the ring (around, across) from the teeth to the outer circle, complex."""
     ring = planetary_set.ring
     inner = gear_outline(ring) * np.exp(1j * orientations(planetary_set).ring)
     # flanks are not radial, so each inner point has its outer one at its own angle
@@ -186,7 +186,7 @@ def _ring_corners(planetary_set):
 
 
 def _places(planetary_set, carrier_angle):
-    """Centre and rotation of the sun and of every planet when the carrier has turned, ring held."""
+    """Find centre and rotation of the sun and of every planet when the carrier has turned, ring held."""
     s = planetary_set
     # against the carrier the ring turns back by a tooth in every mesh period
     at = orientations(s, s.ring.teeth * carrier_angle / (2.0 * np.pi))
@@ -196,7 +196,7 @@ def _places(planetary_set, carrier_angle):
 
 
 def _discs(pv, plotter, planetary_set):
-    """Sun and planets, with a mark each: for every body its meshes and their points in its own frame."""
+    """Add sun and planets, a mark on each: of every body its meshes and their points in its own frame."""
     discs = []
     sun, planet = planetary_set.sun, planetary_set.planet
     for gear, colour in ((sun, _SUN), *((planet, _PLANET) for _ in planetary_set.planet_angles)):
@@ -214,7 +214,7 @@ def _discs(pv, plotter, planetary_set):
 
 
 def _add_sensor(pv, plotter, angle, radius, size):
-    """A triangle that points at the ring from outside."""
+    """Add a triangle that points at the ring from outside."""
     direction = np.exp(1j * angle)
     tip = radius * direction
     points = tip + size * direction * np.array([0.0, 0.12 + 0.035j, 0.12 - 0.035j])
@@ -223,19 +223,19 @@ def _add_sensor(pv, plotter, angle, radius, size):
 
 
 def _closed_line(pv, points):
-    """Mesh of a closed line through complex points."""
+    """Make a closed line through complex points."""
     return pv.PolyData(_plane(points), lines=[len(points) + 1, *range(len(points)), 0])
 
 
 def _strip_faces(around: int, across: int) -> np.ndarray:
-    """Triangles of a closed strip of points numbered around first, across second."""
+    """Number the triangles of a closed strip of points numbered around first, across second."""
     i, j = np.meshgrid(np.arange(around), np.arange(across - 1), indexing="ij")
     a, b = i * across + j, ((i + 1) % around) * across + j
     return np.concatenate([np.stack([a, b, a + 1], -1), np.stack([a + 1, b, b + 1], -1)]).reshape(-1, 3)
 
 
 def _plane(points) -> np.ndarray:
-    """Complex points as points in space, (n, 3)."""
+    """Turn complex points into points in space, (n, 3)."""
     return np.column_stack([points.real, points.imag, np.zeros(len(points))])
 
 

@@ -47,7 +47,7 @@ _CIRCLE = np.linspace(0.0, 2 * np.pi, 241)
 def mode_shapes(
     modes: xr.Dataset, planetary_set: PlanetarySet, *, shown: Sequence[int] | None = None, scale: float = 0.16
 ) -> Figure:
-    """Bodies and outer ring surface in their undeformed (grey) and displaced positions.
+    """Draw bodies and outer ring surface in their undeformed (grey) and displaced positions.
 
     Parameters
     ----------
@@ -60,10 +60,6 @@ def mode_shapes(
         Mode numbers from 0; the first twelve that are no rigid-body motions when omitted.
     scale : float
         Largest displacement as a share of the ring's outer radius.
-
-    Returns
-    -------
-    Figure
     """
     frequency = modes["frequency"].values
     elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))
@@ -81,7 +77,7 @@ def mode_shapes(
 
 
 def _draw_mode(ax, modes, planetary_set, mode, scale):
-    """One mode: bodies with a spoke each, the carrier by its pins, the ring by its outer surface."""
+    """Draw one mode: bodies with a spoke each, the carrier by its pins, the ring by its outer surface."""
     shape = dict(zip((str(name) for name in modes["dof"].values), modes["shape"].values[:, mode]))
     outer = planetary_set.ring.rim_radius
     ring = _ring_radial(modes, mode)
@@ -128,7 +124,7 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
 
 
 def _draw_carrier(ax, planetary_set, moved, turn, colour):
-    """Displaced pins, each joined to the centre of the carrier."""
+    """Draw displaced pins, each joined to the centre of the carrier."""
     pins = planetary_set.centre_distance * np.exp(1j * np.asarray(planetary_set.planet_angles, float))
     pins = moved + pins * np.exp(1j * turn)
     for pin in pins:
@@ -137,7 +133,7 @@ def _draw_carrier(ax, planetary_set, moved, turn, colour):
 
 
 def _bodies(planetary_set):
-    """Centre, radius, colour and legend of every rigid body."""
+    """Tell centre, radius, colour and legend of every rigid body."""
     bodies = {"carrier": (0j, planetary_set.centre_distance, GREEN, "carrier")}
     bodies["sun"] = (0j, planetary_set.sun.reference_radius, VERMILION, "sun")
     for n, angle in enumerate(planetary_set.planet_angles):
@@ -147,12 +143,12 @@ def _bodies(planetary_set):
 
 
 def _motion(shape, name):
-    """Displacement and rotation of a body in a mode; zero where it does not move."""
+    """Find displacement and rotation of a body in a mode; zero where it does not move."""
     return tuple(float(shape.get(f"{name}: {axis}", 0.0)) for axis in ("x", "y", "rotation"))
 
 
 def _ring_radial(modes, mode):
-    """Radial displacement of the outer surface at the angles of `_CIRCLE`."""
+    """Compute the radial displacement of the outer surface at the angles of `_CIRCLE`."""
     if "ring_shape_real" not in modes:
         return np.zeros_like(_CIRCLE)
     n = modes["circumferential"].values
@@ -161,16 +157,12 @@ def _ring_radial(modes, mode):
 
 
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
-    """Amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
+    """Draw the amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
 
     Parameters
     ----------
     dynamics : xarray.Dataset
         With ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m].
-
-    Returns
-    -------
-    Figure
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -206,7 +198,7 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
 
 
 def _bars(ax, h, amplitude, index: int, count: int, text: str) -> None:
-    """Bars of one mesh beside those of the others."""
+    """Draw bars of one mesh beside those of the others."""
     width = 0.8 / count
     ax.bar(
         h + (index - (count - 1) / 2) * width,
@@ -221,23 +213,19 @@ def _bars(ax, h, amplitude, index: int, count: int, text: str) -> None:
 
 
 def _dots(ax, h, amplitude, floor, index: int, text: str) -> None:
-    """Lines of one mesh as markers on thin stems: many bars would merge."""
+    """Draw lines of one mesh as markers on thin stems: many bars would merge."""
     colour = COLOURS[index % len(COLOURS)]
     ax.vlines(h, floor, amplitude, color=colour, linewidth=0.5, alpha=0.5)
     ax.plot(h, amplitude, MARKERS[index % len(MARKERS)], color=colour, markersize=3.5, label=text)
 
 
 def speed_sweep(dynamics: xr.Dataset) -> Figure:
-    """RMS of the fluctuating transmission error over the speed, and what the solver says about each speed.
+    """Draw the RMS of the fluctuating transmission error over the speed, and what the solver says of it.
 
     Parameters
     ----------
     dynamics : xarray.Dataset
         With ``dte_real``, ``dte_imag``, ``spectral_radius``, ``floquet_multiplier`` and ``converged``.
-
-    Returns
-    -------
-    Figure
     """
     figure, (top, bottom) = new_figure(rows=2, height=7.0, sharex=True)
     order = np.argsort(dynamics["speed"].values)
@@ -307,12 +295,12 @@ def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str
 
 
 def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
-    """Complex harmonics of a variable stored as real and imaginary part."""
+    """Read the complex harmonics of a variable stored as real and imaginary part."""
     return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
 
 
 def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
-    """Highest harmonic of the mesh frequency that excites: by ``excitation_limit`` [Hz] where it is known."""
+    """Find the highest harmonic of the mesh frequency that excites, by ``excitation_limit`` [Hz] if known."""
     highest = int(dynamics["harmonic"].values.max())
     if "excitation_limit" not in dynamics:
         return highest
@@ -322,12 +310,12 @@ def excited_harmonics(dynamics: xr.Dataset, speed_index: int) -> int:
 
 
 def fine_positions(harmonics: int) -> np.ndarray:
-    """Positions of one mesh period, enough for a curve of so many harmonics."""
+    """Choose positions of one mesh period, enough for a curve of so many harmonics."""
     return np.linspace(0.0, 1.0, max(256, 16 * harmonics) + 1)
 
 
 def name_kinds(ax, dynamics: xr.Dataset) -> None:
-    """Legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
+    """Add legend entries for dynamic and static curves: they differ in width, meshes in colour and dash."""
     known = "excitation" if "excitation_limit" in dynamics else "response"
     for text, look in (
         ("dynamic (thick)", {"linewidth": 2.0}),
@@ -338,14 +326,14 @@ def name_kinds(ax, dynamics: xr.Dataset) -> None:
 
 
 def draw_static(ax, at, values, harmonics: int, position, style) -> None:
-    """Static transmission error [m] less its mean: the whole record pale, its first harmonics thin."""
+    """Draw the static transmission error [m] less its mean: whole record pale, first harmonics thin."""
     at, whole, part = _fluctuation(at, values, harmonics, position)
     ax.plot(at, 1e6 * whole, color=style["color"], linewidth=2.5, alpha=0.3, label="_")
     ax.plot(position, 1e6 * part, linewidth=0.9, **style, label="_")
 
 
 def _fluctuation(at, values, harmonics: int, position):
-    """A record of one period less its mean, closed, and the sum of its first harmonics at `position`.
+    """Reduce a record of one period by its mean, and sum its first harmonics at `position`.
 
     The record is linear between its positions, which may be closer where it is steep. Harmonics of such a
     curve are those of its second derivative, jumps of the slope, over ``-(2 pi h)^2``.
@@ -359,7 +347,7 @@ def _fluctuation(at, values, harmonics: int, position):
 
 
 def panels(count: int):
-    """Figure with `count` axes of one vertical scale, two in a row."""
+    """Make a figure with `count` axes of one vertical scale, two in a row."""
     rows, columns = -(-count // 2), min(count, 2)
     figure, axes = new_figure(
         rows=rows, columns=columns, width=max(5.0 * columns, 6.5), height=0.8 + 3.6 * rows, sharey=True
@@ -370,11 +358,11 @@ def panels(count: int):
 
 
 def shown_speeds(data: xr.Dataset) -> list[int]:
-    """Indices of the speeds that get pictures of their own: all of a few, else first, middle and last."""
+    """Choose the speeds that get pictures of their own: all of a few, else first, middle and last."""
     n = data.sizes["speed"]
     return list(range(n)) if n <= MANY_SPEEDS else [0, n // 2, n - 1]
 
 
 def some_speeds(count: int, limit: int = 4) -> list[int]:
-    """Numbers of at most `limit` speeds, spread evenly."""
+    """Choose at most `limit` speeds, spread evenly."""
     return sorted({round(i) for i in np.linspace(0, count - 1, min(count, limit))})

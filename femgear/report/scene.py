@@ -67,7 +67,7 @@ def load_pyvista():
 
 
 def _loads(library: str) -> bool:
-    """Whether the machine has a system library."""
+    """Tell whether the machine has a system library."""
     try:
         ctypes.CDLL(library)
     except OSError:
@@ -278,7 +278,7 @@ def new_plotter(size: int) -> pv.Plotter:
 
 
 def _linear_surface(grid: pv.UnstructuredGrid) -> pv.PolyData:
-    """Every quadratic triangle as four flat ones on the same points."""
+    """Split every quadratic triangle into four flat ones on the same points."""
     cells = grid.cells.reshape(-1, 7)[:, 1:]
     return load_pyvista().PolyData.from_regular_faces(np.array(grid.points), cells[:, _SPLIT].reshape(-1, 3))
 

@@ -97,7 +97,7 @@ def complex_entries(entries) -> dict[str, tuple]:
 
 
 def response_entries(result: Any) -> dict[str, tuple]:
-    """What is known of the periodic response at every speed: frequency, convergence, stability.
+    """List what is known of the periodic response at every speed: frequency, convergence, stability.
 
     Of any result with a response, its stability and the speeds of the members.
     """

@@ -145,13 +145,13 @@ def write_text(text: str, path: str | os.PathLike) -> None:
 
 
 def checksum(path: str | os.PathLike) -> str:
-    """SHA-256 of a file."""
+    """Compute the SHA-256 of a file."""
     with storage_errors(path), open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def checked_name(name: str) -> str:
-    """``name`` if every file system takes it as one plain file name, else refused.
+    """Refuse a name that some file system does not take as one plain file name.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def checked_name(name: str) -> str:
 
 
 def is_safe_path(name: str) -> bool:
-    """Whether a relative path stays in its folder and has plain names only."""
+    """Tell whether a relative path stays in its folder and has plain names only."""
     path = Path(name)
     return (
         bool(path.parts)
@@ -234,7 +234,7 @@ def storage_errors(path: str | os.PathLike) -> Iterator[None]:
 
 
 def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageError:
-    """The `StorageError` that says what an `OSError` says, ``E-DISK-FULL`` or ``E-STORAGE``."""
+    """Say what an `OSError` says in a `StorageError`, ``E-DISK-FULL`` or ``E-STORAGE``."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
     return StorageError(
         error.strerror or str(error),
@@ -280,7 +280,7 @@ def _refuse_hostile(path: str | os.PathLike) -> None:
 
 
 def _is_plain(dtype: np.dtype) -> bool:
-    """Whether a type is a number, a truth value or a text."""
+    """Tell whether a type is a number, a truth value or a text."""
     import h5py
 
     return dtype.kind in "fiubS" or (dtype.kind == "O" and h5py.check_string_dtype(dtype) is not None)

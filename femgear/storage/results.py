@@ -128,6 +128,7 @@ class Results:
         return tuple(name.removesuffix(".nc") for name in self.manifest.files if name.endswith(".nc"))
 
     def _checked(self, name: str) -> Path:
+        """Path of a file of the run that is there and unchanged."""
         path = self.folder / name
         if name not in self.manifest.files:
             _refuse_incomplete(self)
@@ -344,11 +345,13 @@ def _plain(value: Any) -> object:
 
 
 def _refuse_missing(folder: Path) -> None:
+    """Refuse a folder that is not there."""
     if not folder.is_dir():
         raise StorageError("no such results folder", code="E-RESULTS-MISSING", file=str(folder))
 
 
 def _refuse_incomplete(results: Results) -> None:
+    """Refuse the results of an interrupted run."""
     if results.manifest.complete:
         return
     folder = results.folder
@@ -375,11 +378,13 @@ def _refuse_changed(folder: Path, manifest: Manifest) -> None:
 
 
 def _interrupted(results: Results) -> str:
+    """Tell how far an interrupted run came."""
     stages = f"after: {', '.join(results.stages)}" if results.stages else "before a stage was complete"
     return f"the run was interrupted {stages}"
 
 
 def _is_complete(folder: Path) -> bool:
+    """Tell whether a folder holds the results of a run that came to its end."""
     return (folder / MANIFEST).is_file() and read_manifest(folder).complete
 
 
@@ -417,12 +422,14 @@ def _publish(folder: Path) -> None:
 
 
 def _remove_tree(path: Path) -> None:
+    """Remove a folder with all that it holds, where there is one."""
     with storage_errors(path):
         if path.is_dir():
             shutil.rmtree(path)
 
 
 def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
+    """Remove those of some files that are as the run wrote them."""
     for name, digest in files.items():
         path = folder / name
         # a link inside the folder must not lead the removal out of it
@@ -432,5 +439,5 @@ def _remove_unchanged(folder: Path, files: Mapping[str, str]) -> None:
 
 
 def _is_unchanged(path: Path, digest: str) -> bool:
-    """Whether a file is there and has the checksum of the manifest."""
+    """Tell whether a file is there and has the checksum of the manifest."""
     return path.is_file() and checksum(path) == digest

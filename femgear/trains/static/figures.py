@@ -56,7 +56,7 @@ PICTURE_REFINE = 0.35
 
 
 def static_transmission_error(static: xr.Dataset) -> Figure:
-    """Static transmission error of every mesh, and of sun to ring over every planet.
+    """Draw the static transmission error of every mesh, and of sun to ring over every planet.
 
     Parameters
     ----------
@@ -69,13 +69,9 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     for i, (text, row) in enumerate(drawn):
         left.plot(*periodic(static["position"], static["ste"][row] * 1e6), label=text, **line_style(i))
     label(left, _POSITION, "transmission error [µm]", "each mesh, along its line of action")
-    planets = [f"sun to ring over planet {p}" for p in static["planet"].values]
     position, overall = periodic(static["position"], static["ste_overall"] * 1e6)
-    rows = list(zip(planets, range(len(planets))))
-    if _equal(overall):
-        rows = [("sun to ring over every planet (identical)", 0)]
-    for i, (text, row) in enumerate(rows):
-        right.plot(position, overall[row], label=text, **line_style(i + len(drawn)))
+    for row, text in enumerate(_of_planets(static, overall)):
+        right.plot(position, overall[row], label=f"sun to ring over {text}", **line_style(row + len(drawn)))
     label(right, _POSITION, "sum of both meshes [µm]", "sun to ring")
     right.set_xlim(0, position[-1])
     legend_below(figure, columns=2)
@@ -83,7 +79,7 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
 
 
 def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Figure:
-    """Tangent and secant stiffness of every mesh.
+    """Draw the tangent and secant stiffness of every mesh.
 
     Parameters
     ----------
@@ -119,7 +115,7 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
 
 
 def load_sharing(static: xr.Dataset) -> Figure:
-    """Share of every planet in the sun's torque over the mesh period.
+    """Draw the share of every planet in the sun's torque over the mesh period.
 
     Parameters
     ----------
@@ -128,9 +124,7 @@ def load_sharing(static: xr.Dataset) -> Figure:
     """
     figure, (ax,) = new_figure(height=3.8)
     position, share = periodic(static["position"], static["load_share"] * 100)
-    identical = _equal(share)
-    for i, planet in enumerate(static["planet"].values[:1] if identical else static["planet"].values):
-        text = "every planet (identical)" if identical else f"planet {planet}"
+    for i, text in enumerate(_of_planets(static, share)):
         ax.plot(position, share[i], label=text, linewidth=2.0, **line_style(i))
     equal = 100.0 / len(share)
     ax.axhline(equal, color="0.4", linewidth=0.8, linestyle=(0, (1, 3)), label=f"equal share {equal:.4g} %")
@@ -145,7 +139,7 @@ def load_sharing(static: xr.Dataset) -> Figure:
 
 
 def tooth_loads(static: xr.Dataset) -> Figure:
-    """Load of one tooth pair from its first to its last contact, in a sun-planet and a planet-ring mesh.
+    """Draw the load of a tooth pair from first to last contact, in a sun-planet and a planet-ring mesh.
 
     The simultaneous pairs of the dataset are one base pitch apart on the path of contact, and a pair goes on
     to the next place with every mesh period: from period to period and place to place the loads are the
@@ -166,10 +160,9 @@ def tooth_loads(static: xr.Dataset) -> Figure:
         place = np.arange(len(load))[:, None]
         each = np.arange(len(position)).reshape(periods, -1)[place.ravel() % periods]
         path, load = (place + position[each] % 1.0).ravel(), load[place, each].ravel()
-        carried = np.flatnonzero(load > 1e-9 * force.max(initial=0.0))
-        first, last = (carried[0], carried[-1]) if len(carried) else (0, load.size - 1)
-        shown = slice(max(first - 1, 0), last + 2)
-        ax.plot(path[shown] - path[first], load[shown], label="one tooth pair", color=COLOURS[0])
+        carried = load > 1e-9 * force.max(initial=0.0)
+        shown = _while_loaded(carried)
+        ax.plot(path[shown] - path[carried.argmax()], load[shown], label="one tooth pair", color=COLOURS[0])
         largest = max(largest, load.max(initial=0.0), force.mean())
         ax.axhline(force.mean(), color="0.45", linewidth=1.0, linestyle=(0, (1, 2)), label="whole mesh, mean")
         label(ax, "path since the first contact [base pitches]", title=names[row])
@@ -180,8 +173,18 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     return figure
 
 
-def _equal(rows) -> bool:
-    return bool(np.abs(rows - rows[0]).max() <= 1e-6 * np.abs(rows).max(initial=0.0))
+def _of_planets(static: xr.Dataset, rows) -> list[str]:
+    """Label the lines to draw of the rows of all planets: the first alone where they agree."""
+    if np.abs(rows - rows[0]).max() <= 1e-6 * np.abs(rows).max(initial=0.0):
+        return ["every planet (identical)"]
+    return [f"planet {planet}" for planet in static["planet"].values]
+
+
+def _while_loaded(loaded: np.ndarray) -> slice:
+    """Range of samples (n,) from one before the first loaded one to one behind the last."""
+    found = np.flatnonzero(loaded)
+    first, last = (found[0], found[-1]) if len(found) else (0, len(loaded) - 1)
+    return slice(max(first - 1, 0), last + 2)
 
 
 def root_stress_history(stress: xr.Dataset) -> Figure:
@@ -241,7 +244,7 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
 
 
 def contact_pressure(stress: xr.Dataset) -> Figure:
-    """Contact pressure of one tooth pair over its path, for both meshes of the planet with the largest.
+    """Draw the contact pressure of a tooth pair over its path, in both meshes of the planet with the largest.
 
     Parameters
     ----------
@@ -290,19 +293,17 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
 
 
 def _along_path(row):
-    """Path (k,) [mm], place (C, k) [um] and pressure (C, k) [MPa] of a tooth pair from entry to exit."""
+    """Find path (k,) [mm], place (C, k) [um] and pressure (C, k) [MPa] of a tooth pair from entry to exit."""
     path = row["pressure_path"].values.ravel()
     pressure = row["pressure_distribution"].values.swapaxes(0, 1).reshape(-1, len(path))
     place = row["pressure_offset"].values[:, None] + row["pressure_centre"].values.ravel()
     order = np.argsort(path, kind="stable")
-    loaded = np.flatnonzero(pressure[:, order].any(axis=0))
-    first, last = (loaded[0], loaded[-1]) if len(loaded) else (0, len(order) - 1)
-    order = order[max(first - 1, 0) : last + 2]
+    order = order[_while_loaded(pressure[:, order].any(axis=0))]
     return path[order] * 1e3, place[:, order] * 1e6, pressure[:, order] * 1e-6
 
 
 def load_spectrum(stress: xr.Dataset) -> Figure:
-    """Load spectrum of the teeth in both meshes of the planet with the largest load.
+    """Draw the load spectrum of the teeth in both meshes of the planet with the largest load.
 
     Parameters
     ----------
@@ -331,7 +332,7 @@ def load_spectrum(stress: xr.Dataset) -> Figure:
 
 
 def planet_bending(stress: xr.Dataset) -> Figure:
-    """Stress in both roots of a tooth of the worst planet while it turns once against the carrier.
+    """Draw the stress in both roots of a tooth of the worst planet while it turns once against the carrier.
 
     Parameters
     ----------
@@ -353,13 +354,13 @@ def planet_bending(stress: xr.Dataset) -> Figure:
 
 
 def _mesh_of(stress: xr.Dataset, kind: str, planet: int) -> xr.Dataset:
-    """The mesh of a kind on a planet (from 0)."""
+    """Pick the mesh of a kind on a planet (from 0)."""
     names = [str(name) for name in stress["mesh"].values]
     return stress.isel(mesh=[i for i, name in enumerate(names) if family(name) == kind][planet])
 
 
 def _worst_planet(stress: xr.Dataset, *measures: np.ndarray) -> int:
-    """Planet (from 0) whose meshes have the largest of a measure (mesh,); the next measure decides ties."""
+    """Find the planet (from 0) with the largest of a measure (mesh,); the next measure decides ties."""
     kinds = [family(str(name)) for name in stress["mesh"].values]
     of_planets = [
         np.max([measure[[kind == wanted for kind in kinds]] for wanted in _KINDS], axis=0)
@@ -374,7 +375,7 @@ def _worst_planet(stress: xr.Dataset, *measures: np.ndarray) -> int:
 
 
 def _nominal(ax, row: xr.Dataset, name: str, text: str) -> None:
-    """Line at a nominal stress, where it is known."""
+    """Draw a line at a nominal stress, where it is known."""
     if name in row and np.isfinite(row[name].item()) and row[name].item() > 0.0:
         ax.axhline(row[name].item() * 1e-6, color=BLACK, linewidth=1.2, linestyle="-.", label=text)
 
@@ -392,7 +393,7 @@ def _four_gears(stress: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
 
 
 def _crossing(slope, arc, angle) -> float | None:
-    """First place at which the slope passes an angle; None when it does not."""
+    """Find the first place at which the slope passes an angle; None when it does not."""
     above = np.flatnonzero((slope[:-1] < angle) & (slope[1:] >= angle))
     if not len(above):
         return None
@@ -401,6 +402,7 @@ def _crossing(slope, arc, angle) -> float | None:
 
 
 def _static_figures(drawn: Drawn) -> dict[str, Figure]:
+    """Draw the figures of static.nc."""
     static = drawn.data["static"]
     return {
         "static_transmission_error": static_transmission_error(static),
@@ -411,7 +413,7 @@ def _static_figures(drawn: Drawn) -> dict[str, Figure]:
 
 
 def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
-    """Figures of stress.nc; distributions and turns are not in records of several mesh periods."""
+    """Draw the figures of stress.nc; distributions and turns are not in records of several mesh periods."""
     stress = drawn.data["stress"]
     figures = {
         "root_stress": root_stress_history(stress),
@@ -426,7 +428,7 @@ def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
 
 
 def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
-    """Charts of profiles and pitches; none of a kind that the set does not have."""
+    """Draw charts of profiles and pitches; none of a kind that the set does not have."""
     gears, deviations = planetary_set(drawn.case), set_deviations(drawn.case)
     figures = {}
     if has_profiles(deviations, gears):
@@ -437,7 +439,7 @@ def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:
 
 
 def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
-    """The whole set deformed by the static loads of position zero, as VTU and picture."""
+    """Write the whole set deformed by the static loads of position zero, as VTU and picture."""
     static, case = drawn.results.get("static"), drawn.case
     if static is None or not static.cycle.force.any():
         return []
