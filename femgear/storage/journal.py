@@ -34,12 +34,6 @@ class Journal:
         self._records: dict[str, dict] = {}
         self._path, self._stream = path, stream
 
-    def __len__(self) -> int:
-        return len(self._records)
-
-    def __contains__(self, key: str) -> bool:
-        return key in self._records
-
     def get(self, key: str) -> dict | None:
         """Record of a key, or None."""
         return self._records.get(key)

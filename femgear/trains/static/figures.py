@@ -61,7 +61,7 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     Parameters
     ----------
     static : xarray.Dataset
-        With ``ste`` (mesh, position) and ``ste_overall`` (planet, position) [m].
+        Contents of static.nc, as `femgear.trains.static.results.STATIC_VARIABLES` declares them.
     """
     figure, (left, right) = new_figure(columns=2, width=9.5, sharex=True)
     names = static["mesh"].values
@@ -84,7 +84,7 @@ def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Fi
     Parameters
     ----------
     static : xarray.Dataset
-        With ``mesh_stiffness`` and ``mesh_stiffness_secant`` (mesh, position) [N/m].
+        Contents of static.nc.
     face_width : float, optional
         [m]; adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
     """
@@ -120,7 +120,7 @@ def load_sharing(static: xr.Dataset) -> Figure:
     Parameters
     ----------
     static : xarray.Dataset
-        With ``load_share`` (planet, position) [1].
+        Contents of static.nc.
     """
     figure, (ax,) = new_figure(height=3.8)
     position, share = periodic(static["position"], static["load_share"] * 100)
@@ -148,7 +148,7 @@ def tooth_loads(static: xr.Dataset) -> Figure:
     Parameters
     ----------
     static : xarray.Dataset
-        With ``tooth_load`` (mesh, tooth, position) and ``mesh_force`` (mesh, position) [N].
+        Contents of static.nc.
     """
     figure, axes = new_figure(columns=2, width=9.5, sharey=True)
     names = [str(name) for name in static["mesh"].values]
@@ -193,8 +193,8 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``root_tension`` and ``root_compression`` [Pa] and ``root_path`` [1] (mesh, gear, step); where
-        it has ``iso_root_stress`` [Pa] (mesh, gear), the nominal stress is drawn too.
+        Contents of stress.nc, as `femgear.trains.static.results.STRESS_VARIABLES` declares them; where it
+        has ``iso_root_stress``, the nominal stress is drawn too.
     """
     gears = _four_gears(stress)
 
@@ -220,8 +220,7 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``root_profile`` (mesh, gear, root, point) [Pa], ``root_arc`` [m] and ``root_slope`` [rad]
-        (mesh, gear, point).
+        Contents of stress.nc.
     """
     gears = _four_gears(stress)
 
@@ -249,9 +248,7 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``pressure_distribution`` [Pa] (mesh, pair, cell, position), ``pressure_offset`` (mesh, cell),
-        ``pressure_centre`` and ``pressure_path`` (mesh, pair, position) [m], ``contact_pressure`` [Pa] (mesh,
-        position) and ``iso_contact_stress`` [Pa] (mesh).
+        Contents of stress.nc.
     """
     figure, axes = new_figure(rows=2, columns=2, width=9.5, height=6.6)
     top = float(stress["contact_pressure"].max()) * 1e-6 or 1.0
@@ -308,8 +305,7 @@ def load_spectrum(stress: xr.Dataset) -> Figure:
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``load_time_share`` and ``load_cycle_share`` (mesh, load_bin) [1], ``load_bin_low`` and
-        ``load_bin_high`` (load_bin) [N], ``load_cycles`` (mesh, gear) [1].
+        Contents of stress.nc.
     """
     figure, axes = new_figure(columns=2, width=9.5, sharex=True, sharey=True)
     edges = np.append(stress["load_bin_low"].values, stress["load_bin_high"].values[-1:])
@@ -337,7 +333,7 @@ def planet_bending(stress: xr.Dataset) -> Figure:
     Parameters
     ----------
     stress : xarray.Dataset
-        With ``planet_root_stress`` [Pa] (mesh, turn).
+        Contents of stress.nc.
     """
     figure, (ax,) = new_figure()
     values = stress["planet_root_stress"].values * 1e-6

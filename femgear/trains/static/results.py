@@ -330,11 +330,7 @@ def root_values(roots: tuple[RootCycle, ...]) -> dict[str, np.ndarray]:
     Returns
     -------
     dict of str to array
-        ``root_tension`` and ``root_compression`` (mesh, gear, step) [Pa]: extremes along the root of the
-        loaded and of the back flank on the way through the mesh, with ``root_path`` [1] and ``root_load``
-        [N]; ``root_profile`` (mesh, gear, root, point) [Pa] along both roots when the tension is largest,
-        with ``root_arc`` [m] and ``root_slope`` [rad] (mesh, gear, point). Points that a root does not have
-        are NaN.
+        Variables of `STRESS_VARIABLES`; points that a root does not have are NaN.
     """
     histories = [root.history() for root in roots]
     return {
