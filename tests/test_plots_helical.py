@@ -10,12 +10,12 @@ from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
 from femgear.report.style import png_bytes
+from femgear.storage.dataset import in_space
 from femgear.system.assembler import free_motions, gear_set_system
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.trains.helical.figures import spatial_mode_shapes
 from femgear.trains.helical.model import helical_modes
 from femgear.trains.helical.results import AXES
-from femgear.trains.rigid import in_space
 
 GEARS = ("sun", "planet", "ring")
 

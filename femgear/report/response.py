@@ -156,6 +156,38 @@ def _ring_radial(modes, mode):
     return (np.exp(1j * np.outer(_CIRCLE, n)) @ value).real
 
 
+def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str) -> Figure:
+    """Draw natural frequencies over the speed with lines of excitation: a Campbell diagram.
+
+    Parameters
+    ----------
+    speed : (p,) array
+        In `speed_unit`.
+    frequency : (p, m) array
+        [Hz]
+    orders : (k,) array
+        Slopes of the lines [Hz per unit of speed].
+    order_names : sequence of str
+    critical : sequence of (speed, frequency)
+        Intersections to mark.
+    speed_unit : str
+    """
+    figure, (ax,) = new_figure(height=5.4)
+    for one in np.transpose(frequency):
+        ax.plot(speed, one, linewidth=1.6, color=BLUE, label="mode")
+    for i, (order, text) in enumerate(zip(orders, order_names)):
+        dash = (0, (6, 2) + (1, 2) * i)
+        ax.plot(speed, order * speed, color=GREY, linewidth=1.2, linestyle=dash, label=text)
+    if len(critical):
+        at = np.asarray(critical, float).T
+        ax.plot(*at, "o", color=BLACK, markerfacecolor="none", markersize=7, label="critical speed")
+    ax.set_xlim(np.min(speed), np.max(speed))
+    ax.set_ylim(0, 1.05 * np.nanmax(frequency))
+    label(ax, f"speed [{speed_unit}]", "natural frequency [Hz]")
+    legend_below(figure, columns=4)
+    return figure
+
+
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     """Draw the amplitudes of the harmonics of the dynamic transmission error, for at most four speeds.
 
@@ -262,40 +294,8 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     return figure
 
 
-def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str) -> Figure:
-    """Draw natural frequencies over the speed with lines of excitation: a Campbell diagram.
-
-    Parameters
-    ----------
-    speed : (p,) array
-        In `speed_unit`.
-    frequency : (p, m) array
-        [Hz]
-    orders : (k,) array
-        Slopes of the lines [Hz per unit of speed].
-    order_names : sequence of str
-    critical : sequence of (speed, frequency)
-        Intersections to mark.
-    speed_unit : str
-    """
-    figure, (ax,) = new_figure(height=5.4)
-    for one in np.transpose(frequency):
-        ax.plot(speed, one, linewidth=1.6, color=BLUE, label="mode")
-    for i, (order, text) in enumerate(zip(orders, order_names)):
-        dash = (0, (6, 2) + (1, 2) * i)
-        ax.plot(speed, order * speed, color=GREY, linewidth=1.2, linestyle=dash, label=text)
-    if len(critical):
-        at = np.asarray(critical, float).T
-        ax.plot(*at, "o", color=BLACK, markerfacecolor="none", markersize=7, label="critical speed")
-    ax.set_xlim(np.min(speed), np.max(speed))
-    ax.set_ylim(0, 1.05 * np.nanmax(frequency))
-    label(ax, f"speed [{speed_unit}]", "natural frequency [Hz]")
-    legend_below(figure, columns=4)
-    return figure
-
-
 def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
-    """Read the complex harmonics of a variable stored as real and imaginary part."""
+    """Complex harmonics of a variable stored as real and imaginary part."""
     return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
 
 

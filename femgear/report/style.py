@@ -122,18 +122,13 @@ def png_bytes(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
-def xy(points):
-    """Split complex points into both coordinates."""
-    return points.real, points.imag
-
-
 def family(name: str) -> str:
-    """Tell the kind of a mesh from its label: ``"planet-ring"`` where the ring takes part."""
+    """Kind of a mesh from its label: ``"planet-ring"`` where the ring takes part."""
     return "planet-ring" if "ring" in name else "sun-planet"
 
 
 def distinct_lines(names, values, *, tolerance: float = 1e-6):
-    """Choose the rows of `values` to draw: one for a family of meshes whose rows agree, each row otherwise.
+    """Rows of `values` to draw: one for a family of meshes whose rows agree, each row otherwise.
 
     Parameters
     ----------
@@ -180,3 +175,8 @@ def excited_to(data, speed_index: int) -> str:
 def rpm(speed: float) -> str:
     """Write an input speed in a title; speeds in datasets are in rpm."""
     return f"{float(speed):.6g} rpm"
+
+
+def xy(points):
+    """Split complex points into both coordinates."""
+    return points.real, points.imag

@@ -15,8 +15,7 @@ import numpy as np
 from femgear.case.case import set_deviations
 from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
 from femgear.errors import CaseError
-from femgear.storage.dataset import MEMBERS
-from femgear.system.rigid_bodies import member_radius
+from femgear.storage.dataset import in_space
 
 if TYPE_CHECKING:
     from femgear.gears.kinematics import Speeds
@@ -206,32 +205,3 @@ def modes_entries(
         "dof": (("dof",), dofs, "1", "degree of freedom"),
     }
     return variables, coords
-
-
-def in_space(data: RigidSet, motions: np.ndarray, axes: tuple[str, ...]) -> tuple[np.ndarray, list[str]]:
-    """Resolve the motions of all bodies along and about x, y (and z) with their names, held ones included.
-
-    Parameters
-    ----------
-    data : RigidSet
-    motions : (n, m) array
-        In all coordinates: two in the plane and ``u``; or three translations, two tilts and ``u``.
-    axes : tuple of str
-        Names of the motions of a body.
-
-    Returns
-    -------
-    (n, m) array, list of str
-        Rotations in radians where translations are in metres; ``"planet 2: x"`` and so on.
-    """
-    N = data.n_planets
-    full = motions.reshape(N + 3, len(axes), -1).copy()
-    cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
-    for first in range(0, len(axes), 3):
-        radial, tangential = full[3:, first].copy(), full[3:, first + 1].copy()
-        full[3:, first] = radial * cosine - tangential * sine
-        full[3:, first + 1] = radial * sine + tangential * cosine
-    radii = np.array([member_radius(data, name) for name in MEMBERS] + [data.planet_radius] * N)
-    full[:, -(len(axes) // 2) :] /= radii[:, None, None]
-    bodies = [*MEMBERS, *(f"planet {n + 1}" for n in range(N))]
-    return full.reshape(len(motions), -1), [f"{body}: {axis}" for body in bodies for axis in axes]
