@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def describe_results(train: Train, results: Results) -> tuple[Block, ...]:
-    """The numbers of a run, one block a stage, and the time that each took.
+    """Tabulate the numbers of a run, one block a stage, and the time that each took.
 
     Parameters
     ----------
@@ -21,9 +21,6 @@ def describe_results(train: Train, results: Results) -> tuple[Block, ...]:
         Of the case.
     results : Results
 
-    Returns
-    -------
-    tuple of Block
     """
     blocks = [stage.describe(results) for stage in train.stages if stage.name in results.stages]
     timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from femgear.report.frequency import campbell
+from femgear.report.response import campbell
 from femgear.report.scene import add_coloured, load_pyvista
 from femgear.report.style import COLOURS, GREY, SIZE, label, legend_below
 from femgear.storage.dataset import RPM

@@ -536,7 +536,7 @@ def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Data
 
 def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
     """The ring's operating deflection while the carrier turns, at the last speed."""
-    from femgear.report.scene import animate_operating_deflection
+    from femgear.report.animation import animate_operating_deflection
 
     case, dynamics = drawn.case, drawn.results.get("dynamics")
     if dynamics is None:
