@@ -44,7 +44,7 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
     Parameters
     ----------
     outline : Outline
-        Or any object with ``curves`` and ``interfaces`` of the same form.
+        Or any object with the same fields [m].
     cache : path, optional
         Folder in which grids are kept under the hash of their content; None to keep nothing. Where it cannot
         be written there is a warning.
@@ -57,8 +57,8 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
     Raises
     ------
     GridError
-        When the outline is not usable, too large, not meshed in time, when Gmsh or one of its system
-        libraries is missing, or when an element is inverted.
+        The outline is not usable, too large (E-GRID), not meshed in time, Gmsh or one of its system
+        libraries is missing (E-GRID-GMSH), or an element is inverted (E-GRID).
     """
     plan = check_outline(outline)
     expected = estimate_elements(plan)
@@ -66,7 +66,6 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
         raise GridError(
             f"the grid would have about {expected:.3g} elements",
             code="E-GRID",
-            value=f"{expected:.3g}",
             limit=f"at most {MAX_ELEMENTS}",
             remedy="use fewer points along the outline",
         )
@@ -74,6 +73,7 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
 
 
 def _mesh_cached(plan: Plan, folder: Path) -> Grid:
+    """The grid of a plan from the folder, or made and kept there."""
     path = folder / f"{_content_hash(plan)}.msh"
     if os.path.exists(path):
         try:
@@ -85,15 +85,10 @@ def _mesh_cached(plan: Plan, folder: Path) -> Grid:
         folder.mkdir(parents=True, exist_ok=True)
         write_grid(path, grid)
     except (OSError, StorageError) as error:
-        _warn_uncached(folder, error)
+        cause = error if isinstance(error, OSError) else error.__cause__
+        reason = "no folder" if folder.exists() and not folder.is_dir() else getattr(cause, "strerror", error)
+        warnings.warn(f"grids are made but not kept: cannot write into {folder} ({reason})", stacklevel=2)
     return grid
-
-
-def _warn_uncached(folder, error):
-    """Say that grids are not kept; the same text is shown once."""
-    cause = error if isinstance(error, OSError) else error.__cause__
-    reason = "no folder" if folder.exists() and not folder.is_dir() else getattr(cause, "strerror", error)
-    warnings.warn(f"grids are made but not kept: cannot write into {folder} ({reason})", stacklevel=2)
 
 
 def _check_cached(grid: Grid, plan: Plan) -> Grid:
