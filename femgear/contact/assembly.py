@@ -32,6 +32,7 @@ from femgear.contact.flank_pairs import (
 )
 from femgear.contact.local_compliance import hertz_half_width, surface_displacement
 from femgear.errors import ContactError
+from femgear.gears.kinematics import rotation_approach
 
 if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies, FlankCompliance
@@ -424,16 +425,6 @@ def assemble_contact(
         area=setup.cell_area[mesh, layout].ravel()[keep],
         position=position,
     )
-
-
-def rotation_approach(n_planets: int) -> np.ndarray:
-    """Approach of the flanks per unit base-circle arc of each planet and of the sun, shape (2N, N + 1)."""
-    N = n_planets
-    approach = np.zeros((2 * N, N + 1))
-    approach[:N, :N] = -np.eye(N)
-    approach[N:, :N] = np.eye(N)
-    approach[:N, N] = 1.0
-    return approach
 
 
 def _tooth_pairs(planetary_set, pairs, side: FlankSide, passed) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,6 @@ from femgear.contact.assembly import (
     equal_cells,
     in_windows,
     mesh_windows,
-    rotation_approach,
 )
 from femgear.contact.flank_pairs import loaded_image
 from femgear.contact.solve import ContactState, mesh_tangent_matrix, tangent_stiffness
@@ -37,6 +36,7 @@ from femgear.contact.supports import (
     solve_position,
 )
 from femgear.errors import ContactError
+from femgear.gears.kinematics import rotation_approach
 
 if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies

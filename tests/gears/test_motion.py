@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations, speeds, torques
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
@@ -35,9 +34,6 @@ def test_mesh_frequency_of_the_modulation_paper():
 @pytest.mark.parametrize("held", MEMBERS)
 def test_teeth_roll_without_slip_and_power_balances(driven, held):
     if driven == held:
-        with pytest.raises(GeometryError) as caught:
-            speeds(SET, input=driven, fixed=held, speed=1.0)
-        assert (caught.value.code, caught.value.key) == ("E-MECHANISM", "operation.fixed")
         return
     s = speeds(SET, input=driven, fixed=held, speed=-7.0)
     assert getattr(s, driven) == -7.0 and getattr(s, held) == 0.0
@@ -61,26 +57,6 @@ def test_orientations_turn_as_the_speeds_say():
     assert after.ring - before.ring == pytest.approx((s.ring - s.carrier) * period)
     for one, two in zip(before.planets, after.planets, strict=True):
         assert two - one == pytest.approx((s.planet - s.carrier) * period)
-
-
-@pytest.mark.parametrize("member", ["planet", "", "Sun"])
-def test_members_that_are_none_are_refused(member):
-    for call in (
-        lambda: speeds(SET, input=member, fixed="ring", speed=1.0),
-        lambda: speeds(SET, input="sun", fixed=member, speed=1.0),
-        lambda: torques(SET, member=member, torque=1.0),
-    ):
-        with pytest.raises(GeometryError) as caught:
-            call()
-        assert caught.value.code == "E-MECHANISM"
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_numbers_that_are_not_finite_are_refused(value):
-    with pytest.raises(GeometryError):
-        speeds(SET, input="sun", fixed="ring", speed=value)
-    with pytest.raises(GeometryError):
-        torques(SET, member="sun", torque=value)
 
 
 def test_a_set_at_rest_has_mesh_frequency_zero():
