@@ -46,14 +46,8 @@ class LoadedPeriod:
     ----------
     position : (P,) array
         In mesh periods, ascending from 0 and denser near jumps.
-    deflection : (2N, P) array
-        Static transmission error of every mesh, as in `MeshCycle` [m].
-    force : (2N, P) array
-        Force on the drive flanks [N].
-    stiffness : (2N, P) array
-        Tangent stiffness at constant loads of the other meshes [N/m].
-    held_stiffness : (2N, P) array
-        The same with the ring held at its outer surface [N/m].
+    deflection, force, stiffness, held_stiffness : (2N, P) arrays
+        As in `MeshCycle` [m], [N], [N/m].
     held_compliance : (2N, 2N) array
         Mean over the period of the tangent compliance between the meshes through their common bodies, the
         ring held, supports left out [m/N].

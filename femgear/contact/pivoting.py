@@ -123,10 +123,6 @@ def solve_step(problem: Problem, active: np.ndarray) -> Step:
     problem : Problem
     active : (n,) bool array
 
-    Returns
-    -------
-    Step
-
     Raises
     ------
     ContactError

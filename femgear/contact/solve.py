@@ -80,10 +80,6 @@ def solve_contact(H, gap, G, load, *, start=None, max_steps=200) -> ContactState
     max_steps : int, optional
         Bound on the steps of each stage, after the last of which the general solver daqp takes over.
 
-    Returns
-    -------
-    ContactState
-
     Raises
     ------
     ContactError

@@ -97,10 +97,8 @@ class BearingSprings:
 
     Parameters
     ----------
-    clearance : float
-        Radial [m].
-    compliance : float
-        Of one spring [m/N].
+    clearance, compliance : float
+        Radial clearance [m], and compliance of one spring [m/N].
     arms : (N n, m) array
         Approach of planet and pin at each of the n springs around every pin per unit free motion, in the
         order of `MovingMembers.names` without sprung motions.
@@ -164,11 +162,8 @@ def solve_position(
 
     Parameters
     ----------
-    H, gap, G
-        Compliance (n, n) [m/N], separations (n,) [m] and approach (n, m) of the pressure cells, as for
-        `solve_contact`.
-    load : (m,) array
-        External load on the motions [N].
+    H, gap, G, load
+        Of the pressure cells and all motions, as for `solve_contact`.
     springs : BearingSprings, optional
         Of the bearings; their motions are the last columns of ``G``.
     start : bool array, optional

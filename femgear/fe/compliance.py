@@ -23,12 +23,11 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import KDTree
 
 from femgear.errors import GridError
+from femgear.fe.grid import Grid, shape_functions
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import SuperLU
-
-    from femgear.fe.grid import Grid
 
 
 @dataclass(frozen=True)
@@ -137,26 +136,14 @@ def interpolation(grid: Grid, points: np.ndarray):
         )
     b1, b2 = _curved_coordinates(nodes[triangles[element]], points, b1[row, element], b2[row, element])
     columns = triangles[element].T
-    shape = _shape_functions(b1, b2)[0]
+    shape = shape_functions(b1, b2)[0]
     return csr_array((shape.ravel(), (np.tile(row, 6), columns.ravel())), shape=(len(points), len(nodes)))
-
-
-def _shape_functions(b1, b2):
-    """Quadratic shape functions (6, m) and their derivatives with respect to both coordinates."""
-    b0 = 1.0 - b1 - b2
-    one, zero = np.ones_like(b0), np.zeros_like(b0)
-    value = np.stack(
-        [b0 * (2 * b0 - 1), b1 * (2 * b1 - 1), b2 * (2 * b2 - 1), 4 * b0 * b1, 4 * b1 * b2, 4 * b2 * b0]
-    )
-    first = np.stack([one - 4 * b0, 4 * b1 - 1, zero, 4 * (b0 - b1), 4 * b2, -4 * b2])
-    second = np.stack([one - 4 * b0, zero, 4 * b2 - 1, -4 * b1, 4 * b1, 4 * (b0 - b2)])
-    return value, first, second
 
 
 def _curved_coordinates(element_nodes, points, b1, b2):
     """Reference coordinates of points in curved six-node triangles by Newton's method."""
     for _ in range(20):
-        value, first, second = _shape_functions(b1, b2)
+        value, first, second = shape_functions(b1, b2)
         error = points - np.einsum("im,mic->mc", value, element_nodes)
         t1 = np.einsum("im,mic->mc", first, element_nodes)
         t2 = np.einsum("im,mic->mc", second, element_nodes)

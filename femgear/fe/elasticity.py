@@ -79,8 +79,7 @@ def stiffness(grid: Grid, material: Material, *, state="plane strain", thickness
 
     Parameters
     ----------
-    grid : Grid
-    material : Material
+    grid, material : Grid, Material
     state : str or mapping of region to str
         ``"plane strain"`` or ``"plane stress"``.
     thickness : float or mapping of region to float
@@ -140,8 +139,7 @@ def foundation(grid: Grid, boundary: str, radial: float, tangential: float, *, t
 
     Parameters
     ----------
-    grid : Grid
-    boundary : str
+    grid, boundary : Grid, str
     radial, tangential : float
         Moduli [N/m^3]: traction per displacement towards and around the origin, not negative.
     thickness : float
@@ -186,10 +184,14 @@ def edge_quadrature(grid, name):
     edges = boundary_edges(grid, name)
     s, weight = np.polynomial.legendre.leggauss(4)
     shape = np.array([0.5 * s * (s - 1), 0.5 * s * (s + 1), 1 - s**2])
-    slope = np.array([s - 0.5, s + 0.5, -2 * s])
     x = np.einsum("iq,kic->kqc", shape, grid.points[edges])
-    tangent = np.einsum("iq,kic->kqc", slope, grid.points[edges]) * weight[:, None]
+    tangent = np.einsum("iq,kic->kqc", _edge_slopes(s), grid.points[edges]) * weight[:, None]
     return edges, shape, x, tangent
+
+
+def _edge_slopes(s: np.ndarray) -> np.ndarray:
+    """Derivatives (3, q) of the shape functions of start, end and middle of an edge at s in -1 .. 1."""
+    return np.array([s - 0.5, s + 0.5, -2.0 * s])
 
 
 @dataclass(frozen=True)
@@ -203,10 +205,8 @@ class BoundaryStress:
         degrees of freedom ``2 node + component``.
     nodes : (m,) int array
         Vertices in the order of the boundary.
-    points : (m, 2) array
-        Their positions [m].
-    tangents : (m, 2) array
-        Unit tangents in the direction of the boundary.
+    points, tangents : (m, 2) arrays
+        Their positions [m] and unit tangents in the direction of the boundary.
     arc : (m,) array
         Arc length from the first vertex [m].
     """
@@ -223,8 +223,7 @@ def tangential_stress(grid: Grid, material: Material, boundary, *, state: str) -
 
     Parameters
     ----------
-    grid : Grid
-    material : Material
+    grid, material : Grid, Material
     boundary : str or tuple of str
         Names of boundaries, each beginning where the one before ends; two edges or more in all.
     state : str
@@ -252,7 +251,7 @@ def plane_modulus(material: Material, state: str) -> float:
 def _edge_strain(grid: Grid, edges):
     """Tangential strain at the Gauss points: columns (2n, 2k), arc lengths (2k,), of the vertices (k+1,)."""
     s = np.array([-GAUSS, GAUSS])
-    slope = np.array([s - 0.5, s + 0.5, -2.0 * s])  # of the shape functions of start, end, mid
+    slope = _edge_slopes(s)
     derivative = np.einsum("iq,kic->kqc", slope, grid.points[edges])
     speed2 = (derivative**2).sum(axis=2)
     # eps = x' . u' / |x'|^2
@@ -269,8 +268,8 @@ def _edge_strain(grid: Grid, edges):
 
 
 def _length(nodes, t, w):
-    slope = np.array([t - 0.5, t + 0.5, -2.0 * t])
-    derivative = np.einsum("iq,kic->kqc", slope, nodes)
+    """Lengths (k,) [m] of edges with nodes (k, 3, 2) [m] by the rule of abscissae `t` and weights `w`."""
+    derivative = np.einsum("iq,kic->kqc", _edge_slopes(t), nodes)
     return np.hypot(derivative[..., 0], derivative[..., 1]) @ w
 
 

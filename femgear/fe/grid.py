@@ -168,6 +168,18 @@ def rotated_copies(grid: Grid, count: int) -> Grid:
     return Grid(points, triangles, boundaries, regions)
 
 
+def shape_functions(b1, b2):
+    """Quadratic shape functions (6, m) of a triangle and their derivatives along both coordinates (m,)."""
+    b0 = 1.0 - b1 - b2
+    one, zero = np.ones_like(b0), np.zeros_like(b0)
+    value = np.stack(
+        [b0 * (2 * b0 - 1), b1 * (2 * b1 - 1), b2 * (2 * b2 - 1), 4 * b0 * b1, 4 * b1 * b2, 4 * b2 * b0]
+    )
+    first = np.stack([one - 4 * b0, 4 * b1 - 1, zero, 4 * (b0 - b1), 4 * b2, -4 * b2])
+    second = np.stack([one - 4 * b0, zero, 4 * b2 - 1, -4 * b1, 4 * b1, 4 * (b0 - b2)])
+    return value, first, second
+
+
 def jacobian_bounds(grid: Grid) -> np.ndarray:
     """Lower and upper bound of the Jacobian determinant of every element, shape (m, 2) [m^2].
 
@@ -177,9 +189,7 @@ def jacobian_bounds(grid: Grid) -> np.ndarray:
     """
     # gradients of the six shape functions at the six nodes of the reference triangle
     x, y = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]).T
-    zero = np.zeros(6)
-    dx = np.array([4 * x + 4 * y - 3, 4 * x - 1, zero, 4 - 8 * x - 4 * y, 4 * y, -4 * y])
-    dy = np.array([4 * x + 4 * y - 3, zero, 4 * y - 1, -4 * x, 4 * x, 4 - 4 * x - 8 * y])
+    _, dx, dy = shape_functions(x, y)
     nodes = grid.points[grid.triangles]
     a, b = np.einsum("mic,ij->cmj", nodes, dx), np.einsum("mic,ij->cmj", nodes, dy)
     value = a[0] * b[1] - a[1] * b[0]

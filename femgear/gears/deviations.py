@@ -123,6 +123,14 @@ class SetDeviations:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
+    def mesh_forms(self, kind: int, back: bool) -> tuple[FlankForm, FlankForm]:
+        """Modifications of gear 1 and gear 2 in the sun-planet (0) or planet-ring (1) meshes.
+
+        On the back side a planet meets sun and ring with its other flanks.
+        """
+        planet = self.planet_sun_side if (kind == 0) != back else self.planet_ring_side
+        return (self.sun, planet) if kind == 0 else (planet, self.ring)
+
     @property
     def ideal(self) -> bool:
         """Whether nothing here separates a loaded flank."""
@@ -185,8 +193,7 @@ def profile_separation(
 
     Parameters
     ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
+    deviations, planetary_set : SetDeviations, PlanetarySet
     kind : int
         0 for sun-planet (gear 1 is the sun), 1 for planet-ring (gear 1 is the planet).
     roll_1, roll_2 : arrays that broadcast
@@ -194,10 +201,10 @@ def profile_separation(
     back : bool
         The other flanks of the teeth; those of a planet are its ring side in the mesh with the sun.
     """
-    d, s = deviations, planetary_set
-    planet = d.planet_sun_side if (kind == 0) != back else d.planet_ring_side
-    one, two = ((d.sun, s.sun), (planet, s.planet)) if kind == 0 else ((planet, s.planet), (d.ring, s.ring))
-    return form_deviation(*one, roll_1) + form_deviation(*two, roll_2)
+    s = planetary_set
+    one, two = deviations.mesh_forms(kind, back)
+    gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
+    return form_deviation(one, gears[0], roll_1) + form_deviation(two, gears[1], roll_2)
 
 
 def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):
@@ -227,8 +234,7 @@ def body_separation(
 
     Parameters
     ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
+    deviations, planetary_set : SetDeviations, PlanetarySet
     position : (P,) array
         tau, as a fraction of mesh periods; may exceed 1.
     back : bool
@@ -297,8 +303,7 @@ def common_period(
 
     Parameters
     ----------
-    deviations : SetDeviations
-    planetary_set : PlanetarySet
+    deviations, planetary_set : SetDeviations, PlanetarySet
     limit : int
         Most mesh periods wanted. Beyond it the record is one turn of the carrier against the ring, z_r mesh
         periods, or the limit when even that is too long; it then does not close.

@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import nnls
 
-from femgear.gears.gear import working_half_angles
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -68,8 +66,7 @@ def orientations(planetary: PlanetarySet, position: float = 0.0) -> Orientations
     """
     s = planetary
     psi, phase = s.planet_angles, s.mesh_phases.tolist()
-    eta_s, eta_p = working_half_angles(s.sun, s.planet, s.working_pressure_angle_sun_planet)
-    _, eta_r = working_half_angles(s.planet, s.ring, s.working_pressure_angle_planet_ring)
+    (eta_s, eta_p), (_, eta_r) = s.half_angles
     pitch_p = s.planet.pitch_angle
     planets = tuple(psi[n] + math.pi - eta_p - (position + phase[n]) * pitch_p for n in range(s.n_planets))
     return Orientations(

@@ -124,8 +124,7 @@ def form_deviation(form: FlankForm, gear: Gear, roll):
 
     Parameters
     ----------
-    form : FlankForm
-    gear : Gear
+    form, gear : FlankForm, Gear
     roll : array, any shape
         Roll lengths [m]; beyond the ends of the involute flank the value of that end holds.
 

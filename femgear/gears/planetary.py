@@ -121,6 +121,14 @@ class PlanetarySet:
         return start, self.planet.tip_roll - planet
 
     @property
+    def half_angles(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Half-thickness angles [rad] on the working pitch circles: of sun and planet, of planet and ring."""
+        return (
+            working_half_angles(self.sun, self.planet, self.working_pressure_angle_sun_planet),
+            working_half_angles(self.planet, self.ring, self.working_pressure_angle_planet_ring),
+        )
+
+    @property
     def backlash_sun_planet(self) -> float:
         """Normal play [m] along the line of action."""
         return _backlash(self.sun, self.planet, self.working_pressure_angle_sun_planet)
@@ -450,12 +458,7 @@ def _planet_lag(planetary: PlanetarySet) -> float:
     The planet tooth that touches the sun is centred at psi + pi - eta_ps, the one that touches the ring at
     psi + eta_pr; the planet turns by one pitch a period.
     """
-    _, eta_ps = working_half_angles(
-        planetary.sun, planetary.planet, planetary.working_pressure_angle_sun_planet
-    )
-    eta_pr, _ = working_half_angles(
-        planetary.planet, planetary.ring, planetary.working_pressure_angle_planet_ring
-    )
+    (_, eta_ps), (eta_pr, _) = planetary.half_angles
     return (math.pi - eta_ps - eta_pr) / planetary.planet.pitch_angle
 
 

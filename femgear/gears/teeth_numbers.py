@@ -26,20 +26,16 @@ class ToothChoices:
     ----------
     teeth : (C, 3) int array
         Sun, planet, ring.
-    ratio : (C,) array
-        ``1 + z_r / z_s``: sun over carrier with the ring held.
-    ratio_change : (C,) array
-        Relative to that of the wanted teeth.
+    ratio, ratio_change : (C,) arrays
+        ``1 + z_r / z_s``, sun over carrier with the ring held; relative change against the wanted teeth.
     closure : (C,) int array
         ``z_r - z_s - 2 z_p``; what is not zero is left to profile shifts.
     positions : (C, N) int array
         Assembly positions nearest to equal spacing, multiples of ``2 pi / (z_s + z_r)``.
     equally_spaced : (C,) bool array
         Whether ``(z_s + z_r) / N`` is whole.
-    kind : (C, H) int array
-        Indices of `phasing.KINDS` for the harmonics 1 to H.
-    cyclic : (C, H) int array
-        mod(h z_s, N); -1 for unequal spacing.
+    kind, cyclic : (C, H) int arrays
+        Indices of `phasing.KINDS` for the harmonics 1 to H, and mod(h z_s, N), -1 for unequal spacing.
     sums : (C, H, 2) array
         Shares of the mesh forces that add up to torque (and thrust), and to lateral force (and tilting
         moment), 0 to 1.

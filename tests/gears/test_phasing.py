@@ -80,7 +80,7 @@ def test_turning_back_meets_the_same_contacts_in_opposite_order(any_set, arcs_to
 
 def test_other_flanks_are_those_of_the_mirror_image(any_set):
     """Against the phases of the back flanks that the contact problem takes from the mirrored set."""
-    back = flank_side(any_set, -1).phase
+    back = flank_side(any_set, -1)[0]
     # there a pair touches where its path coordinate, which runs backwards, plus the phase is whole
     assert apart(phasing_of_set(any_set, flank=-1).phases, back[0] - back) < 1e-9
     both = phasing_of_set(any_set, rotation=-1, flank=-1).phases
