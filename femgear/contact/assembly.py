@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from femgear.contact.bodies import station_weights
+from femgear.contact.bodies import Bodies, FlankCompliance, station_weights
 from femgear.contact.flank_pairs import (
     BACK_SIDE,
     DRIVE_SIDE,
@@ -30,15 +30,12 @@ from femgear.contact.flank_pairs import (
     side_teeth,
 )
 from femgear.contact.local_compliance import hertz_half_width, surface_displacement
+from femgear.contact.supports import MovingMembers
 from femgear.errors import ContactError
+from femgear.fe.elasticity import Material
+from femgear.gears.deviations import SetDeviations
 from femgear.gears.kinematics import rotation_approach
-
-if TYPE_CHECKING:
-    from femgear.contact.bodies import Bodies, FlankCompliance
-    from femgear.contact.supports import MovingMembers
-    from femgear.fe.elasticity import Material
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 WINDOW_NODES = np.array([0.0, 0.5, 1.0])
 WIDTH = 3.2

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from femgear.contact.flank_pairs import LEFT, RIGHT, mesh_pairs
 from femgear.contact.local_compliance import TipCorner, depth_displacement, tip_corner
 from femgear.errors import CaseError
 from femgear.fe.compliance import (
+    SectorSchur,
     condense_sector,
     directional,
     interpolation,
@@ -30,18 +31,12 @@ from femgear.fe.compliance import (
     split_sector,
     tooth_compliance,
 )
-from femgear.fe.elasticity import stiffness, tangential_stress
-from femgear.fe.grid import mirror
+from femgear.fe.elasticity import BoundaryStress, Material, stiffness, tangential_stress
+from femgear.fe.grid import Grid, mirror
 from femgear.fe.meshing import mesh_outlines
-from femgear.gears.gear import tooth_thickness
+from femgear.gears.gear import Gear, tooth_thickness
+from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tooth import half_sector
-
-if TYPE_CHECKING:
-    from femgear.fe.compliance import SectorSchur
-    from femgear.fe.elasticity import BoundaryStress, Material
-    from femgear.fe.grid import Grid
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
 
 # external gears are slender along the axis only; the ring's rim is thin and free at its faces
 TEETH_STATE = "plane strain"

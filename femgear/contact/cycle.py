@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from femgear.contact.assembly import (
     in_windows,
     mesh_windows,
 )
+from femgear.contact.bodies import Bodies
 from femgear.contact.flank_pairs import loaded_image
 from femgear.contact.solve import ContactState, mesh_tangent_matrix, tangent_stiffness
 from femgear.contact.supports import (
@@ -36,12 +37,9 @@ from femgear.contact.supports import (
     solve_position,
 )
 from femgear.errors import ContactError
+from femgear.gears.deviations import SetDeviations
 from femgear.gears.kinematics import rotation_approach
-
-if TYPE_CHECKING:
-    from femgear.contact.bodies import Bodies
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 LARGEST_RESIDUAL = 1e-9
 """Of contact conditions and equilibrium; rounding leaves 1e-14."""

@@ -19,23 +19,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import ContactError
 from femgear.gears.deviations import (
+    SetDeviations,
     body_separation,
     mirrored_deviations,
     profile_separation,
     tooth_separation,
 )
+from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations
-
-if TYPE_CHECKING:
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 LEFT, RIGHT = 0, 1
 """Flanks of a tooth."""
@@ -343,6 +340,7 @@ def tooth_steps(mesh, gear, n_planets: int):
 
 
 def _roll(gear: Gear, radius: float) -> float:
+    """Roll length [m] of a radius [m], zero inside the base circle."""
     return float(np.sqrt(max(radius**2 - gear.base_radius**2, 0.0)))
 
 

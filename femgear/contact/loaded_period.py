@@ -12,19 +12,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import gcd
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
-from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.bodies import Bodies
+from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
 from femgear.contact.supports import RIGID, Supports
-
-if TYPE_CHECKING:
-    from femgear.contact.bodies import Bodies
-    from femgear.contact.cycle import MeshCycle
-    from femgear.gears.deviations import SetDeviations
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.deviations import SetDeviations
+from femgear.gears.planetary import PlanetarySet
 
 SHORTEST = 2.0**-13
 """Mesh periods in which a jump is enclosed."""

@@ -20,13 +20,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from femgear.fe.elasticity import Material
-    from femgear.gears.gear import Gear
+from femgear.fe.elasticity import Material
+from femgear.gears.gear import Gear
 
 _REAL_PART = 0.5
 """Real part of the powers: between the resultant force (0) and the rotation (1)."""

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,17 +26,14 @@ from femgear.contact.bodies import (
     station_weights,
     with_cut,
 )
+from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks
 from femgear.contact.tooth_loads import LoadedTeeth, loaded_teeth
 from femgear.fe.compliance import condense_sector, tooth_compliance
-from femgear.fe.elasticity import stiffness
-
-if TYPE_CHECKING:
-    from femgear.contact.cycle import MeshCycle
-    from femgear.fe.elasticity import Material
-    from femgear.fe.grid import Grid
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
+from femgear.fe.elasticity import Material, stiffness
+from femgear.fe.grid import Grid
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import PlanetarySet
 
 LOADED, BACK = 0, 1
 """Root of the loaded flank and of the back flank in `RootCycle.stress`."""

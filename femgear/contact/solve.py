@@ -195,6 +195,7 @@ def _checked(H, gap, G, load):
 
 
 def _scaled(H, gap, G, load) -> Problem:
+    """The problem over its mean compliance and the largest arms of its motions."""
     compliance = float(np.trace(H)) / len(gap) if len(gap) else 1.0
     arm = np.abs(G).max(axis=0, initial=0.0)
     arm[arm == 0] = 1.0

@@ -17,16 +17,13 @@ planetary gears using an extended harmonic balance approach", NREL/CP-5000-55355
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.contact.solve import ContactState, solve_contact
 from femgear.errors import ContactError
 from femgear.gears.kinematics import MEMBERS, member_approach, mesh_normals, unheld_members
-
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 SPRINGS = 120
 """One-sided springs of a planet bearing with clearance: even, so that they are their own mirror image.

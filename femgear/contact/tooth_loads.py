@@ -8,19 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.contact.bodies import flank_load_columns, flank_stations
+from femgear.contact.bodies import Sector, Sectors, flank_load_columns, flank_stations
+from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import acting_flanks, mesh_pairs, tooth_steps
 from femgear.fe.compliance import cyclic_displacement, mirror_nodes, mirrored_columns
 from femgear.gears.kinematics import orientations
-
-if TYPE_CHECKING:
-    from femgear.contact.bodies import Sector, Sectors
-    from femgear.contact.cycle import MeshCycle
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 LOAD_BINS = 20
 

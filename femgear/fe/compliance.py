@@ -15,19 +15,14 @@ with ``S`` the Schur complement of the sector on its two cuts.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial import KDTree
 
 from femgear.errors import GridError
 from femgear.fe.grid import Grid, shape_functions
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import SuperLU
 
 
 @dataclass(frozen=True)

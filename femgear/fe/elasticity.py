@@ -176,6 +176,7 @@ def _xy(u, v, w):
 
 
 def _by_region(value):
+    """A mapping of regions, or one number or state for all elements under the name None."""
     return dict(value) if isinstance(value, Mapping) else {None: value}
 
 

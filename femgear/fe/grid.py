@@ -8,14 +8,11 @@ import os
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from femgear.errors import GridError, StorageError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 # boundaries of a half sector that `mirror` also gives as one
 JOINED = ("tip", "rim", "root")
@@ -283,12 +280,14 @@ def read_grid(path: Path) -> Grid:
 
 
 def _read_only(value, dtype):
+    """Copy of an array that cannot be changed."""
     array = np.array(value, dtype=dtype)
     array.setflags(write=False)
     return array
 
 
 def _turn(points, angle):
+    """Points (n, 2) turned about the origin by an angle [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     return points @ np.array([[c, s], [-s, c]])
 

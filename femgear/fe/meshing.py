@@ -92,6 +92,7 @@ def _mesh_cached(plan: Plan, folder: Path) -> Grid:
 
 
 def _check_cached(grid: Grid, plan: Plan) -> Grid:
+    """The grid from a file, refused where it is not that of the plan."""
     check_grid(grid)
     same = set(grid.regions) == set(plan.faces) and np.array_equal(
         grid.points[: len(plan.points)], plan.points
@@ -119,6 +120,7 @@ def mesh_outlines(outlines, *, cache: Path | None = None) -> tuple[Grid, ...]:
 
 
 def _content_hash(plan: Plan) -> str:
+    """Name of the grid in a cache: hash of the plan and of what makes the grid."""
     try:
         gmsh = metadata.version("gmsh")
     except metadata.PackageNotFoundError as error:
@@ -131,6 +133,7 @@ def _content_hash(plan: Plan) -> str:
 
 
 def _mesh_plan(plan: Plan) -> Grid:
+    """A new grid of a plan, checked."""
     result = _run_gmsh(plan)
     points = np.vstack([plan.points, result["points"][len(plan.points) :]])
     grid = _second_order(plan, points, result["triangles"], result["face"])
@@ -139,6 +142,7 @@ def _mesh_plan(plan: Plan) -> Grid:
 
 
 def _run_gmsh(plan: Plan) -> dict[str, np.ndarray]:
+    """Points [m], triangles and their faces as the process of Gmsh returns them."""
     # Gmsh works with absolute tolerances: hand it an outline of unit size at the origin, with rounding
     # errors removed so that they do not decide between equally good triangulations
     centre, size = plan.points.mean(axis=0), plan.size
@@ -173,6 +177,7 @@ def _run_gmsh(plan: Plan) -> dict[str, np.ndarray]:
 
 
 def _worker_error(done):
+    """Refusal with the last words of the process of Gmsh."""
     text = " ".join(done.stderr.split())[-400:]
     if done.returncode == 3:
         return _library_error(text)
@@ -180,6 +185,7 @@ def _worker_error(done):
 
 
 def _library_error(text):
+    """Refusal of a Gmsh that cannot be loaded, with the package to install."""
     library = re.search(r"(lib[A-Za-z]+)[-.\d]*\.so", text)
     remedy = "install it with: pip install gmsh"
     if library:

@@ -8,16 +8,13 @@ for each number ``n`` of nodal diameters (Thomas 1979), whose nodal diameter is 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femgear.fe.compliance import cut_rotation, solve_interior, split_sector
-
-if TYPE_CHECKING:
-    from femgear.fe.grid import Grid
+from femgear.fe.grid import Grid
 
 
 @dataclass(frozen=True)

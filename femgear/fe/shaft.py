@@ -142,12 +142,12 @@ def _half_section(steps, refine):
     z = np.concatenate([[0.0], np.cumsum([step.length for step in steps])])
     around = 2.0 * z[-1] + sum(step.outer_diameter - step.inner_diameter for step in steps)
     if around / size > MAX_EDGES:
-        thinnest = ACROSS * refine * around / MAX_EDGES
         raise GeometryError(
             f"the thinnest wall of the shaft is {1e3 * wall:.4g} mm on a length of {1e3 * z[-1]:.4g} mm",
-            code="E-SHAFT", limit=f"walls of {1e3 * thinnest:.3g} mm or more on this length",
+            code="E-SHAFT",
+            limit=f"walls of {1e3 * ACROSS * refine * around / MAX_EDGES:.3g} mm or more on this length",
             remedy="give a smaller inner diameter: a shell this thin is not resolved by elements across it",
-        )  # fmt: skip
+        )
     outer, inner = [], []
     for k, step in enumerate(steps):
         outer += [(0.5 * step.outer_diameter, z[k]), (0.5 * step.outer_diameter, z[k + 1])]

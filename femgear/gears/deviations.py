@@ -16,17 +16,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.gears.gear import GeometryWarning
+from femgear.gears.gear import Gear, GeometryWarning
 from femgear.gears.kinematics import mesh_normals, orientations
 from femgear.gears.modifications import FlankForm, check_flank, form_deviation
-
-if TYPE_CHECKING:
-    from femgear.gears.gear import Gear
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 LONGEST_RECORD = 256
 """Mesh periods that a record spans at most unless told otherwise."""
@@ -406,6 +402,7 @@ def _turned(values: np.ndarray, first: int) -> np.ndarray:
 
 
 def _reflected(runout: Runout, axis: float) -> Runout:
+    """Runout in the mirror image at half the angle `axis` [rad]."""
     return replace(runout, phase=axis - runout.phase)
 
 
@@ -473,12 +470,14 @@ def _worst(d: SetDeviations, s: PlanetarySet, *, back: bool) -> np.ndarray:
 
 
 def _thickest(d: SetDeviations, s: PlanetarySet, kind: int, *, back: bool) -> float:
+    """Smallest separation [m] of any points of the flanks of one kind of mesh."""
     gears = (s.sun, s.planet) if kind == 0 else (s.planet, s.ring)
     rolls = [np.linspace(gear.form_roll, gear.tip_roll, 101) for gear in gears]
     return float(profile_separation(d, s, kind, rolls[0][:, None], rolls[1][None, :], back=back).min())
 
 
 def _wedging(d: SetDeviations, s: PlanetarySet):
+    """Warn where the deviations may use up the play (W-WEDGING)."""
     if d.ideal and not (d.planet_thickness.any() or d.sun_thickness or d.ring_thickness):
         return
     single, whole = least_play(d, s)

@@ -340,6 +340,7 @@ def is_whole(value) -> bool:
 
 
 def _within(value, low: float, high: float) -> bool:
+    """Whether a value is a number between two limits."""
     return isinstance(value, float | int | np.integer | np.floating) and bool(low <= value <= high)
 
 

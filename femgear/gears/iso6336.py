@@ -12,14 +12,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import cutter_of
+from femgear.gears.gear import Gear, cutter_of
 from femgear.gears.profile import inv
-
-if TYPE_CHECKING:
-    from femgear.gears.gear import Gear
 
 # coefficients C1 .. C9 of the minimum flexibility q', ISO 6336-1:2019, eq. 82 (gears of one module depth)
 _C = (0.04723, 0.15551, 0.25791, -0.00635, -0.11654, -0.00193, -0.24188, 0.00529, 0.00182)

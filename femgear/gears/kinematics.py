@@ -9,16 +9,13 @@ drives and no flank stops. A member that floats alone must not slide past all fl
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import nnls
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 MEMBERS = ("sun", "carrier", "ring")
 TOLERANCE = 1e-9

@@ -8,18 +8,13 @@ gears too. Terms and sign of relief, crowning and slope are those of ISO 21771-1
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import GeometryWarning
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from femgear.gears.gear import Gear
+from femgear.gears.gear import Gear, GeometryWarning
 
 LARGEST_DEVIATION = 0.2
 """Largest plausible amount of any modification or error, in modules."""

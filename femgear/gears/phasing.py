@@ -19,16 +19,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import TEETH_RANGE, is_whole
-from femgear.gears.planetary import assembly_positions, check_angles
-
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet, assembly_positions, check_angles
 
 CONVENTIONS = ("rotation", "printed")
 KINDS = ("in-phase", "counter-phased", "sequentially phased", "unequally phased")
@@ -78,6 +74,7 @@ class MeshPhasing:
 
     @property
     def n_planets(self) -> int:
+        """N"""
         return len(self.positions)
 
     @property

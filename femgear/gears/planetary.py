@@ -63,6 +63,7 @@ class PlanetarySet:
 
     @property
     def n_planets(self) -> int:
+        """N"""
         return len(self.planet_angles)
 
     @property

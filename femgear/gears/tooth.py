@@ -296,6 +296,7 @@ def _inside(gear: Gear, split: np.ndarray) -> tuple[tuple[str, tuple[float, floa
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:
+    """The array in one piece that cannot be changed."""
     out = np.ascontiguousarray(array)
     out.setflags(write=False)
     return out
