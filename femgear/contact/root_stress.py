@@ -164,8 +164,8 @@ class RootRange:
         Root point with the largest difference of the two stresses.
     maximum, minimum : float
         There [Pa].
-    tooth_maximum : (z,) array
-        Largest stress of every tooth, at the point where it differs most from the smallest [Pa].
+    tooth_maximum, tooth_minimum : (z,) arrays
+        The same of every tooth, each at the point where the two differ most [Pa].
     worst : tuple of int
         Slot and position of the cycle with the largest stress in this root.
     history : (z P,) array or None
@@ -181,6 +181,7 @@ class RootRange:
     maximum: float
     minimum: float
     tooth_maximum: np.ndarray
+    tooth_minimum: np.ndarray
     worst: tuple[int, int]
     history: np.ndarray | None
 
@@ -419,6 +420,7 @@ def _body_ranges(planetary_set, kind, root: _RootStress, acting, teeth: LoadedTe
             maximum=float(top[tooth, point]),
             minimum=float(bottom[tooth, point]),
             tooth_maximum=top[own][number],
+            tooth_minimum=bottom[own][number],
             worst=worst[target][1:],
             history=_history(field[:, rows][:, point], teeth, start[:2], step) if one else None,
         )

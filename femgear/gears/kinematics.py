@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
+from femgear.errors import GeometryError
 from femgear.gears.planetary import PlanetarySet
 
 MEMBERS = ("sun", "carrier", "ring")
@@ -86,7 +87,21 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
         Driven and held member; they differ.
     speed : float
         Absolute speed of the driven member [rad/s].
+
+    Raises
+    ------
+    GeometryError
+        E-MECHANISM: one member is both driven and held.
     """
+    if input == fixed:
+        raise GeometryError(
+            f"the {input} is both driven and held, which leaves two members free",
+            code="E-MECHANISM",
+            key="operation.fixed",
+            value=input,
+            limit="one driven, one held and one output member out of sun, carrier and ring",
+            remedy='for example input = "sun", fixed = "ring"',
+        )
     zs, zp, zr = planetary.sun.teeth, planetary.planet.teeth, planetary.ring.teeth
     known = {input: speed, fixed: 0.0}
     # z_s w_s + z_r w_r - (z_s + z_r) w_c = 0

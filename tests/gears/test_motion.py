@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations, speeds, torques
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
@@ -34,6 +35,9 @@ def test_mesh_frequency_of_the_modulation_paper():
 @pytest.mark.parametrize("held", MEMBERS)
 def test_teeth_roll_without_slip_and_power_balances(driven, held):
     if driven == held:
+        with pytest.raises(GeometryError) as caught:
+            speeds(SET, input=driven, fixed=held, speed=1.0)
+        assert (caught.value.code, caught.value.key) == ("E-MECHANISM", "operation.fixed")
         return
     s = speeds(SET, input=driven, fixed=held, speed=-7.0)
     assert getattr(s, driven) == -7.0 and getattr(s, held) == 0.0
