@@ -491,7 +491,6 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     )
     modes = cyclic_modes(
         basis,
-        count=gears.ring.teeth,
         nodal_diameters=range(7),
         loads=load,
         outputs=load,
