@@ -226,6 +226,36 @@ def series_of(samples, count: int, *, orders: tuple[int, ...] = (1,)) -> Fourier
     return FourierSeries(harmonics_of(np.atleast_2d(samples), count), orders)
 
 
+def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
+    """Tooth errors (2N, H) of one wave of each kind, shifted by the mesh phases.
+
+    Parameters
+    ----------
+    sun_planet, planet_ring : (H,) complex arrays
+        Harmonics 1 to H at phase zero [m].
+    phases : (2N,) array
+        Fractions of the mesh period, see `femgear.trains.planar.model.phased_series`.
+
+    Raises
+    ------
+    CaseError
+        An odd number of phases, values that are not finite numbers (E-SHAPE).
+    """
+    waves = [
+        np.atleast_1d(checked_numbers(wave, name, code="E-SHAPE", unit="m", kind=complex))
+        for name, wave in (("sun_planet", sun_planet), ("planet_ring", planet_ring))
+    ]
+    phases, count = checked_numbers(phases, "phases", code="E-SHAPE", unit=""), max(map(len, waves))
+    finite = all(np.all(np.isfinite(values)) for values in (*waves, phases))
+    if phases.ndim != 1 or not len(phases) or len(phases) % 2 or max(w.ndim for w in waves) > 1 or not finite:
+        raise CaseError(
+            f"mesh phases of shape {phases.shape}", code="E-SHAPE", key="phases",
+            limit="two a planet, finite: sun-planet meshes, then planet-ring meshes",
+        )  # fmt: skip
+    table = np.repeat([np.pad(wave, (0, count - len(wave))) for wave in waves], len(phases) // 2, axis=0)
+    return table * np.exp(2j * np.pi * phases[:, None] * np.arange(1, count + 1))
+
+
 @dataclass(frozen=True)
 class SummedSeries:
     """``sum_p parts[p]``, each with its own orders; elements take it where they take a `FourierSeries`.
@@ -268,44 +298,6 @@ class SummedSeries:
 
 Series = FourierSeries | StepSeries | SummedSeries
 """Coefficients that repeat with the phases of the base frequencies."""
-
-
-def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np.ndarray, np.ndarray]:
-    """Lines of a series at given base frequencies, ascending; lines that coincide are added.
-
-    Parameters
-    ----------
-    series : FourierSeries or SummedSeries
-    frequency : float or (n_bases,) array
-        [rad/s]
-
-    Returns
-    -------
-    line_frequency : (L,) array
-        Not negative; the mean first [rad/s].
-    amplitude : (n, L) complex array
-        ``Re sum_l A_l exp(i omega_l t)``.
-    """
-    frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
-    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
-        raise CaseError(
-            f"base frequencies of shape {frequency.shape}", code="E-RANGE", key="frequency",
-            limit="finite numbers, one a base",
-        )  # fmt: skip
-    parts = series.parts if isinstance(series, SummedSeries) else (series,)
-    rates, lines = [np.zeros(1)], [np.zeros((len(parts[0].amplitudes), 1), complex)]
-    for part in parts:
-        base = float(np.dot(part.orders[: len(frequency)], frequency[: len(part.orders)]))
-        rate = base * np.arange(part.amplitudes.shape[1])
-        rates.append(np.abs(rate))
-        lines.append(np.where(rate < 0.0, part.amplitudes.conj(), part.amplitudes))
-    rates, lines = np.concatenate(rates), np.concatenate(lines, axis=1)
-    order = np.argsort(rates, kind="stable")
-    rates, lines = rates[order], lines[:, order]
-    first = np.flatnonzero(np.diff(rates, prepend=-np.inf) > _COINCIDE * rates.max(initial=0.0))
-    total = np.add.reduceat(lines, first, axis=1)
-    total[:, 0] = np.real(total[:, 0])
-    return rates[first], total
 
 
 def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:

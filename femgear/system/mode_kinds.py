@@ -265,18 +265,6 @@ def named_kinds(share, frequency) -> tuple[str, ...]:
     )
 
 
-def motion_planes(dofs: Sequence[str]) -> np.ndarray:
-    """Rows (k, 2) of x and y, or radial and tangential, of every body that has both, for `whirl`."""
-    place = {name: i for i, name in enumerate(dofs)}
-    planes = []
-    for first, second in (("x", "y"), ("radial", "tangential")):
-        for name, i in place.items():
-            body, _, axis = name.partition(": ")
-            if axis == first and (partner := place.get(f"{body}: {second}")) is not None:
-                planes.append((i, partner))
-    return np.array(planes, int).reshape(-1, 2)
-
-
 def equally_spaced(planet_angles) -> bool:
     """Whether planet n is at ``psi_1 + 2 pi (n - 1) / N``."""
     psi, N = np.asarray(planet_angles, float), len(planet_angles)

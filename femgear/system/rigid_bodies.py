@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 import numpy as np
@@ -79,8 +79,8 @@ class ContactLines:
 class RigidSet:
     """Rigid bodies, the geometry of their gears and the stiffness of their meshes.
 
-    A kind of set says which of the six motions its bodies have (``axes``), and the names of the springs in
-    them (``directions``); ``meshes_optional`` allows meshes without stiffness.
+    A kind of set says which of the six motions its bodies have (``axes``); ``meshes_optional`` allows meshes
+    without stiffness.
 
     Parameters
     ----------
@@ -107,7 +107,6 @@ class RigidSet:
 
     code: ClassVar[str] = "E-RANGE"
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
-    directions: ClassVar[dict[str, tuple[int, ...]]] = {}
     meshes_optional: ClassVar[bool] = True
 
     sun: PlanarBody | HelicalBody
@@ -228,7 +227,6 @@ class PlanarSet(RigidSet):
 
     code: ClassVar[str] = "E-RANGE"
     axes: ClassVar[tuple[int, ...]] = (0, 1, 5)
-    directions: ClassVar[dict[str, tuple[int, ...]]] = {"{}": (0, 1), "torsional {}": (2,)}
     meshes_optional: ClassVar[bool] = False
 
     planet_bearing: float | np.ndarray
@@ -375,15 +373,6 @@ def gear_geometry(s: PlanetarySet) -> dict[str, Any]:
     }
 
 
-def torsional_set(data: PlanarSet) -> PlanarSet:
-    """The same set with all axes held: N + 3 rotations (A. Kahraman, J. Sound Vib. 173, 1994, 125-130).
-
-    The planets' axes are then fixed to the carrier, whose rotation carries their mass.
-    """
-    held = {name: replace(getattr(data, name), support=math.inf) for name in CENTRAL}
-    return replace(data, planet_bearing=math.inf, **held)
-
-
 def torque_shares(data: RigidSet) -> dict[str, float]:
     """Forces on ``u`` of the members in static balance, that on the sun being one.
 
@@ -447,11 +436,6 @@ def body_masses(data: RigidSet) -> np.ndarray:
 def inertia_of_reduced(reduced: float, radius: float) -> float:
     """Polar inertia [kg m^2] of ``I / r^2`` [kg] at the radius [m] of ``u = r theta``."""
     return reduced * radius**2
-
-
-def torsional_of_reduced(stiffness: float, radius: float) -> float:
-    """Torsional stiffness [N m/rad] of a stiffness ``k_u`` [N/m] that acts on ``u = r theta``."""
-    return stiffness * radius**2
 
 
 def check_set(data: RigidSet) -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
+from validation.reference.mode_energy import motion_planes
 
 from femgear.errors import CaseError
 from femgear.system.assembler import gear_set_system
@@ -10,7 +11,6 @@ from femgear.system.mode_kinds import (
     class_energies,
     class_shares,
     mode_kinds,
-    motion_planes,
     phase_basis,
     phase_shares,
     phasing,

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
+from validation.reference.mode_energy import motion_planes
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes, damping_matrix, solve_modes, whirl
 from femgear.system.assembler import gear_set_system
-from femgear.system.mode_kinds import motion_planes
 from femgear.system.system import MechanicalSystem
 
 NO_MESH = np.zeros(0)

@@ -33,11 +33,18 @@ from femgear.system.assembler import (
     pin_directions,
 )
 from femgear.system.elements import GearMeshes, RadialBearings
-from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, line_tail, series_of
+from femgear.system.fourier import (
+    FourierSeries,
+    Series,
+    StepSeries,
+    SummedSeries,
+    line_tail,
+    series_of,
+    tooth_lines,
+)
 from femgear.system.mode_kinds import gear_set_kinds
 from femgear.system.rigid_bodies import CENTRAL, PlanarSet, PlanarTorque, flank_sign
 from femgear.system.system import HarmonicForce, Modes, NonlinearSystem, element_forces
-from femgear.system.transmission_errors import tooth_lines
 
 # natural frequencies closer than this, relative to the frequency, count as one
 _SAME = 1e-3
