@@ -10,14 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 
 from femgear.errors import CaseError
-
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 CENTRAL = ("carrier", "ring", "sun")
 DIRECTIONS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}

@@ -185,8 +185,21 @@ def continue_curve(
     curve = scaled_curve(
         evaluate, start, parameter, limits=limits, scale=scale, unit=unit, options=options, describe=describe
     )
-    first = start_point(curve, start, parameter, limits=limits, direction=direction)
-    return collect(curve, first, limits=limits, options=options)
+    if not limits[0] <= parameter <= limits[1]:
+        raise CaseError(
+            f"the start at {describe(parameter)} lies outside the range", code="E-RANGE",
+            limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
+        )  # fmt: skip
+    axis = np.zeros(len(curve.scale) + 1)
+    axis[-1] = 1.0
+    try:
+        first = correct(curve, curve.scaled(start, parameter), axis, along=np.sign(direction) * axis)
+    except LostError as error:
+        raise ConvergenceError(
+            f"no solution found near the start at {describe(parameter)}: {error}", code="E-START",
+            remedy="give a better start, or start away from a limit point",
+        ) from error  # fmt: skip
+    return _collect(curve, first, limits, options)
 
 
 def switch_branch(
@@ -238,8 +251,7 @@ def switch_branch(
             code="E-CONVERGENCE", remedy="disturb the symmetry of the system a little",
         ) from error  # fmt: skip
     along, back = (
-        collect(curve, replace(point, tangent=sign * tangent), limits=limits, options=options)
-        for sign in (1.0, -1.0)
+        _collect(curve, replace(point, tangent=sign * tangent), limits, options) for sign in (1.0, -1.0)
     )
     return along, back
 
@@ -255,7 +267,10 @@ def scaled_curve(
     options: StepOptions | None = None,
     describe: Callable[[float], str] = describe_value,
 ) -> ScaledCurve:
-    """The equations with their scales, checked; arguments as for :func:`continue_curve`."""
+    """The equations over their scales and the sizes that the rows of their derivative have at the start.
+
+    Arguments as for :func:`continue_curve`.
+    """
     options = options or StepOptions()
     low, high = _checked_limits(limits)
     unit = high - low if unit is None else unit
@@ -265,32 +280,16 @@ def scaled_curve(
     curve = ScaledCurve(
         evaluate, scale, float(unit), options.tolerance, options.max_iterations, describe=describe
     )
-    return _with_rows(curve, curve.scaled(start, parameter))
-
-
-def start_point(curve: ScaledCurve, start, parameter: float, *, limits, direction: int = 1) -> CurvePoint:
-    """Corrected point at the parameter; the tangent goes with ``direction``."""
-    if not limits[0] <= parameter <= limits[1]:
-        raise CaseError(
-            f"the start at {curve.describe(parameter)} lies outside the range", code="E-RANGE",
-            limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
-        )  # fmt: skip
-    axis = np.zeros(len(curve.scale) + 1)
-    axis[-1] = 1.0
     try:
-        return correct(curve, curve.scaled(start, parameter), axis, along=np.sign(direction) * axis)
+        size = np.abs(curve.equations(curve.scaled(start, parameter))[1]).max(axis=1)
     except LostError as error:
-        raise ConvergenceError(
-            f"no solution found near the start at {curve.describe(parameter)}: {error}", code="E-START",
-            remedy="give a better start, or start away from a limit point",
-        ) from error  # fmt: skip
+        raise ConvergenceError(f"the start cannot be used: {error}", code="E-START") from error
+    # in a branch point all of one equation may vanish
+    return replace(curve, rows=np.where(size > 0.0, size, size.max() or 1.0))
 
 
-def collect(curve: ScaledCurve, first: CurvePoint, *, limits, options: StepOptions | None = None) -> Curve:
-    """The whole curve from a corrected point in the sense of its tangent.
-
-    ``first`` has orientation zero where it is a branch point.
-    """
+def _collect(curve: ScaledCurve, first: CurvePoint, limits, options: StepOptions | None) -> Curve:
+    """The whole curve from a corrected point, of orientation zero in a branch point, along its tangent."""
     points, closed, complete, message = _walk(curve, first, limits, options or StepOptions())
     z = np.array([p.z for p in points])
     parameter = z[:, -1] * curve.unit
@@ -351,16 +350,6 @@ def _checked_limits(limits) -> tuple[float, float]:
             remedy="give limits=(low, high) of the parameter",
         )  # fmt: skip
     return low, high
-
-
-def _with_rows(curve: ScaledCurve, z: np.ndarray) -> ScaledCurve:
-    """The same equations over the sizes that the rows of their derivative have at z."""
-    try:
-        size = np.abs(curve.equations(z)[1]).max(axis=1)
-    except LostError as error:
-        raise ConvergenceError(f"the start cannot be used: {error}", code="E-START") from error
-    # in a branch point all of one equation may vanish
-    return replace(curve, rows=np.where(size > 0.0, size, size.max() or 1.0))
 
 
 def _longest(point: CurvePoint, options: StepOptions) -> float:
@@ -445,13 +434,9 @@ def _at_bound(segment: Segment, low, high, bound: float):
     if low[1].z[-1] == bound:
         # the curve starts at the bound and leaves at once
         return low[0] + np.finfo(float).tiny, replace(low[1], kind="end")
-    known = {low[0]: low[1].z[-1] - bound, high[0]: high[1].z[-1] - bound}
-
-    def gap(h: float) -> float:
-        return known[h] if h in known else segment.at(h).z[-1] - bound
-
-    h = bracketed_root(gap, low[0], high[0], xtol=1e-13 * segment.length)
-    near = segment.at(h) if h not in known else (low if h == low[0] else high)[1]
+    ends, known = dict((low, high)), {h: point.z[-1] - bound for h, point in (low, high)}
+    h = bracketed_root(lambda h: segment.at(h).z[-1] - bound, known, xtol=1e-13 * segment.length)
+    near = ends[h] if h in ends else segment.at(h)
     try:
         exact = _at_parameter(segment.curve, near.z, bound, near.tangent)
         if np.linalg.norm(exact.z - near.z) < 1e-6 * segment.length:

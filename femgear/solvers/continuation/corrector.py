@@ -16,6 +16,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy import linalg
+from scipy.optimize import root_scalar
 
 from femgear.errors import FemgearError
 
@@ -136,8 +138,6 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     LostError
         No convergence, or a bordered matrix that is singular.
     """
-    from scipy import linalg
-
     z, lengths, contraction, factors = guess.copy(), [], 0.0, None
     residuals = []
     unit = np.zeros(len(z))
@@ -175,8 +175,6 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
 
 def factored(matrix: np.ndarray):
     """LU factors of a bordered matrix and the sign of its determinant."""
-    from scipy import linalg
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", linalg.LinAlgWarning)
         factors = linalg.lu_factor(matrix, check_finite=False)
@@ -254,11 +252,7 @@ def _check_sides(point: CurvePoint, new: CurvePoint) -> None:
 
 
 def _check_return(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
-    """Predict the old point from the new one: Newton's method must lead back to it.
-
-    Where a step jumped to a neighbouring curve, the way back misses the curve that it came from. The old
-    point is known, so one Newton step tells how the method contracts towards it.
-    """
+    """One Newton step from a prediction of the old point leads back to it, but from a neighbouring curve."""
     way = float(new.tangent @ (point.z - new.z))
     guess = new.z + way * new.tangent
     miss = np.linalg.norm(guess - point.z)
@@ -271,11 +265,10 @@ def _check_return(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> Non
 
 
 def _check_middle(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
-    """The curve passes near the middle of the cubic between both ends, with the tangent that it has there.
+    """The curve passes near the middle of the cubic between both ends, with the tangent by Simpson's rule.
 
-    Simpson's rule gives the chord from the tangents at both ends and in the middle. A curve that makes a
-    detour between two points, such as a resonance narrower than the step, is not near; two branch points in
-    one step show by the orientation between them.
+    A detour such as a resonance narrower than the step is not near; two branch points in one step show by the
+    orientation between them.
     """
     chord = new.z - point.z
     length = float(np.linalg.norm(chord))
@@ -293,8 +286,6 @@ def _check_middle(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> Non
 
 def _newton_step(curve: ScaledCurve, z: np.ndarray, normal: np.ndarray):
     """Newton step to subtract in the plane normal to a vector, tangent over that vector, sign."""
-    from scipy import linalg
-
     residual, derivative = curve.equations(z)
     factors, sign = factored(np.vstack([derivative, normal]))
     right = np.zeros((len(z), 2))
@@ -343,9 +334,9 @@ def folds(segment: Segment) -> list[tuple[float, CurvePoint]]:
     if inner is not None:
         ends.insert(1, (inner, segment.at(inner).tangent[-1]))
     found = []
-    for (low, before), (high, after) in pairwise(ends):
-        if before * after < 0.0 and abs(before) > _START:
-            h = _root(lambda h: segment.at(h).tangent[-1], low, high, before, after)
+    for low, high in pairwise(ends):
+        if low[1] * high[1] < 0.0 and abs(low[1]) > _START:
+            h = bracketed_root(lambda h: segment.at(h).tangent[-1], dict((low, high)), xtol=1e-13 * high[0])
             found.append((h, replace(segment.at(h), kind="fold")))
     return [(h, point) for h, point in found if h > _START * segment.length]
 
@@ -401,14 +392,8 @@ def _singular_place(tau, length: float, at_low: float, at_high: float) -> float:
     Rounding grows with one over tau, so that points very near the zero cannot be corrected to tolerance.
     """
     known = {0.0: at_low, length: at_high}
-
-    def value(h: float) -> float:
-        if h not in known:
-            known[h] = tau(h)
-        return known[h]
-
     try:
-        return bracketed_root(value, 0.0, length, xtol=1e-13 * length)
+        return bracketed_root(tau, known, xtol=1e-13 * length)
     except RoundingError:
         low = max(h for h in known if known[h] * at_low > 0.0)
         high = min(h for h in known if known[h] * at_high > 0.0)
@@ -430,10 +415,7 @@ def _check_smooth(segment: Segment, h: float) -> None:
 
 
 def _beside(segment: Segment, h: float, part: float):
-    """Places and points before and after the place h, as near as asked or as rounding allows.
-
-    The distance starts with a part of the segment.
-    """
+    """Places and points before and after the place h, a part of the segment away or as rounding allows."""
     while True:
         width = part * segment.length
         low, high = max(h - width, 0.0), min(h + width, segment.length)
@@ -456,18 +438,18 @@ def _on_both(segment: Segment, h: float) -> CurvePoint:
     return CurvePoint(z, tangent / np.linalg.norm(tangent), derivative, 0.0, 0, 0.0, error, "branch point")
 
 
-def _root(function, low: float, high: float, at_low: float, at_high: float) -> float:
-    if at_low == 0.0 or at_high == 0.0:
-        return low if at_low == 0.0 else high
-    known = {low: at_low, high: at_high}
-    return bracketed_root(lambda h: known.get(h) or function(h), low, high, xtol=1e-13 * high)
+def bracketed_root(function: Callable[[float], float], known: dict[float, float], *, xtol: float) -> float:
+    """Zero of a function between two places with ``known`` values of different sign, by Brent's method.
 
+    ``known`` collects all values.
+    """
 
-def bracketed_root(function: Callable[[float], float], low: float, high: float, *, xtol: float) -> float:
-    """Zero of a function between two places of different sign, by Brent's method."""
-    from scipy.optimize import root_scalar
+    def value(h: float) -> float:
+        if h not in known:
+            known[h] = function(h)
+        return known[h]
 
-    return root_scalar(function, bracket=(low, high), method="brentq", xtol=xtol, rtol=1e-14).root
+    return root_scalar(value, bracket=tuple(known), method="brentq", xtol=xtol, rtol=1e-14).root
 
 
 def crossing_tangent(curve: ScaledCurve, point: CurvePoint) -> np.ndarray:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.system import MechanicalSystem, Modes, Response, freeze
@@ -248,8 +249,6 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
     1997, sections 4.4 and 4.9); the left vectors are the rows of the inverse of the right ones, so that both
     are biorthonormal within multiple poles as well.
     """
-    from scipy import linalg
-
     square, real, rigid = _real_modes(system, mesh_stiffness)
     damping = real.T @ damping_matrix(system, speed) @ real
     m, elastic = int(np.count_nonzero(~rigid)), ~rigid
@@ -405,8 +404,6 @@ def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
 
     ``K + a M R R^T M`` is positive definite and gives the same answer for loads without work on R.
     """
-    from scipy import linalg
-
     carried = mass @ rigid
     loads = loads - carried @ (rigid.T @ loads)
     out = linalg.cho_solve(_held(mass, stiffness, rigid), loads)
@@ -429,8 +426,6 @@ def _spring_share(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
 
 def _eigen(mass, stiffness, count, max_frequency):
     """Eigenvalues and mass-normalised shapes that are asked for, and which of them are rigid."""
-    from scipy import linalg
-
     if count is not None and max_frequency is not None:
         raise CaseError("give the number of modes or the highest frequency, not both", code="E-MODES")
     n = len(mass)
@@ -481,8 +476,6 @@ def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
 
 def _refined_rigid(mass, stiffness, shape) -> np.ndarray:
     """Rigid modes cleaned of elastic parts, mass-orthonormal: twice ``x - (K + a M x x^T M)^-1 K x``."""
-    from scipy import linalg
-
     for _ in range(2):
         shape = shape - linalg.cho_solve(_held(mass, stiffness, shape), stiffness @ shape)
         lower = np.linalg.cholesky(shape.T @ mass @ shape)
@@ -492,8 +485,6 @@ def _refined_rigid(mass, stiffness, shape) -> np.ndarray:
 
 def _held(mass, stiffness, rigid):
     """Cholesky factor of ``K + a M R R^T M``: the elastic part as it is, rigid motions held by a spring a."""
-    from scipy import linalg
-
     carried = mass @ rigid
     # as soft as the softest coordinate: a stiff spring would drown soft couplings in its rounding
     own = np.diag(stiffness) / np.diag(mass)
@@ -573,8 +564,6 @@ def _damping_ratios(system: MechanicalSystem, shape, omega, damping_ratio) -> np
 
 def _real_modes(system: MechanicalSystem, mesh_stiffness):
     """``omega^2`` of any sign, mass-normalised shapes and which of them are rigid."""
-    from scipy import linalg
-
     stiffness = total_stiffness(replace(system, gyroscopic=None), mesh_stiffness)
     try:
         square, shape = linalg.eigh(stiffness, system.M)

@@ -22,6 +22,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg, optimize
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, gmres
 
 from femgear.errors import CaseError, ConvergenceError, checked_count
 from femgear.solvers.linear.receptance import Reduction, reduce_problem, source_columns
@@ -349,8 +351,6 @@ class LineTangent:
 
     def solve(self, error) -> np.ndarray | None:
         """``dR/dX^-1 error`` to three digits; None where GMRES does not get there."""
-        from scipy.sparse.linalg import gmres
-
         operator = _operator(len(error), lambda y: y + self.fixed_point(y))
         step, state = gmres(operator, error, rtol=_ACCURACY, restart=_PRODUCTS, maxiter=1)
         return None if state else step
@@ -371,8 +371,6 @@ def krylov_radius(tangent: LineTangent) -> float | None:
     Hundreds of lines far from any resonance have eigenvalues of nearly the same modulus: more digits would
     take ten times as many products.
     """
-    from scipy.sparse.linalg import ArpackError, eigs
-
     size = tangent.balance.size
     operator = _operator(size, tangent.fixed_point)
     # a fixed start: the same value every time
@@ -388,8 +386,6 @@ def krylov_radius(tangent: LineTangent) -> float | None:
 
 
 def _operator(size: int, product: Callable[[np.ndarray], np.ndarray]):
-    from scipy.sparse.linalg import LinearOperator
-
     return LinearOperator((size, size), matvec=product, dtype=float)  # type: ignore[call-arg]
 
 
@@ -446,8 +442,6 @@ def _beyond_reach(balance: HarmonicBalance) -> tuple[int, float, float, float] |
     None where some forces within the reach of all elements balance the load on the free motions: a linear
     programme that minimises what is left over. Of several columns the least forces are the wanted ones.
     """
-    from scipy import optimize
-
     strain, load = _free_balance(balance)
     columns = np.flatnonzero(np.abs(strain).max(axis=0, initial=0.0) > _UNSTRAINED)
     if not len(columns) or not np.any(load):
@@ -470,8 +464,6 @@ def _free_balance(balance: HarmonicBalance) -> tuple[np.ndarray, np.ndarray]:
 
     Rows have unit size; none for systems so large that the motions are not looked for.
     """
-    from scipy import linalg
-
     system, reference = balance.problem.system, balance.reduction.reference
     if len(system.M) > _MOST_DOFS:
         return np.zeros((0, len(reference))), np.zeros(0)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from femgear.errors import CaseError, FemgearError, checked_count, checked_tolerance
 from femgear.solvers.periodic.equations import harmonic_balance
@@ -260,8 +261,6 @@ def _without_free_motions(problem: NonlinearSystem, monodromy: np.ndarray) -> tu
 
     With it the number of free motions left in it, whose velocities damping feels.
     """
-    from scipy import linalg
-
     system, n = problem.system, len(problem.system.M)
     root = np.linalg.cholesky(system.M)
 

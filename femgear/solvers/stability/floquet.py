@@ -14,6 +14,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import linalg
+from scipy.linalg import expm
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.periodic.solution import (
@@ -61,8 +63,6 @@ def monodromy(matrices, durations) -> np.ndarray:
     (..., n, n) array
         ``expm(A_last dt_last) ... expm(A_0 dt_0)``; its eigenvalues are the Floquet multipliers.
     """
-    from scipy.linalg import expm
-
     matrices, durations = np.asarray(matrices, dtype=float), np.asarray(durations, dtype=float)
     if matrices.ndim < 3 or durations.shape != matrices.shape[:-2] or np.any(durations <= 0.0):
         raise CaseError("every matrix needs one positive duration", code="E-SHAPE", key="durations")
@@ -164,8 +164,6 @@ def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
     positions are one, those of their velocities follow from `Frame.drift`. Modes left out leave their static
     flexibility.
     """
-    from scipy import linalg
-
     system, reference = problem.system, np.maximum(problem.reference, 0.0)
     stiffness = system.K + (system.W * reference) @ system.W.T
     count = min(int(modes), len(stiffness))
@@ -251,8 +249,6 @@ def passage(
 
 def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:
     """``W^T K^+ W`` without the part of the modes kept; rigid motions that no column feels are held."""
-    from scipy import linalg
-
     system = problem.system
     carried = system.M @ rigid
     weight = np.trace(stiffness) / np.trace(system.M)
@@ -350,8 +346,6 @@ def _modal_drift(frame: Frame, scale, durations):
 
 def _coupled_drift(frame: Frame, scale, durations):
     """As :func:`_modal_drift` for damping and gyroscopic terms that couple the modes."""
-    from scipy.linalg import expm
-
     both = np.concatenate([np.ones_like(scale), scale])
     matrix = frame.state_matrices(np.zeros((len(frame.rows),) * 2)) * both / both[:, None]
     values, where = np.unique(durations, return_inverse=True)

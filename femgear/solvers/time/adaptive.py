@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, is_dataclass, replace
 
 import numpy as np
+from scipy import integrate, linalg
+from scipy.optimize import root_scalar
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error
@@ -126,8 +128,6 @@ class Flow:
 
 def flow(problem: NonlinearSystem, frequency, *, variational=False) -> Flow:
     """First-order form of a problem; M is factorised once."""
-    from scipy import linalg
-
     system, n = problem.system, len(problem.system.M)
     frequency = np.atleast_1d(np.asarray(frequency, float))
     loads = np.stack([system.load.astype(complex), *(f.force for f in problem.forces)])
@@ -300,8 +300,6 @@ def _smooth_pieces(motion: Flow, law: Contacts, y, t, stop, small, method, toler
 
 
 def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
-    from scipy import integrate
-
     if method not in METHODS or (motion.variational and method != "DOP853"):
         raise CaseError(f"no integrator {method}", code="E-CHOICE", limit=", ".join(METHODS))
     options = {"rtol": max(tolerance, 3e-14), "atol": atol}
@@ -314,8 +312,6 @@ def _solver(motion, law, t, y, stop, method, tolerance, atol, first):
 
 def _first_change(motion: Flow, law: Contacts, dense, t0, t1, small):
     """Instant of the first contact change in a step and the switches that change, or the end and None."""
-    from scipy.optimize import root_scalar
-
     times = np.linspace(t0, t1, _SAMPLES + 1)
     gaps = _gaps(motion, law, dense, times)
     wrong = gaps[1:] < 0.0

@@ -25,7 +25,8 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import get_lapack_funcs
+from scipy import linalg
+from scipy.linalg import expm, get_lapack_funcs
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error, output_load, residual_output, solve_modes
@@ -136,8 +137,6 @@ class RuleScheme:
 
     def start(self, q, v, theta, law):
         """State with the acceleration that the equation of motion asks for, and the column forces."""
-        from scipy import linalg
-
         system = self.problem.system
         g, _ = law(0, self.rows @ q)
         force = (
@@ -203,8 +202,6 @@ def rule_scheme(problem: NonlinearSystem, rule: StepRule, step: float) -> RuleSc
     ConvergenceError
         The matrix is singular.
     """
-    from scipy import linalg
-
     system, part = problem.system, 1.0 - rule.force
     stiffness, damping = problem.stiffness, problem.damping
     matrix = (1.0 - rule.mass) * system.M + part * step * (
@@ -366,8 +363,6 @@ def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.n
     transition (m, 2, 2), first (m, 2), last (m, 2) arrays
         ``state_1 = transition state_0 + first p_0 + last p_1``.
     """
-    from scipy.linalg import expm
-
     natural = np.asarray(natural, float)
     turn, scale = natural * step, np.array([1.0, 1.0 / step])
     matrix = np.zeros((len(natural), 4, 4))
@@ -382,8 +377,6 @@ def step_matrices(natural, damping_ratio, step: float) -> tuple[np.ndarray, np.n
 
 def highest_frequency(problem: NonlinearSystem, mesh_stiffness) -> float:
     """Largest undamped natural frequency [rad/s] with the given stiffnesses of the columns."""
-    from scipy import linalg
-
     system, n = problem.system, len(problem.system.M)
     total = system.K + (system.W * mesh_stiffness) @ system.W.T
     try:
