@@ -11,13 +11,13 @@ from femgear.solvers.time import adaptive
 from femgear.solvers.time.adaptive import checked_start, motion_scale
 from femgear.solvers.time.steps import (
     RULES,
+    ModalScheme,
+    RuleScheme,
     Scheme,
     StepRule,
     generalised_alpha,
     highest_frequency,
     march_times,
-    modal_scheme,
-    rule_scheme,
     stability_limit,
 )
 from femgear.system.elements import GearMeshes, PiecewiseSprings
@@ -189,8 +189,8 @@ def step_scheme(
     rule = RULES.get(method) or (made[method]() if method in made else None)
     number, step = _steps(problem, np.atleast_1d(frequency), rule, span, step)
     if rule is None:
-        return modal_scheme(problem, step, count=count), number
-    return rule_scheme(problem, rule, step), number
+        return ModalScheme(problem, step, count=count), number
+    return RuleScheme(problem, rule, step), number
 
 
 def column_stiffness(problem: NonlinearSystem, frequency) -> np.ndarray:
