@@ -360,12 +360,12 @@ def distinct_lines(orders) -> np.ndarray:
     """
     orders = np.atleast_2d(np.array(orders, int))
     orders = np.vstack([np.zeros_like(orders[:1]), orders])
-    orders = np.unique(orders * mirror_sign(orders)[:, None], axis=0)
+    orders = np.unique(orders * _mirror_sign(orders)[:, None], axis=0)
     size = np.abs(orders).sum(axis=1)
     return orders[np.lexsort((*orders.T, size))]
 
 
-def mirror_sign(orders: np.ndarray) -> np.ndarray:
+def _mirror_sign(orders: np.ndarray) -> np.ndarray:
     """Sign (L,) of the last order of every line that is not zero; 1 for the mean."""
     last: np.ndarray = np.zeros(len(orders), int)
     for column in orders.T:
@@ -391,7 +391,7 @@ def checked_lines(orders) -> np.ndarray:
             f"the first line has the orders {array[0].tolist()}", code="E-HARMONICS", limit="zeros: the mean",
             remedy="build the lines with harmonic_lines, side_bands or distinct_lines",
         )  # fmt: skip
-    unique, count = np.unique(array * mirror_sign(array)[:, None], axis=0, return_counts=True)
+    unique, count = np.unique(array * _mirror_sign(array)[:, None], axis=0, return_counts=True)
     if np.any(count > 1):
         raise CaseError(
             f"the line {unique[count > 1][0].tolist()} or its mirror image is there twice",

@@ -126,7 +126,7 @@ class RigidSet:
         for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
             self._keep(name, self._per_planet(name))
         for name in (*CENTRAL, "planet"):
-            check_body(name, getattr(self, name))
+            _check_body(name, getattr(self, name))
         check_set(self)
 
     @property
@@ -333,7 +333,7 @@ class HelicalBody:
     support: HelicalSupport = field(default_factory=HelicalSupport)
 
     def __post_init__(self):
-        check_body("body", self)
+        _check_body("body", self)
 
     @property
     def stiffness(self) -> np.ndarray:
@@ -458,7 +458,7 @@ def check_set(data: RigidSet) -> None:
         data.refuse("planet_angles", psi.tolist(), "rad", allowed, remedy=remedy)
 
 
-def check_body(name: str, body: PlanarBody | HelicalBody) -> None:
+def _check_body(name: str, body: PlanarBody | HelicalBody) -> None:
     """Refuse a mass, inertia or support."""
     code = "E-RANGE"
     for entry, unit in (("mass", "kg"), ("inertia", "kg m^2"), ("diametral_inertia", "kg m^2")):

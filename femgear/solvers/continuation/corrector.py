@@ -45,7 +45,7 @@ class LostError(Exception):
     """A correction that did not succeed; the reason is its text."""
 
 
-class RoundingError(LostError):
+class _RoundingError(LostError):
     """A correction that came near a solution, but whose last steps are rounding: it is nearly singular."""
 
 
@@ -237,7 +237,7 @@ def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
 
 def _failed(residuals: list[float]) -> type[LostError]:
     """Kind of a failure: the last steps began where the equations hold to rounding, or not."""
-    return RoundingError if max(residuals[-2:]) <= _ROUNDING else LostError
+    return _RoundingError if max(residuals[-2:]) <= _ROUNDING else LostError
 
 
 def _check_sides(point: CurvePoint, new: CurvePoint) -> None:
@@ -394,7 +394,7 @@ def _singular_place(tau, length: float, at_low: float, at_high: float) -> float:
     known = {0.0: at_low, length: at_high}
     try:
         return bracketed_root(tau, known, xtol=1e-13 * length)
-    except RoundingError:
+    except _RoundingError:
         low = max(h for h in known if known[h] * at_low > 0.0)
         high = min(h for h in known if known[h] * at_high > 0.0)
         if high < low:
@@ -421,7 +421,7 @@ def _beside(segment: Segment, h: float, part: float):
         low, high = max(h - width, 0.0), min(h + width, segment.length)
         try:
             return low, high, segment.at(low), _turned(segment, high)
-        except RoundingError:
+        except _RoundingError:
             part *= 4.0
             if part > 1.0:
                 raise

@@ -162,11 +162,9 @@ def track_modes(
         Fewer modes at a value than are followed (E-MODES).
     """
     values = np.asarray(values, float)
-    if (
-        values.ndim != 1
-        or len(values) < 2
-        or not (np.all(np.diff(values) > 0) or np.all(np.diff(values) < 0))
-    ):
+    steps = np.diff(np.ravel(values))
+    monotonic = np.all(steps > 0) or np.all(steps < 0)
+    if values.ndim != 1 or len(values) < 2 or not monotonic:
         raise CaseError("parameter values must ascend or descend", code="E-RANGE", limit="two or more")
     root = np.linalg.cholesky(np.asarray(mass, float)).T
     first = _solved(family, float(values[0]), root)

@@ -21,7 +21,7 @@ _CONTACT_SAMPLES = ((128, 2048), (8, 64))
 
 
 @dataclass(frozen=True)
-class GridSeries:
+class _GridSeries:
     """Coefficients on a fixed grid of phases: ``values`` (N, n), their ``mean`` (n,) and their orders."""
 
     values: np.ndarray
@@ -164,7 +164,7 @@ def on_grid(element: Element, theta: np.ndarray) -> Element:
         if hasattr(getattr(element, item.name), "at") and hasattr(getattr(element, item.name), "orders")
     }
     fixed = {
-        name: GridSeries(np.ascontiguousarray(value.at(theta)), value.mean, value.orders)
+        name: _GridSeries(np.ascontiguousarray(value.at(theta)), value.mean, value.orders)
         for name, value in series.items()
     }
     return replace(element, **fixed) if fixed else element

@@ -274,11 +274,7 @@ def _extrapolated(table, found):
 
 
 def _steps(breaks: list[np.ndarray], base: int, level: int) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and durations (p, s) of steps, in parts of the period, that end at the breaks.
-
-    Every piece between breaks has its share of ``base`` steps, each halved ``level`` times; rows that have
-    fewer are filled up with steps of no duration.
-    """
+    """Starts and durations (p, s), over the period, of ``base 2^level`` steps or more that end at breaks."""
     rows = []
     for inner in breaks:
         ends = np.concatenate([[0.0], inner, [1.0]])
@@ -288,6 +284,7 @@ def _steps(breaks: list[np.ndarray], base: int, level: int) -> tuple[np.ndarray,
         number = np.concatenate([np.arange(m) for m in each])
         rows.append((np.repeat(ends[:-1], each) + duration * number, duration))
     longest = max(len(duration) for _, duration in rows)
+    # rows that have fewer are filled up with steps of no duration
     out = np.zeros((2, len(rows), longest))
     out[0] = 1.0
     for i, (start, duration) in enumerate(rows):
@@ -461,14 +458,13 @@ def tangents_of(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution])
     return tangents
 
 
-def hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:
-    """Floquet exponents (2 n,) [1/s] by Hill's method.
+def _hill_exponents(frame: Frame, kappa: np.ndarray, omega: float, *, harmonics: int) -> np.ndarray:
+    """Floquet exponents (2 n,) [1/s] from the stiffness changes kappa (samples, n_c, n_c) [N/m].
 
     ``z = exp(lambda t) sum_h z_h exp(i h omega t)`` in the first-order form gives the eigenvalues of the
     block Toeplitz matrix ``A_(h - m) - i h omega``. Of every exponent it holds copies ``lambda + i k omega``;
     those with the most symmetric eigenvectors are the converged ones (Moore, SIAM J. Numer. Anal. 42, 2005):
-    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each. ``kappa``
-    (samples, n_c, n_c) is the change of stiffness from the reference over one period [N/m].
+    the smallest distance of the centre ``sum h |z_h|^2 / sum |z_h|^2`` from zero, one copy of each.
     """
     n, orders = len(frame.square), np.arange(-harmonics, harmonics + 1)
     lines = np.fft.fft(kappa, axis=0) / len(kappa)
@@ -570,7 +566,7 @@ def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int |
     samples = max(512, 16 * count)
     fraction = np.arange(samples)[None] / samples
     kappa = frame.kappa(tangents_of(problem, [solution])(fraction, np.array([0]))[0])
-    exponents = hill_exponents(frame, kappa, omega, harmonics=count)
+    exponents = _hill_exponents(frame, kappa, omega, harmonics=count)
     period = 2.0 * np.pi / omega
     return verdict_of(np.exp(exponents * period), period, "Hill", np.nan, np.inf, **_free(frame))
 

@@ -179,7 +179,7 @@ def trajectory(
         atol.reshape(2 * motion.size, -1)[:, 1:] = tolerance
     small = _TOGETHER * max(abs(begin), abs(end), 1.0 / motion.rate)
     while t < end:
-        stop = min(next_break(steps, t), end)
+        stop = min(_next_break(steps, t), end)
         stop = end if end - stop <= small else stop
         if stop - t <= small:
             t = stop
@@ -339,7 +339,7 @@ def _gaps(motion: Flow, law: Contacts, dense, times):
 
 
 @dataclass(frozen=True)
-class SharpMeshes:
+class _SharpMeshes:
     """Separating gear meshes without smoothing; ``k``, deflection and force come from one series, (3, g)."""
 
     columns: np.ndarray
@@ -372,22 +372,22 @@ class SharpMeshes:
         return (line * drive + behind * back)[:, None], (k * (drive + back))[:, None, None]
 
 
-Piece = Element | GearMeshes | SharpMeshes
+Piece = Element | GearMeshes | _SharpMeshes
 
 
 def _sharp(element: Element) -> Piece:
-    """Gear meshes as `SharpMeshes` where those say the same, else the element itself."""
+    """Gear meshes as `_SharpMeshes` where those say the same, else the element itself."""
     if type(element) is not GearMeshes or not element.separates or element.smoothing:
         return element
     has_back = np.isfinite(element.backlash)
     backlash = np.where(has_back, element.backlash, 0.0)
-    return SharpMeshes(element.columns, _coefficients(element), backlash, has_back)
+    return _SharpMeshes(element.columns, _coefficients(element), backlash, has_back)
 
 
 def switches(element: Piece, x, theta) -> np.ndarray:
     """Arguments (..., m) of the positive parts of an element at deflections x (..., g, d); none if smooth."""
     x = np.asarray(x, float)
-    if isinstance(element, SharpMeshes):
+    if isinstance(element, _SharpMeshes):
         return element.switches(x, theta)
     if isinstance(element, PiecewiseSprings) and not element.smoothing:
         return (x - element.breaks).reshape(*x.shape[:-2], -1)
@@ -406,7 +406,7 @@ def frozen(element: Piece, x, theta, closed) -> tuple[np.ndarray, np.ndarray]:
     """Forces (g, d) and tangents (g, d, d) of an element whose switches are closed as given, one instant."""
     if not len(closed):
         return element.evaluate(x, theta)
-    if isinstance(element, SharpMeshes):
+    if isinstance(element, _SharpMeshes):
         return element.frozen(x, theta, closed)
     groups = len(element.columns)
     closed = closed.reshape(groups, -1)
@@ -493,7 +493,7 @@ def stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, float
     return found
 
 
-def next_break(steps, time: float) -> float:
+def _next_break(steps, time: float) -> float:
     """First instant after ``time`` at which a step series changes; infinite when none does."""
     best = np.inf
     for breaks, rate in steps:
