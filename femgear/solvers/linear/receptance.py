@@ -450,5 +450,6 @@ def _superposed(gain: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.nda
 
 
 def _resonance(where: str, remedy="give the motion some damping or move the frequency") -> ConvergenceError:
-    words = f"undamped resonance {where}: infinite response"
-    return ConvergenceError(words, code="E-RESONANCE", remedy=remedy)
+    return ConvergenceError(
+        f"undamped resonance {where}: infinite response", code="E-RESONANCE", remedy=remedy
+    )

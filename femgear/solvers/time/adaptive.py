@@ -229,16 +229,15 @@ def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.
     n = len(problem.system.M)
     if start is None:
         return np.zeros(n), np.zeros(n)
-    found = "no pair of lists of numbers"
     try:
         q, v = (np.array(part, float) for part in start)
     except (TypeError, ValueError):
-        pass
+        found = "no pair of lists of numbers"
     else:
-        if q.shape == v.shape == (n,) and np.all(np.isfinite([q, v])):
+        finite = np.all(np.isfinite(q)) and np.all(np.isfinite(v))
+        if q.shape == v.shape == (n,) and finite:
             return q, v
-        found = f"shapes {q.shape} and {v.shape}"
-        found += ", not all finite" if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))) else ""
+        found = f"shapes {q.shape} and {v.shape}" + ("" if finite else ", not all finite")
     raise CaseError(
         f"a start of {found} for {n} degrees of freedom", code="E-START", key="start",
         limit=f"finite displacements [m] and velocities [m/s], each of shape ({n},)",
