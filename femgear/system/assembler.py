@@ -32,6 +32,7 @@ from femgear.system.rigid_bodies import (
     RigidSet,
     body_masses,
     flank_sign,
+    refuse,
     torque_load,
 )
 from femgear.system.system import MechanicalSystem, MeshExcitation, gear_meshes
@@ -133,9 +134,9 @@ def gear_set_system(
         bearing (E-BEARING), a carrier speed or bearings of bodies that move in space (E-RANGE).
     """
     if len(data.axes) > 3 and carrier_speed:
-        data.refuse("carrier_speed", carrier_speed, "rad/s", "0 of bodies that move in space")
+        refuse("carrier_speed", carrier_speed, "rad/s", "0 of bodies that move in space")
     if len(data.axes) > 3 and bearings:
-        data.refuse("bearings", tuple(bearings), "", "none of bodies that move in space")
+        refuse("bearings", tuple(bearings), "", "none of bodies that move in space")
     T, flank, kept = free_motions(data), flank_sign(data, torque), _kept(data)
     if not T.shape[1]:
         raise CaseError(
