@@ -415,8 +415,8 @@ def line_tail(amplitudes: np.ndarray, orders: np.ndarray, *, rounding: float = _
     return float(np.sqrt(energy[size > 0.5 * size.max()].sum() / total)) if total > still else 0.0
 
 
-def coinciding_lines(orders: np.ndarray, frequency) -> tuple[int, int] | None:
-    """The first two lines whose frequencies agree to 1e-9 of the highest line, or none.
+def coincidence_note(orders: np.ndarray, frequency) -> str:
+    """What to know of a solution in which two lines have one frequency; empty where none have.
 
     Parameters
     ----------
@@ -425,22 +425,13 @@ def coinciding_lines(orders: np.ndarray, frequency) -> tuple[int, int] | None:
         [rad/s]; with a single base frequency no two lines coincide.
     """
     if orders.shape[1] < 2:
-        return None
+        return ""
     size = np.abs(orders @ np.asarray(frequency, float))
     along = np.argsort(size, kind="stable")
     near = np.flatnonzero(np.diff(size[along]) <= _COINCIDE * size.max())
     if not len(near):
-        return None
-    one, other = sorted(along[near[0] : near[0] + 2].tolist())
-    return one, other
-
-
-def coincidence_note(orders: np.ndarray, frequency) -> str:
-    """What to know of a solution in which two lines have one frequency; empty where none have."""
-    found = coinciding_lines(orders, frequency)
-    if found is None:
         return ""
-    one, other = (orders[line].tolist() for line in found)
+    one, other = orders[np.sort(along[near[0] : near[0] + 2])].tolist()
     return (
         f" Lines {one} and {other} have one frequency: only their sum is an amplitude, and its split, as of "
         "phases that are independent, converges slowly; take one base frequency and multiply the orders."

@@ -85,11 +85,6 @@ class ComplexModes:
         return np.abs(self.eigenvalue) / (2.0 * np.pi)
 
     @property
-    def damped_frequency(self) -> np.ndarray:
-        """``Im lambda / 2 pi`` (p,) [Hz]; zero for real poles."""
-        return self.eigenvalue.imag / (2.0 * np.pi)
-
-    @property
     def damping_ratio(self) -> np.ndarray:
         """``-Re lambda / |lambda|`` (p,): negative where motions grow, +-1 for real poles, 0 if rigid."""
         return np.where(

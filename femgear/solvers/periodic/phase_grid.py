@@ -6,13 +6,13 @@ phases (Kim and Choi, J. Vib. Acoust. 119 (1997) 107).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 
 import numpy as np
 from scipy.fft import irfftn, next_fast_len, rfftn
 
 from femgear.errors import CaseError
-from femgear.system.elements import Element, GearMeshes, PolynomialSprings
+from femgear.system.elements import Element, GearMeshes, PolynomialSprings, coefficients_of
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import NonlinearSystem
 
@@ -156,18 +156,11 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
 
 def on_grid(element: Element, theta: np.ndarray) -> Element:
     """The element with its periodic coefficients evaluated once at the phases ``theta`` (N, n_bases)."""
-    if not is_dataclass(element):
-        return element
-    series = {
-        item.name: getattr(element, item.name)
-        for item in fields(element)
-        if hasattr(getattr(element, item.name), "at") and hasattr(getattr(element, item.name), "orders")
-    }
     fixed = {
         name: _GridSeries(np.ascontiguousarray(value.at(theta)), value.mean, value.orders)
-        for name, value in series.items()
+        for name, value in coefficients_of(element).items()
     }
-    return replace(element, **fixed) if fixed else element
+    return replace(element, **fixed) if fixed and is_dataclass(element) else element
 
 
 def coupled_pairs(elements: tuple[Element, ...]) -> np.ndarray:
@@ -235,10 +228,7 @@ def _degree(element: Element) -> int | None:
 def _series_content(element: Element, bases: int) -> np.ndarray | None:
     """Highest order along every base in the element's coefficients; none where one of them jumps."""
     top = np.zeros(bases, int)
-    values = [getattr(element, item.name) for item in fields(element)] if is_dataclass(element) else []
-    for series in values:
-        if not (hasattr(series, "at") and hasattr(series, "orders")):
-            continue
+    for series in coefficients_of(element).values():
         if not isinstance(series, FourierSeries):
             return None
         orders = np.abs(np.array((*series.orders, *[0] * bases))[:bases])

@@ -20,7 +20,13 @@ from scipy.optimize import root_scalar
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import mass_error
-from femgear.system.elements import Element, GearMeshes, PiecewiseSprings, RadialBearings
+from femgear.system.elements import (
+    Element,
+    GearMeshes,
+    PiecewiseSprings,
+    RadialBearings,
+    coefficients_of,
+)
 from femgear.system.fourier import FourierSeries, StepSeries, constant, phase_of
 from femgear.system.system import NonlinearSystem
 
@@ -482,7 +488,7 @@ def stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, float
     """Breaks (fractions) and repetition rate [1/s] of every step series of the elements."""
     found = []
     for element in problem.elements:
-        for series in vars(element).values():
+        for series in coefficients_of(element).values():
             if isinstance(series, StepSeries) and len(series.breaks) > 1:
                 rate = float(phase_of(frequency, series.orders)) / (2.0 * np.pi)
                 if rate < 0.0:
@@ -509,7 +515,7 @@ def held(problem: NonlinearSystem, theta) -> NonlinearSystem:
     for element in problem.elements:
         changed = {
             name: constant(series.at(theta))
-            for name, series in vars(element).items()
+            for name, series in coefficients_of(element).items()
             if isinstance(series, StepSeries)
         }
         elements.append(replace(element, **changed) if changed and is_dataclass(element) else element)

@@ -170,7 +170,6 @@ class RuleScheme:
         return np.real(mixed.T @ self.forces)
 
     def free(self, state, g, load):
-        """(q, v, a) at the end of the step without the column forces there."""
         both = self.predictor @ state
         acceleration = load - self.balance @ both[3:].ravel()
         if self.rule.force:
@@ -178,19 +177,15 @@ class RuleScheme:
         return both[:3] + self.weights * acceleration
 
     def deflection(self, state, load):
-        """Columns (n_c,)."""
         return self.rows @ state[0]
 
     def finish(self, state, g):
-        """(q, v, a) at the end of the step."""
         return state - (self.drawn @ g).reshape(state.shape)
 
     def columns(self, states, g, theta):
-        """(..., n_c)."""
         return states[..., 0, :] @ self.rows.T
 
     def motion(self, states, g, theta):
-        """Displacements, velocities and accelerations (n, dofs)."""
         return states[:, 0], states[:, 1], states[:, 2]
 
     def local_error(self, states, g):
@@ -270,7 +265,6 @@ class ModalScheme:
         return np.hstack([push.reshape(len(push), -1), static])
 
     def free(self, state, g, load):
-        """(y, v) at the end of the step without the column forces there."""
         out = (self.transition * state).sum(axis=1)
         out -= (self.pushed @ g).reshape(out.shape)
         out += load[: out.size].reshape(out.shape)
@@ -281,11 +275,9 @@ class ModalScheme:
         return self.rows @ state[0] + load[state.size :]
 
     def finish(self, state, g):
-        """(y, v) at the end of the step."""
         return state - (self.drawn @ g).reshape(state.shape)
 
     def columns(self, states, g, theta):
-        """(..., n_c)."""
         own = self.problem.system.W.T @ self.residual
         return states[..., 0, :] @ self.rows.T - g @ own + np.real(self._waves(theta) @ self.static_columns)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.system.assembler import free_motions, mesh_directions, mesh_names, pin_directions
+from femgear.system.mode_kinds import SetMotions
 from femgear.system.rigid_bodies import CENTRAL, ROTATIONS, RigidSet
 
 # Strain energy relative to the sum of the absolute terms below which a motion has none.
@@ -143,3 +144,12 @@ def motion_planes(dofs: Sequence[str]) -> np.ndarray:
             if axis == first and (partner := place.get(f"{body}: {second}")) is not None:
                 planes.append((i, partner))
     return np.array(planes, int).reshape(-1, 2)
+
+
+def signed_phase_shares(motions: SetMotions) -> np.ndarray:
+    """Shares (N, m) of the harmonics ``exp(i j psi_n)`` in the kinetic energy of equally spaced planets.
+
+    They tell harmonic j from N - j; real shapes hold equal parts of both.
+    """
+    energy = (np.abs(np.fft.fft(motions.weighted, axis=0)) ** 2).sum(axis=1)
+    return energy / (np.abs(motions.weighted) ** 2).sum(axis=(0, 1)) / len(energy)
