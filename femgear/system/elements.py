@@ -419,9 +419,7 @@ def coefficients_of(element: Element) -> dict[str, Series]:
     }
 
 
-def tangent_jumps(
-    tangents: Callable[..., np.ndarray], states: np.ndarray, *, intervals: int = _INTERVALS
-) -> list[np.ndarray]:
+def tangent_jumps(tangents: Callable[..., np.ndarray], states: np.ndarray) -> list[np.ndarray]:
     """Fractions of the period, for every state, at which its tangents jump; ascending, zero left out.
 
     Tangents at equidistant instants; an interval whose change is unlike that of its neighbours is halved
@@ -433,13 +431,11 @@ def tangent_jumps(
     tangents : callable
         ``(fraction (m, s), states (m,)) -> (m, s, n, n)``, periodic in the fraction.
     states : (m,) int array
-    intervals : int
-        Number of equal intervals of the period.
     """
     states = np.asarray(states)
-    nodes = (np.arange(-1, intervals + 3) - 0.5) / intervals
+    nodes = (np.arange(-1, _INTERVALS + 3) - 0.5) / _INTERVALS
     # one interval more on both sides, for the neighbours
-    known = tangents(np.broadcast_to(nodes[1:-2], (len(states), intervals + 1)), states)
+    known = tangents(np.broadcast_to(nodes[1:-2], (len(states), _INTERVALS + 1)), states)
     size = np.abs(known).max(axis=(1, 2, 3), initial=0.0)
     change = np.diff(known, axis=1)
     around = 0.5 * (np.roll(change, 1, axis=1) + np.roll(change, -1, axis=1))

@@ -5,7 +5,8 @@ from femgear.solvers import lazy_names
 __all__, __getattr__ = lazy_names(
     __name__,
     {
-        "arclength": ["StepOptions", "continue_curve"],
+        "arclength": ["continue_curve"],
+        "corrector": ["StepOptions"],
         "branches": [
             "Branch",
             "CurveOptions",

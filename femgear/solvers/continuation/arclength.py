@@ -20,6 +20,7 @@ from femgear.solvers.continuation.corrector import (
     LostError,
     ScaledCurve,
     Segment,
+    StepOptions,
     bracketed_root,
     branch_point,
     check_step,
@@ -41,59 +42,6 @@ _CORNER, _CORNER_LARGEST = 1e-3, 0.1
 _SHARP = 0.02
 # Largest step over its option, a unit of the scaled unknowns, where they are large.
 _RELATIVE = 0.1
-# Largest options: the chord is compared with the mean of two tangents, and Newton's method must contract.
-_MOST_ANGLE, _MOST_CONTRACTION = 0.5, 0.25
-
-
-@dataclass(frozen=True)
-class StepOptions:
-    """How a curve is followed; lengths are in the scaled unknowns ``(u / scale, parameter / unit)``.
-
-    Parameters
-    ----------
-    first, smallest, largest : float
-        Step lengths; where the scaled unknowns exceed ten, the largest is that many tenths longer.
-    angle : float
-        Angle between successive tangents that is aimed at [rad], up to 0.5; twice as much is refused.
-    contraction : float
-        Ratio of the second to the first Newton step, both with the first derivative, aimed at
-        (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 5.1), up to 0.25; it sets the next
-        step.
-    tolerance : float
-        Last Newton step relative to ``1 + |z|``.
-    max_iterations : int
-        Newton iterations of one correction.
-    max_points : int
-        The curve ends, incomplete, after so many points.
-    """
-
-    first: float = 0.01
-    smallest: float = 1e-8
-    largest: float = 0.1
-    angle: float = 0.15
-    contraction: float = 0.0625
-    tolerance: float = 1e-10
-    max_iterations: int = 10
-    max_points: int = 5000
-
-    def __post_init__(self):
-        if not 0.0 < self.smallest <= self.first or not self.smallest <= self.largest < np.inf:
-            raise CaseError(
-                f"steps from {self.smallest} over {self.first} to {self.largest}", code="E-RANGE",
-                limit="0 < smallest <= first, smallest <= largest",
-            )  # fmt: skip
-        if min(self.angle, self.contraction, self.tolerance, self.max_iterations - 1, self.max_points) <= 0:
-            raise CaseError(
-                "a step option is not positive", code="E-RANGE", limit="> 0; two iterations or more"
-            )
-        for name, bound in (("angle", _MOST_ANGLE), ("contraction", _MOST_CONTRACTION)):
-            value = getattr(self, name)
-            if not value <= bound:
-                raise CaseError(
-                    f"the step option {name} is {value}", code="E-RANGE", key=name, value=value,
-                    limit=f"up to {bound}: beyond, a jump to another curve may look like a step",
-                    remedy="lengthen the steps by largest instead",
-                )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -199,7 +147,7 @@ def continue_curve(
             f"no solution found near the start at {describe(parameter)}: {error}", code="E-START",
             remedy="give a better start, or start away from a limit point",
         ) from error  # fmt: skip
-    return _collect(curve, first, limits, options)
+    return _collect(curve, first)
 
 
 def switch_branch(
@@ -250,9 +198,7 @@ def switch_branch(
             f"no other curve found at {describe(float(known.parameter[index]))}: {error}",
             code="E-CONVERGENCE", remedy="disturb the symmetry of the system a little",
         ) from error  # fmt: skip
-    along, back = (
-        _collect(curve, replace(point, tangent=sign * tangent), limits, options) for sign in (1.0, -1.0)
-    )
+    along, back = (_collect(curve, replace(point, tangent=sign * tangent)) for sign in (1.0, -1.0))
     return along, back
 
 
@@ -271,15 +217,12 @@ def scaled_curve(
 
     Arguments as for :func:`continue_curve`.
     """
-    options = options or StepOptions()
     low, high = _checked_limits(limits)
     unit = high - low if unit is None else unit
     scale = np.broadcast_to(np.asarray(scale, float), np.shape(start)).copy()
     if not (np.all(np.isfinite(scale)) and np.all(scale > 0.0) and 0.0 < unit < np.inf):
         raise CaseError("the scales of a curve must be positive", code="E-RANGE", limit="> 0")
-    curve = ScaledCurve(
-        evaluate, scale, float(unit), options.tolerance, options.max_iterations, describe=describe
-    )
+    curve = ScaledCurve(evaluate, scale, float(unit), (low, high), options or StepOptions(), describe)
     try:
         size = np.abs(curve.equations(curve.scaled(start, parameter))[1]).max(axis=1)
     except LostError as error:
@@ -288,13 +231,13 @@ def scaled_curve(
     return replace(curve, rows=np.where(size > 0.0, size, size.max() or 1.0))
 
 
-def _collect(curve: ScaledCurve, first: CurvePoint, limits, options: StepOptions | None) -> Curve:
+def _collect(curve: ScaledCurve, first: CurvePoint) -> Curve:
     """The whole curve from a corrected point, of orientation zero in a branch point, along its tangent."""
-    points, closed, complete, message = _walk(curve, first, limits, options or StepOptions())
+    points, closed, complete, message = _walk(curve, first)
     z = np.array([p.z for p in points])
     parameter = z[:, -1] * curve.unit
     if points[-1].kind == "end":
-        parameter[-1] = min(limits, key=lambda limit: abs(limit - parameter[-1]))
+        parameter[-1] = min(curve.limits, key=lambda limit: abs(limit - parameter[-1]))
     kinds = np.array([p.kind for p in points])
     return Curve(
         points=z[:, :-1] * curve.scale,
@@ -312,21 +255,19 @@ def _collect(curve: ScaledCurve, first: CurvePoint, limits, options: StepOptions
     )
 
 
-def _walk(
-    curve: ScaledCurve, first: CurvePoint, limits, options: StepOptions
-) -> tuple[list[CurvePoint], bool, bool, str]:
+def _walk(curve: ScaledCurve, first: CurvePoint) -> tuple[list[CurvePoint], bool, bool, str]:
     """Points, limit points and branch points among them; whether closed, whether complete, how it ended."""
-    bounds = np.asarray(limits, float) / curve.unit
-    points, point, h = [first], first, options.first
+    points, point, options = [first], first, curve.options
+    h = options.first
     while len(points) < options.max_points:
         try:
             h = max(min(h, _longest(point, options)), options.smallest)
-            segment, special, h = _step(curve, point, h, bounds, options)
+            segment, special, h = _step(curve, point, h)
         except LostError as lost:
             return points, False, False, f"lost after {_where(curve, point)}: {lost}"
         events = [*special, (segment.length, segment.last)]
         events, closed = _closing(segment, first, events, len(points))
-        for _, end in _until_end(segment, events, bounds):
+        for _, end in _until_end(segment, events):
             points.append(end)
             if end.kind == "end":
                 return points, False, True, f"end of the range at {_where(curve, end)}"
@@ -362,20 +303,17 @@ def _where(curve: ScaledCurve, point: CurvePoint) -> str:
     return curve.describe(float(point.z[-1] * curve.unit))
 
 
-def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: StepOptions):
+def _step(curve: ScaledCurve, point: CurvePoint, h: float):
     """The next accepted point: segment, special points on it, length of the next step."""
-    reason = ""
+    reason, options = "", curve.options
     while h >= options.smallest:
         try:
-            new = _landing(curve, point, h, bounds)
+            new = _landing(curve, point, h)
             if new is None:
                 new = correct(curve, point.z + h * point.tangent, point.tangent)
             shortness = h / (_CORNER * min(options.largest, _CORNER_LARGEST))
             corner = shortness <= 1.0
-            effort = step_effort(
-                point, new, angle=options.angle, contraction=options.contraction, corner=corner,
-                sharp=shortness <= _SHARP,
-            )  # fmt: skip
+            effort = step_effort(options, point, new, corner=corner, sharp=shortness <= _SHARP)
             if not corner:
                 check_step(curve, point, new)
             segment = Segment(curve, point, new)
@@ -390,10 +328,10 @@ def _step(curve: ScaledCurve, point: CurvePoint, h: float, bounds, options: Step
     raise LostError(f"{reason} (step reduced to {h:.1e})")
 
 
-def _landing(curve: ScaledCurve, point: CurvePoint, h: float, bounds) -> CurvePoint | None:
+def _landing(curve: ScaledCurve, point: CurvePoint, h: float) -> CurvePoint | None:
     """Point at the end of the range where the predictor reaches it, so that nothing is evaluated beyond."""
     rate = point.tangent[-1]
-    bound = bounds[1] if rate > 0.0 else bounds[0]
+    bound = curve.bounds[1 if rate > 0.0 else 0]
     way = (bound - point.z[-1]) / rate if rate else 0.0
     if not 0.0 < way <= h:
         return None
@@ -412,9 +350,9 @@ def _at_parameter(curve: ScaledCurve, guess: np.ndarray, bound: float, along: np
     return replace(found, z=np.append(found.z[:-1], bound))
 
 
-def _until_end(segment: Segment, events, bounds):
+def _until_end(segment: Segment, events):
     """Events up to the end of the range, which replaces the first one beyond it."""
-    low = (0.0, segment.first)
+    low, bounds = (0.0, segment.first), segment.curve.bounds
     for event in events:
         value = event[1].z[-1]
         beyond = bounds[0] if value < bounds[0] else bounds[1] if value > bounds[1] else None

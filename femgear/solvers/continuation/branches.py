@@ -14,14 +14,8 @@ import numpy as np
 from scipy.optimize import OptimizeResult, minimize_scalar
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
-from femgear.solvers.continuation.arclength import (
-    Curve,
-    StepOptions,
-    continue_curve,
-    scaled_curve,
-    switch_branch,
-)
-from femgear.solvers.continuation.corrector import Segment, correct, describe_value
+from femgear.solvers.continuation.arclength import Curve, continue_curve, scaled_curve, switch_branch
+from femgear.solvers.continuation.corrector import Segment, StepOptions, correct, describe_value
 from femgear.solvers.linear.receptance import Reduction
 from femgear.solvers.periodic.equations import HarmonicBalance, harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import linalg
 from scipy.optimize import root_scalar
 
-from femgear.errors import FemgearError
+from femgear.errors import CaseError, FemgearError
 
 # Residuals over the sizes of the rows, relative to 1 + |z|, that are rounding.
 _ROUNDING = 1e-13
@@ -55,22 +55,79 @@ def describe_value(parameter: float) -> str:
 
 
 @dataclass(frozen=True)
+class StepOptions:
+    """How a curve is followed; lengths are in the scaled unknowns ``(u / scale, parameter / unit)``.
+
+    Parameters
+    ----------
+    first, smallest, largest : float
+        Step lengths; where the scaled unknowns exceed ten, the largest is that many tenths longer.
+    angle : float
+        Angle between successive tangents that is aimed at [rad], up to 0.5; twice as much is refused.
+    contraction : float
+        Ratio of the second to the first Newton step, both with the first derivative, aimed at
+        (Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 5.1), up to 0.25; it sets the next
+        step.
+    tolerance : float
+        Last Newton step relative to ``1 + |z|``.
+    max_iterations : int
+        Newton iterations of one correction.
+    max_points : int
+        The curve ends, incomplete, after so many points.
+    """
+
+    first: float = 0.01
+    smallest: float = 1e-8
+    largest: float = 0.1
+    angle: float = 0.15
+    contraction: float = 0.0625
+    tolerance: float = 1e-10
+    max_iterations: int = 10
+    max_points: int = 5000
+
+    def __post_init__(self):
+        if not 0.0 < self.smallest <= self.first or not self.smallest <= self.largest < np.inf:
+            raise CaseError(
+                f"steps from {self.smallest} over {self.first} to {self.largest}", code="E-RANGE",
+                limit="0 < smallest <= first, smallest <= largest",
+            )  # fmt: skip
+        if min(self.angle, self.contraction, self.tolerance, self.max_iterations - 1, self.max_points) <= 0:
+            raise CaseError(
+                "a step option is not positive", code="E-RANGE", limit="> 0; two iterations or more"
+            )
+        # the chord is compared with the mean of two tangents, and Newton's method must contract
+        for name, bound in (("angle", 0.5), ("contraction", 0.25)):
+            value = getattr(self, name)
+            if not value <= bound:
+                raise CaseError(
+                    f"the step option {name} is {value}", code="E-RANGE", key=name, value=value,
+                    limit=f"up to {bound}: beyond, a jump to another curve may look like a step",
+                    remedy="lengthen the steps by largest instead",
+                )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class ScaledCurve:
     """``F(u, parameter)`` in the unknowns ``z = (u / scale, parameter / unit)``.
 
     ``evaluate(u (n,), parameter)`` gives residual (n,), jacobian (n, n) and slope (n,); ``scale`` (n,) and
     ``unit`` are typical sizes of u and of a change of the parameter, ``rows`` those of the rows of the scaled
-    derivative, constant so that no singularity is divided away. Newton's method ends with a step of
-    ``tolerance``, relative to ``1 + |z|``. ``describe(parameter)`` is text for messages.
+    derivative, constant so that no singularity is divided away. ``limits`` are the ends of the range of the
+    parameter, ``options`` says how the curve is followed, ``describe(parameter)`` is text for messages.
     """
 
     evaluate: Callable
     scale: np.ndarray
     unit: float
-    tolerance: float
-    max_iterations: int
-    rows: np.ndarray | float = 1.0
+    limits: tuple[float, float]
+    options: StepOptions
     describe: Callable[[float], str] = describe_value
+    rows: np.ndarray | float = 1.0
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Ends of the range of the scaled parameter (2,)."""
+        return np.asarray(self.limits, float) / self.unit
 
     def scaled(self, u, parameter: float) -> np.ndarray:
         """``z`` (n + 1,)."""
@@ -142,7 +199,7 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     residuals = []
     unit = np.zeros(len(z))
     unit[-1] = 1.0
-    for _ in range(curve.max_iterations):
+    for _ in range(curve.options.max_iterations):
         residual, derivative = curve.equations(z)
         right = np.append(residual, normal @ (z - guess))
         residuals.append(float(np.abs(residual).max() / (1.0 + np.linalg.norm(z))))
@@ -156,19 +213,19 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
         lengths.append(float(np.linalg.norm(step) / (1.0 + np.linalg.norm(z))))
         if not np.isfinite(lengths[-1]):
             raise LostError("Newton's method left the finite numbers")
-        if lengths[-1] <= curve.tolerance:
+        if lengths[-1] <= curve.options.tolerance:
             break
         if len(lengths) > 3 and lengths[-1] > 2.0 * max(lengths[-2], lengths[-3]):
             raise _failed(residuals)(f"Newton's method diverges (steps {lengths[-2]:.1e}, {lengths[-1]:.1e})")
     else:
-        count, last = curve.max_iterations, lengths[-1]
+        count, last = curve.options.max_iterations, lengths[-1]
         raise _failed(residuals)(f"no convergence in {count} iterations (last step {last:.1e})")
     tangent = linalg.lu_solve(factors, unit, check_finite=False)
     tangent /= np.linalg.norm(tangent)
     if along is not None and tangent @ along < 0.0:
         # normal . tangent is positive as solved, so only a turned tangent changes the sign of the determinant
         tangent, sign = -tangent, -sign
-    if lengths[0] <= 1e2 * curve.tolerance:
+    if lengths[0] <= 1e2 * curve.options.tolerance:
         contraction = 0.0  # rounding
     return CurvePoint(z, tangent, derivative, sign, len(lengths), float(contraction), lengths[-1])
 
@@ -186,15 +243,9 @@ def factored(matrix: np.ndarray):
 
 
 def step_effort(
-    point: CurvePoint,
-    new: CurvePoint,
-    *,
-    angle: float,
-    contraction: float,
-    corner: bool = False,
-    sharp: bool = False,
+    options: StepOptions, point: CurvePoint, new: CurvePoint, *, corner: bool, sharp: bool
 ) -> float:
-    """How far a step was from the ``angle`` [rad] and ``contraction`` that are aimed at: 1 on target.
+    """How far a step was from the angle and the contraction that the options aim at: 1 on target.
 
     On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);
     a jump from curve to curve turns the chord but not the tangents. A step may be so short that the curve may
@@ -205,6 +256,7 @@ def step_effort(
     LostError
         The angle is twice what is aimed at, or the chord leaves the tangents.
     """
+    angle, contraction = options.angle, options.contraction
     turn = np.arccos(float(np.clip(point.tangent @ new.tangent, -1.0, 1.0)))
     if sharp and 2.0 * angle < turn <= _SHARPEST:
         _check_sides(point, new)
@@ -229,7 +281,7 @@ def check_step(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> None:
     LostError
         The step left the curve, or passed over a piece of it.
     """
-    if np.linalg.norm(new.z - point.z) <= 1e2 * curve.tolerance * (1.0 + np.linalg.norm(new.z)):
+    if np.linalg.norm(new.z - point.z) <= 1e2 * curve.options.tolerance * (1.0 + np.linalg.norm(new.z)):
         return
     _check_return(curve, point, new)
     _check_middle(curve, point, new)
@@ -256,7 +308,7 @@ def _check_return(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> Non
     way = float(new.tangent @ (point.z - new.z))
     guess = new.z + way * new.tangent
     miss = np.linalg.norm(guess - point.z)
-    if miss <= 1e2 * curve.tolerance * (1.0 + np.linalg.norm(point.z)):
+    if miss <= 1e2 * curve.options.tolerance * (1.0 + np.linalg.norm(point.z)):
         return
     step, _, _ = _newton_step(curve, guess, new.tangent)
     left = np.linalg.norm(guess - step - point.z) / miss

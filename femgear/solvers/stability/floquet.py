@@ -156,6 +156,13 @@ class Frame:
         both = np.concatenate([np.ones(n), np.full(n, self.fastest or 1.0)])
         return monodromy(self.state_matrices(self.kappa(tangents)) * both / both[:, None], durations)
 
+    def verdict(
+        self, multipliers, period: float, method: str, error: float, tolerance: float
+    ) -> FloquetVerdict:
+        """`verdict_of` with what it has to know of free motions."""
+        free = {"positions": self.positions, "velocities": self.positions, "drift": self.drift}
+        return verdict_of(multipliers, period, method, error, tolerance, **free)
+
 
 def frame_of(problem: NonlinearSystem, *, modes: int = 100) -> Frame:
     """Modes of a problem about its reference stiffness, at most so many, lowest first.
@@ -524,9 +531,7 @@ def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[Fl
         )  # fmt: skip
         values = np.linalg.eigvals(matrix)
         for i, multipliers, error in zip(rest, values, errors):
-            out[i] = verdict_of(
-                multipliers, float(period[i]), "splitting", float(error), tolerance, **_free(frame)
-            )
+            out[i] = frame.verdict(multipliers, float(period[i]), "splitting", float(error), tolerance)
     return [out[i] for i in range(len(solutions))]
 
 
@@ -555,7 +560,7 @@ def _constant_pieces(tangents, state: int, inner: np.ndarray) -> np.ndarray | No
 def _exact_verdict(frame: Frame, period: float, inner, pieces) -> FloquetVerdict:
     durations = np.diff(np.concatenate([[0.0], inner, [1.0]])) * period
     multipliers = np.linalg.eigvals(frame.exact_monodromy(pieces, durations))
-    return verdict_of(multipliers, period, "exact exponentials", 0.0, np.inf, **_free(frame))
+    return frame.verdict(multipliers, period, "exact exponentials", 0.0, np.inf)
 
 
 def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int | None) -> FloquetVerdict:
@@ -568,12 +573,7 @@ def _by_hill(frame: Frame, problem, solution: PeriodicSolution, harmonics: int |
     kappa = frame.kappa(tangents_of(problem, [solution])(fraction, np.array([0]))[0])
     exponents = _hill_exponents(frame, kappa, omega, harmonics=count)
     period = 2.0 * np.pi / omega
-    return verdict_of(np.exp(exponents * period), period, "Hill", np.nan, np.inf, **_free(frame))
-
-
-def _free(frame: Frame) -> dict:
-    """What the verdict has to know of free motions."""
-    return {"positions": frame.positions, "velocities": frame.positions, "drift": frame.drift}
+    return frame.verdict(np.exp(exponents * period), period, "Hill", np.nan, np.inf)
 
 
 def _one_copy_each(values: np.ndarray, omega: float, count: int) -> np.ndarray:

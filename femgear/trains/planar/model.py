@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.solvers.continuation.arclength import StepOptions
 from femgear.solvers.continuation.branches import Branch, frequency_response_curve
+from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.solvers.periodic.harmonic_balance import displacements
