@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path.extend(str(Path(__file__).parents[1] / name) for name in ("benchmarks", "scripts", "tests"))
 
 import pytest
 from table import page, rows_of

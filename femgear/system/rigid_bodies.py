@@ -1,23 +1,21 @@
 """Data of planetary sets of rigid bodies: bodies, supports, radii, angles, torques, refusals.
 
 Bodies have up to six motions: along x, y and z, two tilts ``w = r phi`` and the rotation ``u = r theta``.
-Those of the planar set move in their plane (E-RANGE), those of the helical set in all directions
-(E-RANGE).
+Those of the planar set move in their plane, those of the helical set in all directions.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 
 from femgear.errors import CaseError
-
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
+from femgear.gears.planetary import PlanetarySet
 
 CENTRAL = ("carrier", "ring", "sun")
 DIRECTIONS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}
@@ -76,11 +74,11 @@ class ContactLines:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RigidSet:
+class RigidSet(ABC):
     """Rigid bodies, the geometry of their gears and the stiffness of their meshes.
 
-    A kind of set says which of the six motions its bodies have (``axes``), and the names of the springs in
-    them (``directions``); ``meshes_optional`` allows meshes without stiffness.
+    A kind of set says which of the six motions its bodies have (``axes``); ``meshes_optional`` allows meshes
+    without stiffness.
 
     Parameters
     ----------
@@ -101,12 +99,11 @@ class RigidSet:
     Raises
     ------
     CaseError
-        E-RANGE: numbers that no set can have, planet angles that are none, unordered or span more than a
-        turn.
+        Numbers that no set can have, planet angles that are none, unordered or span more than a turn
+        (E-RANGE).
     """
 
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
-    directions: ClassVar[dict[str, tuple[int, ...]]] = {}
     meshes_optional: ClassVar[bool] = True
 
     sun: PlanarBody | HelicalBody
@@ -128,7 +125,7 @@ class RigidSet:
         for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
             self._keep(name, self._per_planet(name))
         for name in (*CENTRAL, "planet"):
-            check_body(name, getattr(self, name))
+            _check_body(name, getattr(self, name))
         check_set(self)
 
     @property
@@ -163,9 +160,9 @@ class RigidSet:
         return np.stack([getattr(self, name).stiffness for name in CENTRAL])
 
     @property
+    @abstractmethod
     def pin_stiffness(self) -> np.ndarray:
         """Of the planet bearings (N, d) in the first d motions of a planet [N/m, N m/rad]."""
-        raise NotImplementedError
 
     @property
     def contact_lines(self) -> ContactLines:
@@ -209,12 +206,6 @@ class PlanarSet(RigidSet):
     planet_bearing : float or (N,) array
         Isotropic stiffness between planet and carrier [N/m]; infinite fixes the planet's axis to its pin.
 
-    Raises
-    ------
-    CaseError
-        Numbers that no set can have (E-RANGE), planet angles that are none, unordered or span more than a
-        turn (E-RANGE).
-
     Notes
     -----
     Published data are often rounded, or mix reference and working angles: radii that do not close are
@@ -222,7 +213,6 @@ class PlanarSet(RigidSet):
     """
 
     axes: ClassVar[tuple[int, ...]] = (0, 1, 5)
-    directions: ClassVar[dict[str, tuple[int, ...]]] = {"{}": (0, 1), "torsional {}": (2,)}
     meshes_optional: ClassVar[bool] = False
 
     planet_bearing: float | np.ndarray
@@ -331,7 +321,7 @@ class HelicalBody:
     support: HelicalSupport = field(default_factory=HelicalSupport)
 
     def __post_init__(self):
-        check_body("body", self)
+        _check_body("body", self)
 
     @property
     def stiffness(self) -> np.ndarray:
@@ -367,15 +357,6 @@ def gear_geometry(s: PlanetarySet) -> dict[str, Any]:
         "pressure_angle_sun_planet": s.working_pressure_angle_sun_planet,
         "pressure_angle_planet_ring": s.working_pressure_angle_planet_ring,
     }
-
-
-def torsional_set(data: PlanarSet) -> PlanarSet:
-    """The same set with all axes held: N + 3 rotations (A. Kahraman, J. Sound Vib. 173, 1994, 125-130).
-
-    The planets' axes are then fixed to the carrier, whose rotation carries their mass.
-    """
-    held = {name: replace(getattr(data, name), support=math.inf) for name in CENTRAL}
-    return replace(data, planet_bearing=math.inf, **held)
 
 
 def torque_shares(data: RigidSet) -> dict[str, float]:
@@ -443,11 +424,6 @@ def inertia_of_reduced(reduced: float, radius: float) -> float:
     return reduced * radius**2
 
 
-def torsional_of_reduced(stiffness: float, radius: float) -> float:
-    """Torsional stiffness [N m/rad] of a stiffness ``k_u`` [N/m] that acts on ``u = r theta``."""
-    return stiffness * radius**2
-
-
 def check_set(data: RigidSet) -> None:
     """Refuse radii, pressure angles, mesh stiffnesses and planet angles."""
     for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
@@ -470,7 +446,7 @@ def check_set(data: RigidSet) -> None:
         refuse("planet_angles", psi.tolist(), "rad", allowed, remedy=remedy)
 
 
-def check_body(name: str, body: PlanarBody | HelicalBody) -> None:
+def _check_body(name: str, body: PlanarBody | HelicalBody) -> None:
     """Refuse a mass, inertia or support."""
     for entry, unit in (("mass", "kg"), ("inertia", "kg m^2"), ("diametral_inertia", "kg m^2")):
         if hasattr(body, entry):
@@ -515,7 +491,7 @@ def numbers(key: str, values, dimensions: int | None = None) -> np.ndarray:
 
 
 def refuse(key: str, value, unit: str, limit: str, *, remedy: str | None = None) -> NoReturn:
-    """Refuse an entry of a set (E-RANGE), such as ``planet.mass``, with its value and what is allowed."""
+    """Refuse an entry of a set, such as ``planet.mass``, with its value and what is allowed."""
     raise CaseError(
         f"{key.replace('_', ' ').replace('.', ': ')} of {value} {unit}".rstrip(),
         code="E-RANGE", key=key, value=value, limit=limit, remedy=remedy,

@@ -197,8 +197,8 @@ def _units(case: GearPairCase, title: str) -> dict[str, Any]:
 @one_blas_thread()
 def solve_response(case: GearPairCase) -> ResponseResult:
     """Periodic motions over the frequency ratio past limit points, with stability and contact."""
-    from femgear.solvers.continuation.arclength import StepOptions
     from femgear.solvers.continuation.branches import parameter_curve
+    from femgear.solvers.continuation.corrector import StepOptions
 
     pair, given = pair_of(case), case.response
     branch = parameter_curve(

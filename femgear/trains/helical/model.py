@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -88,13 +88,6 @@ class HelicalSet(RigidSet):
         radii, centre distance and pressure angles that miss each other by more than 10 % (E-RANGE).
         `closure` tells by how much they do.
     """
-
-    directions: ClassVar[dict[str, tuple[int, ...]]] = {
-        "{}, radial": (0, 1),
-        "{}, axial": (2,),
-        "{}, tilt": (3, 4),
-        "{}, torsional": (5,),
-    }
 
     base_helix_angle: float
     planet_bearing: HelicalSupport
@@ -463,8 +456,8 @@ def spring_loads(springs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[
     Parameters
     ----------
     springs : mapping of str to (columns (n, g), stiffness (g,))
-        From `femgear.system.assembler.gear_set_springs`; those of meshes give ``k W^T q``
-        without the transmission error, whose force is in `MeshErrorResponse.force`.
+        Columns and stiffnesses by name; those of meshes give ``k W^T q`` without the
+        transmission error, whose force is in `MeshErrorResponse.force`.
 
     Returns
     -------
