@@ -22,7 +22,8 @@ from femgear.case.case import planetary_set
 from femgear.housing.orders import BandAnalysis, analyse_band
 from femgear.housing.orders import order_spectrum as _spectrum
 from femgear.report.response import (
-    MANY_SPEEDS,
+    MODE_CAPTIONS,
+    RESPONSE_CAPTIONS,
     draw_static,
     excited_harmonics,
     fine_positions,
@@ -30,10 +31,9 @@ from femgear.report.response import (
     mode_shapes,
     name_kinds,
     panels,
+    response_figures,
     shown_speeds,
     some_speeds,
-    speed_sweep,
-    transmission_error_spectrum,
 )
 from femgear.report.style import (
     BLACK,
@@ -515,16 +515,13 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
 
 def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
     dynamics, data = drawn.data["dynamics"], drawn.data
-    figures = {
-        "dynamic_spectrum": transmission_error_spectrum(dynamics),
-        "dynamic_transmission_error": transmission_error_period(
+    return response_figures(
+        dynamics,
+        dynamic_transmission_error=transmission_error_period(
             dynamics, _on_supports(data.get("modes"), data.get("static"))
         ),
-        "ring_static_deflection": ring_mean_deflection(dynamics, planetary_set(drawn.case)),
-    }
-    if dynamics.sizes["speed"] > MANY_SPEEDS:
-        figures["speed_sweep"] = speed_sweep(dynamics)
-    return figures
+        ring_static_deflection=ring_mean_deflection(dynamics, planetary_set(drawn.case)),
+    )
 
 
 def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Dataset | None:
@@ -568,11 +565,8 @@ def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
 
 FIGURES = STATIC | {
     "modes": Figures(
-        {
-            "mode_shapes": (
-                "Mode shapes with mean mesh stiffness: bodies with a mark of their rotation, and the outer "
-                "surface of the ring; at rest in grey."
-            ),
+        MODE_CAPTIONS
+        | {
             "natural_frequencies": "Natural frequencies over the nodal diameters of the ring.",
             "ring_mode": "A mode of the toothed ring on its foundation, on the finite-element grid.",
         },
@@ -580,20 +574,8 @@ FIGURES = STATIC | {
         write=(_write_ring_modes,),
     ),
     "dynamics": Figures(
-        {
-            "dynamic_transmission_error": (
-                "Dynamic transmission error over one mesh period (thick) beside the static one of the set "
-                "on its supports, both without their mean. The thin static curve has the harmonics of the "
-                "excitation alone: what rings in both curves is the cut series, not vibration. Pale: the "
-                "whole static curve."
-            ),
-            "dynamic_spectrum": (
-                "Harmonics of the dynamic transmission error, down to five decades below the largest."
-            ),
-            "speed_sweep": (
-                "Fluctuation of the transmission error over the speed, and the verdicts on the solution: "
-                "the fixed point contracts below 1, the motion is stable up to 1."
-            ),
+        RESPONSE_CAPTIONS
+        | {
             "ring_static_deflection": (
                 "Mean radial deflection of the ring's outer surface, which turns with the carrier."
             ),
