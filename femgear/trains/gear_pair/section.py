@@ -10,7 +10,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from femgear.case.fields import PAIR, Count, Number, Quantity, Section, Title
-from femgear.case.problems import checked_case
 from femgear.case.sections import FORMAT, Inertia, Mass, Radius, Stiffness
 from femgear.case.text import ReadCase
 from femgear.case.units import ANGLE, LENGTH, STIFFNESS, TORQUE
@@ -107,20 +106,6 @@ class GearPairCase(Section, ReadCase):
     response: ResponseSection = ResponseSection()
     sweep: SweepSection | None = None
     chaos: ChaosSection | None = None
-
-
-def build_gear_pair(data: dict, text: str, name: str, *, numbered: bool = True) -> GearPairCase:
-    """Case of the tables of a TOML text; see `femgear.trains.protocol.OwnFile`.
-
-    Raises
-    ------
-    CaseError
-        Everything that is wrong, at once.
-    """
-    lines = text if numbered else ""
-    case = checked_case(GearPairCase, data, lines, name, check=cross_check)
-    case.read_from(text, lines, name)
-    return case
 
 
 def cross_check(case: GearPairCase) -> Iterator[CaseError]:

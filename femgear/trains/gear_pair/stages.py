@@ -22,7 +22,7 @@ from femgear.system.contact_states import (
 )
 from femgear.threads import one_blas_thread
 from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
-from femgear.trains.gear_pair.section import GearPairCase, build_gear_pair, pair_of, scales_of
+from femgear.trains.gear_pair.section import GearPairCase, cross_check, pair_of, scales_of
 from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
 
 if TYPE_CHECKING:
@@ -351,9 +351,8 @@ GEAR_PAIR = Train(
     name="gear_pair",
     words="a gear pair",
     model=GearPairCase,
-    own_file=OwnFile(
-        lambda data: data.get("model") == "gear_pair", build_gear_pair, GearPairCase.model_json_schema
-    ),
+    own_file=OwnFile(),
+    cross_check=cross_check,
     stages=(
         Stage(
             name="response",

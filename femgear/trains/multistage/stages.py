@@ -48,7 +48,7 @@ from femgear.trains.multistage.section import (
     MultistageCase,
     OperationSection,
     ResponseSection,
-    build_multistage,
+    cross_check,
     multistage_of,
     stage_gears,
 )
@@ -510,9 +510,8 @@ MULTISTAGE = Train(
     name="multistage",
     words="a multistage case",
     model=MultistageCase,
-    own_file=OwnFile(
-        lambda data: data.get("model") == "multistage", build_multistage, MultistageCase.model_json_schema
-    ),
+    own_file=OwnFile(),
+    cross_check=cross_check,
     stages=(
         RunStage(
             name="modes",
