@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import fsolve
 from trains import example_pair, level_crossings
 
-from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import parameter_curve
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.stroboscopic import sweep_response
@@ -160,48 +159,3 @@ def test_damping_of_fifteen_per_cent_leaves_one_answer_and_nine_per_cent_does_no
     run = sweep_response(lambda r: (example_pair(0.09).problem(r), 1.0), ratios, steps=100, most=250)
     states = range_states(run.lowest[:, 0], run.highest[:, 0], drive=1.0, back=-1.0)
     assert states.tolist() == [1, 2, 0]
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"damping_ratio": -0.1},
-        {"load": np.nan},
-        {"tooth_error": (np.inf,)},
-        {"teeth": (0, 3)},
-        {"eccentricity": (1.0, 2.0, 3.0)},
-    ],
-)
-def test_wrong_pairs_are_refused(change):
-    with pytest.raises(CaseError, match="E-RANGE"):
-        replace(example_pair(0.1), **change)
-
-
-def test_wrong_ratios_and_bearings_are_refused():
-    with pytest.raises(CaseError, match="E-RANGE"):
-        example_pair(0.1).problem(0.0)
-    with pytest.raises(CaseError, match="E-RANGE"):
-        PairBearings(mass=(1.0, 0.0), stiffness=(1.0, 1.0))
-    with pytest.raises(CaseError, match="E-RANGE"):
-        pair_scales(inertia=(1.0, 1.0), base_radius=(1.0, 1.0), stiffness=0.0, backlash=1.0)
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: separation_ratios(damping_ratio=0.1, load=0.0, error=0.5),
-        lambda: separation_ratios(damping_ratio=0.1, load=np.nan, error=0.5),
-        lambda: separation_ratios(damping_ratio="a", load=1.0, error=0.5),
-        lambda: example_pair(0.1).problem(1.0, divided=1.5),
-        lambda: example_pair(0.1).problem("fast"),
-        lambda: ImpactPair(damping_ratio=0.1, load=1.0, teeth=(20, 20), eccentricity=(1.0, 1.0)),
-        lambda: ImpactPair(damping_ratio=0.1, load=1.0, teeth=(20.5, 30)),
-        lambda: ImpactPair(damping_ratio="a", load=1.0),
-        lambda: ImpactPair(damping_ratio=0.1, load="a"),
-        lambda: PairBearings(mass=("a", 1.0), stiffness=(1.0, 1.0)),
-        lambda: pair_scales(inertia=(1.0, "a"), base_radius=(1.0, 1.0), stiffness=1.0, backlash=1.0),
-    ],
-)
-def test_questions_without_answer_are_refused(make):
-    with pytest.raises(CaseError):
-        make()

@@ -13,6 +13,7 @@ import numpy as np
 
 from femgear.report.tables import Block
 from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
+from femgear.system.assembler import mesh_names
 from femgear.trains.multistage.model import (
     MultistageSet,
     mean_mesh_stiffness,
@@ -178,11 +179,9 @@ def _first_meshes(data: MultistageSet) -> list[int]:
 
 def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
     """Stages, meshes, and speeds of the input where there are some."""
-    names = []
-    for number, stage in enumerate(data.stages, 1):
-        planets = range(1, stage.data.n_planets + 1)
-        names += [f"stage {number} sun-planet {n}" for n in planets]
-        names += [f"stage {number} planet {n}-ring" for n in planets]
+    names = [
+        f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in mesh_names(one.data.n_planets)
+    ]
     found = {"mesh": (("mesh",), names, "1", "gear mesh"), "stage": (("stage",), _stages(data), "1", "stage")}
     if speed is not None:
         found["speed"] = ("speed",), speed / RPM, "rpm", "speed of the input"
