@@ -110,7 +110,7 @@ class Branches:
 def followed(result, centre_distance: float, speeds, below: float) -> Branches:
     """Branches of all elastic modes that are below a frequency [Hz] at rest."""
     from femgear.solvers.linear.tracking import campbell_data
-    from femgear.trains.elastic.model import ring_wave_shares, turning_system
+    from femgear.trains.elastic.model import turning_system
 
     modes, model = result.modes, result.model
     elastic = np.flatnonzero(modes.frequency > 0.0)
@@ -137,6 +137,39 @@ def followed(result, centre_distance: float, speeds, below: float) -> Branches:
         wave=wave,
         part=shares[largest + wave, columns] / np.where(both > 0.0, both, 1.0),
     )
+
+
+def ring_wave_shares(model, shape) -> np.ndarray:
+    """Share the kinetic energy of complex modes out among the travelling waves of the ring.
+
+    Parameters
+    ----------
+    model : femgear.trains.elastic.model.ElasticSet
+    shape : (n, m) complex array
+        Mode shapes, motion ``Re(shape e^{i omega t})``.
+
+    Returns
+    -------
+    (2 n_max + 1, m) array
+        Row ``n_max + n``: the part of the whole that the waves ``e^{i n phi} e^{i omega t}`` hold, phi in the
+        carrier frame; a point of the ring hears them at ``omega - n Omega``. Standing waves have equal parts
+        of n and -n; the other bodies hold what the sum over n misses.
+    """
+    shape = np.asarray(shape, complex)
+    total = np.einsum("im,ij,jm->m", shape.conj(), model.system.M, shape).real
+    ring, n = shape[model.ring_slice], model.ring_diameter
+    largest = int(n.max(initial=0))
+    shares = np.zeros((2 * largest + 1, shape.shape[1]))
+    single = np.ones(len(n), bool)
+    sine = np.flatnonzero(model.ring_phase == 1)
+    single[sine] = single[sine - 1] = False
+    for sign in (1, -1):
+        wave = np.abs(ring[sine - 1] - sign * 1j * ring[sine]) ** 2 / 2.0
+        np.add.at(shares, largest + sign * n[sine], wave)
+    alone = np.flatnonzero(single)
+    for row in (largest + n[alone], largest - n[alone]):
+        np.add.at(shares, row, 0.5 * np.abs(ring[alone]) ** 2)
+    return shares / total
 
 
 def bare_ring(modes, below: float) -> list[tuple[int, float]]:

@@ -47,9 +47,9 @@ def all_figures():
         "dte spectrum": response.transmission_error_spectrum(dynamics),
         "sweep": response.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
         "deflection": elastic_figures.ring_mean_deflection(dynamics, gears),
-        "signal": elastic_figures.housing_signal(housing, speed_index=1, ring_teeth=TEETH),
-        "orders": elastic_figures.order_spectrum(housing, speed_index=1, ring_teeth=TEETH),
-        "modulation": elastic_figures.modulation_polar(housing, speed_index=1, ring_teeth=TEETH),
+        "signal": elastic_figures.housing_signal(housing.isel(speed=[1]), ring_teeth=TEETH),
+        "orders": elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH),
+        "modulation": elastic_figures.modulation_polar(housing.isel(speed=[1]), ring_teeth=TEETH),
     }
 
 
@@ -437,7 +437,7 @@ def test_the_whole_signal_lies_between_its_extremes():
     wave = housing["acceleration"].values
     wave[:] = np.maximum(wave, 0.2 * wave)
     signal, high, low, *_ = (
-        elastic_figures.housing_signal(housing, speed_index=1, ring_teeth=TEETH).axes[0].get_lines()
+        elastic_figures.housing_signal(housing.isel(speed=[1]), ring_teeth=TEETH).axes[0].get_lines()
     )
     assert np.max(high.get_ydata()) == np.max(wave[1]) and np.min(low.get_ydata()) == np.min(wave[1])
     assert np.all(high.get_ydata()[:-1] >= signal.get_ydata()) and np.all(
@@ -454,7 +454,7 @@ def test_spectra_of_hundreds_of_harmonics_stay_legible():
     housing = housing.drop_dims("order").assign_coords(order=order)
     for name in ("order_amplitude", "order_amplitude_exact"):
         housing[name] = (("speed", "order"), lines)
-    figure = elastic_figures.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH)
     renderer = drawn(figure)
     (top,) = figure.axes[0].child_axes
     boxes = [text.get_window_extent(renderer) for text in top.get_xticklabels()]
@@ -485,6 +485,6 @@ def test_order_spectrum_says_what_its_lines_are():
     assert names == ["Heaviside, linear interpolation", "exact circumferential Fourier"]
     housing["order_amplitude"] = housing["order_amplitude_exact"]
     housing["excitation_limit"] = ("speed", [1080.0, 2500.0])
-    figure = elastic_figures.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["exact circumferential Fourier"]
     assert not any(ax.get_lines() for ax in figure.axes) and "excited up to 2.5 kHz" in figure.get_suptitle()

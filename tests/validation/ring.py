@@ -242,8 +242,10 @@ def whole_ring() -> tuple[Row, ...]:
 
 def turning_carrier() -> tuple[Row, ...]:
     """Natural frequencies in the carrier frame, gyroscopic and convective terms included, up to 120 rad/s."""
+    from gyroscopic import ring_wave_shares
+
     from femgear.solvers.linear.tracking import campbell_data
-    from femgear.trains.elastic.model import ring_wave_shares, turning_system
+    from femgear.trains.elastic.model import turning_system
 
     basis = reference_modes()
     distance = reference_static().planetary_set.centre_distance

@@ -11,9 +11,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.case import planetary_set
 from femgear.case.dependencies import Entries
+from femgear.housing.orders import analyse_band, order_level, order_spectrum
+from femgear.housing.sensor import (
+    HousingSignal,
+    SensorLines,
+    fixed_sensor_lines,
+    fixed_sensor_signal,
+    hanning_model,
+)
 from femgear.report.tables import Block, chosen
 from femgear.storage.dataset import FOURIER, RPM, _mesh_names, complex_entries, dataset, response_entries
+from femgear.trains.elastic.checks import checked_speeds, missing_level
+from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,11 +32,9 @@ if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
-    from femgear.housing.sensor import HousingSignal, SensorLines
     from femgear.solvers.stability.parametric import Stability
     from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
-    from femgear.trains.elastic.model import ElasticSet, RingModel
 
 # speeds, and bands at each of them, that are listed
 _FEW = 4
@@ -59,8 +68,6 @@ class ModesResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc."""
-        from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ring_field
-
         modes, model, state, n_max = self.modes, self.model, self.state, self.max_diameter
         record, supported = "mesh supported_position", "static transmission error of the set on its supports"
         between = "compliance between the meshes through their bodies"
@@ -133,8 +140,6 @@ class DynamicsResult:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What an engineer should not overlook in this result."""
-        from femgear.trains.elastic.checks import missing_level
-
         rpm = self.input_speed * 30.0 / np.pi
         return missing_level(rpm, self.level_change, self.excitation_limit, self.compared_to)
 
@@ -199,8 +204,6 @@ class HousingResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of housing.nc."""
-        from femgear.housing.orders import order_level
-
         signal, lines, exact = self.signal, self.lines, self.exact
         heard = np.abs(lines.acceleration), np.abs(exact.acceleration), np.angle(exact.displacement)
         words = (
@@ -259,13 +262,10 @@ def describe_housing(data: xr.Dataset) -> Block:
 
 def mesh_bands(results: Results) -> Block:
     """Dominant lines and lobes around every mesh harmonic of the excitation, at a few speeds."""
-    from femgear.housing.orders import analyse_band, order_spectrum
-
     housing, case = results.housing, results.case
     teeth = int(housing.attrs["ring_teeth"])
     rows, threshold = [], 0.0
-    count = housing.sizes["speed"]
-    for s in sorted({round(i) for i in np.linspace(0, count - 1, min(count, _FEW))}):
+    for s in checked_speeds(housing.sizes["speed"], _FEW):
         spectrum = order_spectrum(housing["acceleration"].values[s])
         windowed = _hanning_spectrum(results, s)
         rpm = float(housing["speed"][s])
@@ -312,10 +312,6 @@ def _shown_harmonics(spectrum, teeth: int, given: int | None) -> list[int]:
 
 def _hanning_spectrum(results: Results, speed: int):
     """Order spectrum of the Hanning-window model with the planet-ring forces of the dynamic solution."""
-    from femgear.case.case import planetary_set
-    from femgear.housing.orders import order_spectrum
-    from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, hanning_model
-
     if "dynamics" not in results.stages:
         return None
     data = results.dynamics

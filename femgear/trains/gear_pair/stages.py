@@ -6,7 +6,7 @@ The stages know nothing of one another. Lengths count in half backlashes and tim
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,10 +25,9 @@ from femgear.system.contact_states import (
     state_regions,
 )
 from femgear.threads import one_blas_thread
-from femgear.trains.gear_pair.figures import FIGURES
 from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
 from femgear.trains.gear_pair.section import GearPairCase, cross_check, pair_of, scales_of
-from femgear.trains.protocol import OwnFile, Progress, Stage, Train
+from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -248,7 +247,7 @@ def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> Chao
     return ChaosResult(case, ratios, found, sections)
 
 
-def describe_gear_pair(case: GearPairCase) -> tuple[Block, ...]:
+def _describe_case(case: GearPairCase) -> tuple[Block, ...]:
     """Title, units, numbers of the pair, and warnings of a case."""
     scales, pair = scales_of(case), pair_of(case)
     numbers = {
@@ -270,11 +269,11 @@ def describe_gear_pair(case: GearPairCase) -> tuple[Block, ...]:
         )
         ends = " and ".join(f"{ratio:.4f}" for ratio in parting) or "no ratio"
         notes = (f"with constant stiffness drive flanks begin to part at {ends} of the natural frequency",)
-    warnings = tuple(gear_pair_warnings(case)) or ("none",)
+    warnings = tuple(_case_warnings(case)) or ("none",)
     return Block(case.title), Block("Gear pair", (), tuple(rows), notes), Block("Warnings", notes=warnings)
 
 
-def gear_pair_warnings(case: GearPairCase) -> Iterator[str]:
+def _case_warnings(case: GearPairCase) -> Iterator[str]:
     """What is allowed but deserves a look."""
     if case.operation.torque == 0.0:
         yield "[W-LOAD] operation.torque: without load nothing keeps the flanks on one side"
@@ -282,7 +281,7 @@ def gear_pair_warnings(case: GearPairCase) -> Iterator[str]:
         yield "[W-EXCITATION] mesh: neither error nor stiffness waves nor eccentricity excite the pair"
 
 
-def result_warnings(results) -> Iterator[str]:
+def _result_warnings(results) -> Iterator[str]:
     """What the solvers say against their own results."""
     if "response" in results.stages and not results.response.attrs["complete"]:
         yield f"[W-BRANCH] response: {results.response.attrs['message']}"
@@ -330,6 +329,12 @@ def _no_response(case: GearPairCase) -> str:
     return "the shafts of eccentric gears add base frequencies; take sweep" if eccentric else ""
 
 
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.gear_pair.figures import FIGURES
+
+    return FIGURES
+
+
 GEAR_PAIR = Train(
     name="gear_pair",
     words="a gear pair",
@@ -362,8 +367,8 @@ GEAR_PAIR = Train(
             unavailable=lambda case: "" if case.chaos else "the case has no section chaos",
         ),
     ),
-    describe=describe_gear_pair,
-    warnings=gear_pair_warnings,
-    result_warnings=result_warnings,
-    figures=lambda: FIGURES,
+    describe=_describe_case,
+    warnings=_case_warnings,
+    result_warnings=_result_warnings,
+    figures=_figures,
 )

@@ -367,7 +367,7 @@ def _rows(data: MultistageSet, weights: np.ndarray) -> np.ndarray:
         for number, stage in enumerate(data.stages, 1)
         if stage.fixed is not None
     ]
-    return np.vstack([block_diag(*weights), *couplings, *held])
+    return np.vstack([np.asarray(block_diag(*weights)), *couplings, *held])
 
 
 def _tooth_weights(data: MultistageSet) -> np.ndarray:
@@ -451,14 +451,14 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
         columns, stiffness = _springs(data, T, coupling, lateral=number not in turning)
         K += (columns * stiffness) @ columns.T
     meshes = [free_motions(one.data).T @ mesh_directions(one.data, sign)
-              for one, sign in zip(data.stages, stage_flanks(data, torque))]  # fmt: skip
+              for one, sign in zip(data.stages, _stage_flanks(data, torque))]  # fmt: skip
     ends = [_ends(data, T, data.couplings[number]) for number in turning]
     load = np.concatenate([part.load for part in parts]) + _torque_load(data, T, torque)
     return MechanicalSystem(
         M=Z.T @ block_diag(*(part.M for part in parts)) @ Z,
         C=np.zeros((Z.shape[1], Z.shape[1])),
         K=Z.T @ K @ Z,
-        W=Z.T @ np.hstack([block_diag(*meshes), *ends]),
+        W=Z.T @ np.hstack([np.asarray(block_diag(*meshes)), *ends]),
         load=Z.T @ load,
         dofs=_names(data, T, Z),
         gyroscopic=Z.T @ _gyroscopic(parts, carrier / speed) @ Z if speed else None,
@@ -476,7 +476,7 @@ def mean_mesh_stiffness(data: MultistageSet) -> np.ndarray:
     return np.concatenate([stage.data.mesh_stiffness for stage in data.stages])
 
 
-def stage_flanks(data: MultistageSet, torque: float) -> tuple[int, ...]:
+def _stage_flanks(data: MultistageSet, torque: float) -> tuple[int, ...]:
     """Loaded flanks of every stage: 1 where the sun drives counter-clockwise, else -1."""
     if not torque:
         return (1,) * len(data.stages)

@@ -23,7 +23,6 @@ from femgear.system.mode_kinds import class_energies, gear_set_motions, named_ki
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 from femgear.system.transmission_errors import tooth_lines
 from femgear.threads import one_blas_thread
-from femgear.trains.multistage.figures import FIGURES
 from femgear.trains.multistage.model import (
     MultistageSet,
     joined_motions,
@@ -53,7 +52,7 @@ from femgear.trains.multistage.section import (
     multistage_of,
     stage_gears,
 )
-from femgear.trains.protocol import OwnFile, Progress, Train
+from femgear.trains.protocol import Figures, OwnFile, Progress, Train
 from femgear.trains.protocol import Stage as RunStage
 
 # relative distance of frequencies that count as one
@@ -350,12 +349,10 @@ def loaded_errors(case: MultistageCase, train: MultistageSet) -> dict[int, np.nd
     errors = {}
     on_sun = train_torques(train, _asked(case)[0].torque).sun
     for number, stage in enumerate(train.stages, 1):
-        data, mean = stage.data, stage.data.mesh_stiffness[[0, -1]]
+        data, waves = stage.data, _stiffness_waves(case, number)
         force = abs(on_sun[number - 1]) / (data.n_planets * data.sun_radius)
-        waves = _stiffness_waves(case, number)
-        errors[number] = tooth_lines(
-            *(force / k * _inverse(wave) for k, wave in zip(mean, waves)), stage.phases
-        )
+        first, second = (force / k * _inverse(wave) for k, wave in zip(data.mesh_stiffness[[0, -1]], waves))
+        errors[number] = tooth_lines(first, second, stage.phases)
     return errors
 
 
@@ -394,6 +391,12 @@ def _no_balance(case: MultistageCase) -> str:
     return _no_response(case) or ("" if _asked(case)[1].balance_points else "response.balance_points is 0")
 
 
+def _figures() -> Mapping[str, Figures]:
+    from femgear.trains.multistage.figures import FIGURES
+
+    return FIGURES
+
+
 MULTISTAGE = Train(
     name="multistage",
     words="a multistage case",
@@ -429,5 +432,5 @@ MULTISTAGE = Train(
     describe=lambda case: describe_multistage(case, multistage_of(case)),
     warnings=multistage_warnings,
     result_warnings=lambda results: balance_warnings(results.balance) if "balance" in results.stages else (),
-    figures=lambda: FIGURES,
+    figures=_figures,
 )
