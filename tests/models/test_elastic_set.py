@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gyroscopic import ring_wave_shares
+from gyroscopic import ring_wave_shares, turning_system
 from scipy.sparse.linalg import splu
 
 from femgear.contact.bodies import active_flank_load, make_sectors
@@ -30,7 +30,6 @@ from femgear.trains.elastic.model import (
     ring_field,
     ring_mesh_compliance,
     ring_model,
-    turning_system,
 )
 
 STEEL = Material(206e9, 0.3, 7850.0)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.multistage_example import CASES
 from scipy.optimize import fsolve
 from trains import example_pair, level_crossings
 
@@ -14,7 +15,9 @@ from femgear.system.contact_states import range_states
 from femgear.system.elements import GearMeshes
 from femgear.system.fourier import FourierSeries, SummedSeries, constant, harmonic_lines
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
-from femgear.trains.gear_pair.model import ImpactPair, PairBearings, pair_scales, separation_ratios
+from femgear.trains.gear_pair.model import ImpactPair, PairBearings, separation_ratios
+from femgear.trains.gear_pair.section import scales_of
+from femgear.trains.reading import read_case, with_values
 
 
 def describing_functions(mean, amplitude):
@@ -101,7 +104,11 @@ def test_relative_coordinates_against_displacements_and_moving_flanks():
 
 def test_units_of_a_pair_in_si():
     inertia, radius, k, play, zeta = (2e-3, 5e-3), (0.04, 0.06), 3e8, 80e-6, 0.09
-    scales = pair_scales(inertia=inertia, base_radius=radius, stiffness=k, backlash=play)
+    values = {
+        "gears.inertia": [f"{one} kg m^2" for one in inertia], "mesh.stiffness": f"{k} N/m",
+        "gears.base_radii": [f"{one} m" for one in radius], "mesh.backlash": f"{play} m",
+    }  # fmt: skip
+    scales = scales_of(with_values(read_case(CASES / "gear_pair.toml"), values))
     mass = 1.0 / (0.04**2 / 2e-3 + 0.06**2 / 5e-3)
     assert scales.frequency == pytest.approx(np.sqrt(k / mass))
     load, error, omega = 0.9 * scales.force, 0.72 * scales.length, 1.2 * scales.frequency

@@ -14,7 +14,7 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.case.checks import check_floating
-from femgear.case.sections import Case, output_member
+from femgear.case.sections import RPM, Case, output_member
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 from femgear.trains.elastic.model import MAX_DIAMETER
@@ -116,14 +116,13 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
     critical = 2.0 * np.pi * ring_modes.frequency[wave] / ring_modes.nodal_diameter[wave]
     lowest, fastest = int(np.argmin(critical)), float(np.max(np.abs(carrier_speeds)))
     if fastest >= critical[lowest]:
-        rpm = 30.0 / np.pi
         raise CaseError(
-            f"the carrier turns at {fastest * rpm:.6g} rpm, faster than the wave of "
+            f"the carrier turns at {fastest / RPM:.6g} rpm, faster than the wave of "
             f"{ring_modes.nodal_diameter[wave][lowest]} nodal diameters around the ring",
             code="E-SPEED",
             key="operation.speeds",
-            value=f"{fastest * rpm:.6g} rpm of the carrier",
-            limit=f"below {critical[lowest] * rpm:.6g} rpm of the carrier",
+            value=f"{fastest / RPM:.6g} rpm of the carrier",
+            limit=f"below {critical[lowest] / RPM:.6g} rpm of the carrier",
             remedy="leave the highest speeds out, or stiffen the ring or its foundation",
         )
 
@@ -199,8 +198,8 @@ def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
             f"{harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
             code="E-RANGE",
             key="operation.speeds",
-            value=f"{max(case.operation.speeds) * 30 / np.pi:.6g} rpm",
-            limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed * 30 / np.pi:.4g} rpm here",
+            value=f"{max(case.operation.speeds) / RPM:.6g} rpm",
+            limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed / RPM:.4g} rpm here",
             remedy="leave the highest speeds out, or fewer dynamics.response_harmonics",
         )
     return fastest.mesh_frequency

@@ -1,8 +1,8 @@
 """Planetary set with an elastic toothed ring: rigid sun, planets and carrier, FE ring on a foundation.
 
 All bodies move in the plane; coordinates are those of the carrier frame, in which the mean motion is removed.
-`elastic_set`, and with it the dynamics, leaves the gyroscopic and convective terms of that frame out;
-`turning_system` adds them, to see what they do to the natural frequencies.
+The gyroscopic and convective terms of that frame are left out; `scripts/gyroscopic.py` shows what they do to
+the natural frequencies.
 
 In the carrier frame the teeth of the ring pass under a load that stands still. `ring_model` therefore
 represents the ring by its cyclic modes on the foundation, with a load spread over the active flank of one
@@ -332,54 +332,6 @@ def ring_field(
     mirrored = inside & ~single
     np.add.at(columns, (row[mirrored], max_diameter - n[mirrored]), (half * np.conj(turn * value))[mirrored])
     return np.asarray(coordinates) @ columns
-
-
-def turning_system(model: ElasticSet, *, centre_distance: float, carrier_speed: float) -> MechanicalSystem:
-    """Add the inertia terms of the turning carrier frame to the matrices of the set.
-
-    A body of mass m at rest in that frame has ``m (x'' - 2 Omega y' - Omega^2 x)`` and
-    ``m (y'' + 2 Omega x' - Omega^2 y)`` (J. Lin and R. G. Parker, J. Vib. Acoust. 121, 1999, 316-321). The
-    ring does not turn: its points run backwards through the frame, ``d/dt - Omega d/dphi`` (S. C. Huang and
-    W. Soedel, J. Sound Vib. 115, 1987, 253-274). The pair ``q = c - i s`` of n nodal diameters, displacement
-    ``Re(q U e^{i n phi})``, has the velocity ``q' - i n Omega q``: the terms of a body of mass 1 at the speed
-    ``n Omega``. Alone it has ``f +- n Omega / 2 pi`` in the frame and f on the ring.
-
-    The centrifugal force ``m Omega^2 a`` of a planet pulls its pin outwards; when the carrier turns by theta
-    the pin comes inwards by ``a theta^2 / 2``, which stiffens that rotation by ``m (Omega a)^2`` a planet. It
-    balances the centripetal term of the planets, so that the rotation of the mechanism stays free.
-
-    Parameters
-    ----------
-    model : ElasticSet
-    centre_distance : float
-        Of sun and planets, a [m].
-    carrier_speed : float
-        Mean speed Omega of the carrier [rad/s].
-
-    Returns
-    -------
-    MechanicalSystem
-        ``gyroscopic`` multiplies the carrier speed; K holds the centripetal terms, the load the centrifugal
-        forces of the planets.
-    """
-    system = model.system
-    place, mass = {name: i for i, name in enumerate(system.dofs)}, np.diag(system.M)
-    x = np.array([i for name, i in place.items() if name.endswith(": x")])
-    sine = model.ring_slice.start + np.flatnonzero(model.ring_phase == 1)
-    diameter = model.ring_diameter[sine - model.ring_slice.start]
-    first, second = np.concatenate([x, sine - 1]), np.concatenate([x + 1, sine])
-    waves = np.concatenate([np.ones(len(x)), diameter])
-    gyroscopic, centripetal, load = np.zeros_like(system.K), np.zeros(len(mass)), system.load.copy()
-    gyroscopic[first, second] = -2.0 * waves * mass[first]
-    gyroscopic[second, first] = 2.0 * waves * mass[first]
-    centripetal[first] = centripetal[second] = waves**2 * mass[first]
-    for number, psi in enumerate(model.planet_angles):
-        i = place[f"planet {number + 1}: x"]
-        centripetal[place["carrier: rotation"]] -= mass[i] * centre_distance**2
-        outwards = carrier_speed**2 * mass[i] * centre_distance
-        load[i : i + 2] += outwards * np.array([np.cos(psi), np.sin(psi)])
-    K = system.K - carrier_speed**2 * np.diag(centripetal)
-    return replace(system, K=K, load=load, gyroscopic=gyroscopic)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ from femgear.housing.sensor import (
     hanning_model,
 )
 from femgear.report.tables import Block, chosen
-from femgear.storage.dataset import FOURIER, RPM, _mesh_names, complex_entries, dataset, response_entries
+from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset, response_entries
+from femgear.system.assembler import mesh_names
 from femgear.trains.elastic.checks import checked_speeds, missing_level
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 
@@ -92,7 +93,7 @@ class ModesResult:
             )
             for part in ("real", "imag"):
                 variables[f"{name}_{part}"] = ("mode circumferential", getattr(field, part), "kg^-1/2", words)
-        names, diameters = _mesh_names(len(modes.mesh_stiffness) // 2), np.arange(-n_max, n_max + 1)
+        names, diameters = mesh_names(len(modes.mesh_stiffness) // 2), np.arange(-n_max, n_max + 1)
         denser = "position in mesh periods, denser near jumps of the stiffness"
         return dataset(
             variables,
@@ -130,7 +131,6 @@ class DynamicsResult:
     dte: np.ndarray
     ring_radial: np.ndarray
     ring_tangential: np.ndarray
-    mesh_names: tuple[str, ...]
     ring_teeth: int
     excitation_limit: np.ndarray
     level_change: np.ndarray
@@ -140,8 +140,9 @@ class DynamicsResult:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What an engineer should not overlook in this result."""
-        rpm = self.input_speed * 30.0 / np.pi
-        return missing_level(rpm, self.level_change, self.excitation_limit, self.compared_to)
+        return missing_level(
+            self.input_speed / RPM, self.level_change, self.excitation_limit, self.compared_to
+        )
 
     def dataset(self) -> xr.Dataset:
         """Contents of dynamics.nc."""
@@ -170,7 +171,7 @@ class DynamicsResult:
             response_entries(self) | reach | complex_entries(entries),
             coords={
                 "speed": ("speed", self.input_speed / RPM, "rpm", "speed of the input"),
-                "mesh": ("mesh", list(self.mesh_names), "1", "gear mesh"),
+                "mesh": ("mesh", mesh_names(self.dte.shape[1] // 2), "1", "gear mesh"),
                 "harmonic": ("harmonic", harmonics, "1", "harmonic of the mesh frequency"),
                 "circumferential": ("circumferential", diameters, "1", "signed nodal diameter n"),
             },
@@ -331,7 +332,7 @@ def _hanning_spectrum(results: Results, speed: int):
 def _published(case, rpm: float, harmonic: int) -> str:
     """What the case file says was published for a speed and mesh harmonic."""
     for entry in case.housing.published:
-        if entry.harmonic == harmonic and np.isclose(entry.speed * 30 / np.pi, rpm):
+        if entry.harmonic == harmonic and np.isclose(entry.speed / RPM, rpm):
             lobes = "" if entry.lobes is None else f"; {entry.lobes} lobes"
             return f"{', '.join(map(str, entry.orders))}{lobes}"
     return "-"

@@ -262,7 +262,6 @@ def solve_dynamics(
         dte=dte,
         ring_radial=field[0],
         ring_tangential=field[1],
-        mesh_names=gears.mesh_names,
         ring_teeth=gears.ring.teeth,
         excitation_limit=limit.frequency,
         level_change=change,

@@ -142,40 +142,6 @@ class ImpactPair:
                 yield HarmonicForce((ratio / z) ** 2 * error * along, _orders(base, 1, count))
 
 
-@dataclass(frozen=True)
-class PairScales:
-    """Units of the dimensionless pair.
-
-    Parameters
-    ----------
-    length : float
-        Half backlash along the line of action [m].
-    frequency : float
-        omega_n [rad/s].
-    force : float
-        k b [N].
-    """
-
-    length: float
-    frequency: float
-    force: float
-
-
-def pair_scales(*, inertia, base_radius, stiffness: float, backlash: float) -> PairScales:
-    """Units of a pair with polar inertias [kg m^2], base radii [m], mesh stiffness [N/m] and play [m].
-
-    Parameters
-    ----------
-    inertia, base_radius : (float, float)
-    stiffness : float
-        Mean.
-    backlash : float
-        Total play along the line of action.
-    """
-    mass = 1.0 / sum(r * r / i for r, i in zip(base_radius, inertia))
-    return PairScales(0.5 * backlash, math.sqrt(stiffness / mass), 0.5 * stiffness * backlash)
-
-
 def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tuple[float, ...]:
     """Frequency ratios at which drive flanks begin to part, ascending: none, one or two.
 

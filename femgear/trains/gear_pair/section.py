@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -14,7 +15,7 @@ from femgear.case.sections import FORMAT, Inertia, Mass, Radius, Stiffness
 from femgear.case.text import ReadCase
 from femgear.case.units import ANGLE, LENGTH, STIFFNESS, TORQUE
 from femgear.errors import CaseError
-from femgear.trains.gear_pair.model import ImpactPair, PairBearings, PairScales, pair_scales
+from femgear.trains.gear_pair.model import ImpactPair, PairBearings
 
 Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
 Ratio = Annotated[float, Number(1e-3, 100.0)]
@@ -148,14 +149,31 @@ def cross_check(case: GearPairCase) -> Iterator[CaseError]:
                             limit="another ratio than from")  # fmt: skip
 
 
+@dataclass(frozen=True)
+class PairScales:
+    """Units of the dimensionless pair.
+
+    Parameters
+    ----------
+    length : float
+        Half backlash along the line of action [m].
+    frequency : float
+        omega_n [rad/s].
+    force : float
+        k b [N].
+    """
+
+    length: float
+    frequency: float
+    force: float
+
+
 def scales_of(case: GearPairCase) -> PairScales:
     """Half backlash, natural frequency and force that count as one."""
     gears, mesh = case.gears, case.mesh
-    return pair_scales(
-        inertia=gears.inertia,
-        base_radius=gears.base_radii,
-        stiffness=mesh.stiffness,
-        backlash=mesh.backlash,
+    mass = 1.0 / sum(r * r / i for r, i in zip(gears.base_radii, gears.inertia))
+    return PairScales(
+        0.5 * mesh.backlash, math.sqrt(mesh.stiffness / mass), 0.5 * mesh.stiffness * mesh.backlash
     )
 
 

@@ -248,10 +248,6 @@ class TrainTorques:
     ----------
     sun, ring, carrier : (S,) arrays
         What couplings, housing, input and output give the members; they add up to zero in every stage.
-    coupling : (C,) array
-        On the second member of every coupling, its reaction on the first.
-    housing : (S,) array
-        On the fixed member of every stage; zero where there is none.
     output : float
         On the output member.
     """
@@ -259,8 +255,6 @@ class TrainTorques:
     sun: np.ndarray
     ring: np.ndarray
     carrier: np.ndarray
-    coupling: np.ndarray
-    housing: np.ndarray
     output: float
 
 
@@ -311,18 +305,11 @@ def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) ->
         As `train_speeds`.
     """
     weights = _radius_weights(data) if radii else _tooth_weights(data)
-    rows = _rows(data, weights)
     # unknown: lambda of every row, and the torque of the output
-    matrix = np.vstack([rows, -_unit(data, data.output)]).T
-    right = torque * _unit(data, data.input)
-    solution = _solved(data, matrix, right)
-    count, stages = len(data.couplings), len(data.stages)
-    housing = np.zeros(stages)
-    held = [n for n, stage in enumerate(data.stages) if stage.fixed is not None]
-    housing[held] = -solution[stages + count : -1]
-    carrier, ring, sun = (solution[:stages, None] * weights).T
-    coupling, output = solution[stages : stages + count], float(solution[-1])
-    return TrainTorques(sun, ring, carrier, coupling, housing, output)
+    matrix = np.vstack([_rows(data, weights), -_unit(data, data.output)]).T
+    solution = _solved(data, matrix, torque * _unit(data, data.input))
+    carrier, ring, sun = (solution[: len(data.stages), None] * weights).T
+    return TrainTorques(sun, ring, carrier, float(solution[-1]))
 
 
 def speed_ratio(data: MultistageSet) -> float:
@@ -625,13 +612,13 @@ def _torque_load(data: MultistageSet, T: np.ndarray, torque: float) -> np.ndarra
         return load
     output = train_torques(data, torque, radii=True).output
     for member, value in ((data.input, torque), (data.output, output)):
-        column = _axis(data, T, member, 2)
-        if not np.any(column):
+        rotation = _rotation(data, T, member)
+        if not np.any(rotation):
             raise CaseError(
                 f"the torque acts on the {member}, which is held", code="E-MECHANISM",
                 remedy="choose members that can turn",
             )  # fmt: skip
-        load += column * value / member_radius(data.stages[member.stage - 1].data, member.name)
+        load += rotation * value
     return load
 
 
