@@ -50,6 +50,7 @@ from femgear.report.style import (
     BLACK,
     BLUE,
     COLOURS,
+    MARKERS,
     ORANGE,
     SIZE,
     SKY,
@@ -76,8 +77,6 @@ if TYPE_CHECKING:
 
 _BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
 
-_MARKERS = "osD^vPX*"
-
 # share of the height below the strongest line that a letter above it takes
 _ROOM = 0.068
 # numbers along an axis, and lines of a spectrum that can be told apart, at most
@@ -102,7 +101,7 @@ def natural_frequencies(modes: xr.Dataset) -> Figure:
         ax.plot(
             diameter[rows],
             frequency[rows] * 1e-3,
-            _MARKERS[i % len(_MARKERS)],
+            MARKERS[i % len(MARKERS)],
             color=COLOURS[i % len(COLOURS)],
             markersize=6,
             markerfacecolor="none",
@@ -276,7 +275,7 @@ def _band_title(speed: str, found: BandAnalysis) -> str:
     )
 
 
-def order_spectrum(housing: xr.Dataset, *, ring_teeth: int, zooms: int = 2) -> Figure:
+def order_spectrum(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
     """Order spectrum with the mesh harmonics marked, and the strongest bands with their lines labelled.
 
     A line of harmonic ``h`` and nodal diameter ``n`` stands at order ``h z_ring - n``.
@@ -287,12 +286,10 @@ def order_spectrum(housing: xr.Dataset, *, ring_teeth: int, zooms: int = 2) -> F
         With ``order_amplitude`` and ``order_amplitude_exact`` (speed, order) [m/s^2]; the first speed is
         drawn.
     ring_teeth : int
-    zooms : int
-        Number of bands shown enlarged.
     """
     order = housing["order"].values
     linear, exact = (housing[name].values[0] for name in ("order_amplitude", "order_amplitude_exact"))
-    bands = _strongest_bands(order, linear, ring_teeth, zooms)
+    bands = _strongest_bands(order, linear, ring_teeth)
     figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.8 * len(bands))
     largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
     floor = 1e-4 * largest
@@ -319,12 +316,12 @@ def order_spectrum(housing: xr.Dataset, *, ring_teeth: int, zooms: int = 2) -> F
     return figure
 
 
-def _strongest_bands(order, amplitude, ring_teeth, count):
-    """Mesh harmonics whose bands hold the strongest lines, ascending."""
+def _strongest_bands(order, amplitude, ring_teeth):
+    """Two mesh harmonics whose bands hold the strongest lines, ascending."""
     harmonics = np.rint(order / ring_teeth).astype(int)
     peaks = {int(h): amplitude[harmonics == h].max() for h in np.unique(harmonics) if h > 0}
     ranked = sorted((h for h in peaks if peaks[h] > 0), key=lambda h: (-peaks[h], h))
-    return sorted(ranked[:count])
+    return sorted(ranked[:2])
 
 
 def _stems(ax, order, amplitude, floor, *, text, colour=BLUE, width=1.0):
@@ -359,13 +356,10 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
         ax.plot(order[shown], exact[shown], "o", markerfacecolor="none", color=VERMILION, label=_EXACT)
     peak = np.maximum(linear, exact)
     limit, longest = peak[inside].max(initial=floor), 0
+    multiple = str(ring_teeth) if harmonic == 1 else f"{harmonic}·{ring_teeth}"
     for k in _labelled(order, peak, inside & (peak > floor), spacing=reach / 22):
         offset = round(order[k]) - centre
-        text = (
-            f"{order[k]:g}"
-            if offset == 0
-            else f"{order[k]:g} = {_multiple(harmonic, ring_teeth)} {offset:+d}"
-        )
+        text = f"{order[k]:g}" if offset == 0 else f"{order[k]:g} = {multiple} {offset:+d}"
         longest = max(longest, len(text))
         ax.annotate(
             text.replace("-", "−"),
@@ -384,10 +378,6 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     ax.set_ylim(floor, limit * (limit / floor) ** (_ROOM * longest) if limit > floor else 10 * floor)
     ax.set_xlim(centre - reach, centre + reach)
     label(ax, "carrier order [1]", _ACCELERATION, f"around mesh harmonic {harmonic} (order {centre})")
-
-
-def _multiple(harmonic, ring_teeth):
-    return str(ring_teeth) if harmonic == 1 else f"{harmonic}·{ring_teeth}"
 
 
 def _labelled(order, amplitude, candidates, *, spacing, limit=12):

@@ -40,13 +40,7 @@ MEMORY = 1.5e9
 
 @dataclass(frozen=True)
 class FrequencyLimit:
-    """Harmonics of excitation and response at every speed, (n_speeds,) integer arrays.
-
-    Parameters
-    ----------
-    frequency : (n_speeds,) array
-        Highest excitation frequency [Hz].
-    """
+    """Harmonics of excitation and response, int, and highest excitation frequency [Hz], all (n_speeds,)."""
 
     excitation: np.ndarray
     response: np.ndarray

@@ -33,7 +33,7 @@ from femgear.report.tables import describe_modes, describe_response, response_wa
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.system.mode_kinds import mode_kinds
-from femgear.system.system import Modes, Response
+from femgear.system.system import Response
 from femgear.threads import one_blas_thread
 from femgear.trains.elastic.checks import (
     case_warnings,
@@ -44,7 +44,6 @@ from femgear.trains.elastic.checks import (
     max_nodal_diameter,
 )
 from femgear.trains.elastic.model import (
-    ElasticSet,
     RingModel,
     body_flexibility,
     elastic_set,
@@ -67,7 +66,7 @@ from femgear.trains.elastic.results import (
     mesh_bands,
 )
 from femgear.trains.protocol import Figures, Progress, Stage, Train
-from femgear.trains.rigid import member_speeds
+from femgear.trains.rigid import member_speeds, modes_verdict
 from femgear.trains.static.description import describe_case
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import (
@@ -211,11 +210,20 @@ def _modal_basis(case: Case, ring: RingModel, bodies, state: LoadedPeriod, *, su
         damping_ratio=case.dynamics.damping_ratio,
         max_frequency=MODES_ABOVE * reach,
     )
+    kinds, diameters = mode_kinds(
+        modes.shape,
+        np.diag(model.system.M),
+        model.system.dofs,
+        frequency=modes.frequency,
+        ring_diameter=model.ring_diameter,
+        ring_slice=model.ring_slice,
+        planet_angles=model.planet_angles,
+    )
     return ModesResult(
         ring=ring,
         model=model,
         excitation=excitation,
-        modes=_named(modes, model),
+        modes=replace(modes, kind=kinds, nodal_diameter=diameters),
         max_diameter=len(ring.compliance) - 1,
         bodies=bodies,
         state=state,
@@ -320,20 +328,6 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     )
 
 
-def _named(modes: Modes, model: ElasticSet) -> Modes:
-    """The modes with their kinds and nodal diameters."""
-    kinds, diameters = mode_kinds(
-        modes.shape,
-        np.diag(model.system.M),
-        model.system.dofs,
-        frequency=modes.frequency,
-        ring_diameter=model.ring_diameter,
-        ring_slice=model.ring_slice,
-        planet_angles=model.planet_angles,
-    )
-    return replace(modes, kind=kinds, nodal_diameter=diameters)
-
-
 def _notices(data: dict) -> Iterator[str]:
     if "bearing_clearance" in data["planet"] and data.get("static", {}).get("members", "fixed") == "fixed":
         yield (
@@ -361,9 +355,7 @@ ELASTIC = Train(
             solve=lambda case, results, context: solve_modes(
                 case, results["static"], progress=context.progress
             ),
-            verdict=lambda result: {
-                "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.model.system.M),
-            },
+            verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=lambda case: ("static", "stress") if case.static.stresses else ("static",),
             check=lambda case: check_dynamic_case(case, planetary_set(case)),

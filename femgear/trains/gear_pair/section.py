@@ -151,17 +151,7 @@ def cross_check(case: GearPairCase) -> Iterator[CaseError]:
 
 @dataclass(frozen=True)
 class PairScales:
-    """Units of the dimensionless pair.
-
-    Parameters
-    ----------
-    length : float
-        Half backlash along the line of action [m].
-    frequency : float
-        omega_n [rad/s].
-    force : float
-        k b [N].
-    """
+    """What counts as one: half backlash [m], natural angular frequency omega_n [rad/s] and force k b [N]."""
 
     length: float
     frequency: float

@@ -53,14 +53,7 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True, order=True)
 class Member:
-    """A central member of a stage.
-
-    Parameters
-    ----------
-    stage : int
-        From 1.
-    name : {"carrier", "ring", "sun"}
-    """
+    """A central member, "carrier", "ring" or "sun", of a stage, counted from 1."""
 
     stage: int
     name: str
@@ -220,14 +213,7 @@ def in_series(stages: Sequence[Stage], *, torsional: float = math.inf, lateral: 
 
 @dataclass(frozen=True, eq=False)
 class TrainSpeeds:
-    """Absolute speeds [rad/s] and mesh frequencies [Hz], one a stage.
-
-    Parameters
-    ----------
-    sun, ring, carrier, planet : (S,) arrays
-        The planet's about its own axis, in the fixed frame.
-    mesh_frequency : (S,) array
-    """
+    """Absolute speeds [rad/s] (planet: its own axis too), mesh frequencies [Hz]; (S,) arrays."""
 
     sun: np.ndarray
     ring: np.ndarray

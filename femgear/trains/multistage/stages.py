@@ -168,15 +168,19 @@ def error_response(
     system, k = multistage_system(data), mean_mesh_stiffness(data)
     if modes is None:
         modes = multistage_modes(data, damping_ratio=damping_ratio).modes
-    unit = train_speeds(data, math.copysign(1.0, speed[0]))
-    forward = unit.sun > unit.carrier
-    found = {}
+    unit, found = train_speeds(data, math.copysign(1.0, speed[0])), {}
     for number, error in errors.items():
-        stage = number - 1
+        columns, hertz = mesh_columns(data)[number - 1], np.abs(speed) * unit.mesh_frequency[number - 1]
         # where the sun turns backwards the mesh runs through its period from the end
-        error = np.asarray(error) if forward[stage] else np.conj(error)
-        mesh_frequency = np.abs(speed) * unit.mesh_frequency[stage]
-        found[number] = _stage_response(system, modes, mesh_frequency, mesh_columns(data)[stage], error, k)
+        error = np.asarray(error) if unit.sun[number - 1] > unit.carrier[number - 1] else np.conj(error)
+        harmonics, inputs = np.arange(1, error.shape[1] + 1), system.W[:, columns] * k[columns]
+        transfer = modal_response(system, modes, np.outer(hertz, harmonics).ravel(), inputs, system.W.T)
+        transfer = transfer.reshape(len(hertz), len(harmonics), len(k), len(columns))
+        deflection = np.einsum("fhoj,jh->fho", transfer, error)
+        force = k * deflection
+        force[..., columns] -= k[columns] * error.T
+        output = np.empty((*force.shape[:2], 0))
+        found[number] = MeshErrorResponse(hertz, harmonics, deflection, force, output)
     return found
 
 
@@ -245,18 +249,6 @@ def multistage_problem(
     standing = multistage_system(replace(data, couplings=couplings)).K
     centred = replace(system, K=standing, gyroscopic=None)
     return replace(problem, system=replace(system, C=viscous_damping(centred, problem.reference, damping)))
-
-
-def _stage_response(system, modes, mesh_frequency, columns, error, k) -> MeshErrorResponse:
-    """Answer of all meshes to the errors (columns, H) of one stage."""
-    harmonics = np.arange(1, error.shape[1] + 1)
-    inputs = system.W[:, columns] * k[columns]
-    transfer = modal_response(system, modes, np.outer(mesh_frequency, harmonics).ravel(), inputs, system.W.T)
-    transfer = transfer.reshape(len(mesh_frequency), len(harmonics), len(k), len(columns))
-    deflection = np.einsum("fhoj,jh->fho", transfer, error)
-    force = k * deflection
-    force[..., columns] -= k[columns] * error.T
-    return MeshErrorResponse(mesh_frequency, harmonics, deflection, force, np.empty((*force.shape[:2], 0)))
 
 
 def _stage_elements(
@@ -429,7 +421,7 @@ MULTISTAGE = Train(
             unavailable=_no_balance,
         ),
     ),
-    describe=lambda case: describe_multistage(case, multistage_of(case)),
+    describe=describe_multistage,
     warnings=multistage_warnings,
     result_warnings=lambda results: balance_warnings(results.balance) if "balance" in results.stages else (),
     figures=_figures,
