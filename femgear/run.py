@@ -58,11 +58,12 @@ def solve(case: Any, only: str | None = None, *, progress: Progress | None = Non
 
 def _solved(case: Any, only: str | None, context: Context) -> Iterator[tuple[Stage, Any, float]]:
     """Stages of a case with their results and seconds, one after the other."""
-    if only == "stress":
-        case = case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})})
+    stages = stages_of(case, only)
+    if only is not None:
+        case = stages[-1].asked(case)
     results, say = {}, context.progress or (lambda name, done, total: None)
     with one_blas_thread():
-        for stage in stages_of(case, only):
+        for stage in stages:
             say(stage.name, 0, 1)
             start = time.perf_counter()
             results[stage.name] = stage.solve(case, results, context)
@@ -86,8 +87,7 @@ def run_case(
     folder : path
         From `run_folder`; its manifest says after every stage what is there.
     only : str, optional
-        Last stage to compute, ``"stress"`` computes the stresses
-        whatever ``static.stresses`` says.
+        Last stage to compute, whatever the case says of it.
     pictures : bool
         Draw figures, fields and report.
     progress : callable, optional

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -110,7 +110,6 @@ class Branches:
 def followed(result, centre_distance: float, speeds, below: float) -> Branches:
     """Branches of all elastic modes that are below a frequency [Hz] at rest."""
     from femgear.solvers.linear.tracking import campbell_data
-    from femgear.trains.elastic.model import ring_wave_shares, turning_system
 
     modes, model = result.modes, result.model
     elastic = np.flatnonzero(modes.frequency > 0.0)
@@ -137,6 +136,87 @@ def followed(result, centre_distance: float, speeds, below: float) -> Branches:
         wave=wave,
         part=shares[largest + wave, columns] / np.where(both > 0.0, both, 1.0),
     )
+
+
+def turning_system(model, *, centre_distance: float, carrier_speed: float):
+    """Add the inertia terms of the turning carrier frame to the matrices of the set.
+
+    A body of mass m at rest in that frame has ``m (x'' - 2 Omega y' - Omega^2 x)`` and
+    ``m (y'' + 2 Omega x' - Omega^2 y)`` (J. Lin and R. G. Parker, J. Vib. Acoust. 121, 1999, 316-321). The
+    ring does not turn: its points run backwards through the frame, ``d/dt - Omega d/dphi`` (S. C. Huang and
+    W. Soedel, J. Sound Vib. 115, 1987, 253-274). The pair ``q = c - i s`` of n nodal diameters, displacement
+    ``Re(q U e^{i n phi})``, has the velocity ``q' - i n Omega q``: the terms of a body of mass 1 at the speed
+    ``n Omega``. Alone it has ``f +- n Omega / 2 pi`` in the frame and f on the ring.
+
+    The centrifugal force ``m Omega^2 a`` of a planet pulls its pin outwards; when the carrier turns by theta
+    the pin comes inwards by ``a theta^2 / 2``, which stiffens that rotation by ``m (Omega a)^2`` a planet. It
+    balances the centripetal term of the planets, so that the rotation of the mechanism stays free.
+
+    Parameters
+    ----------
+    model : femgear.trains.elastic.model.ElasticSet
+    centre_distance : float
+        Of sun and planets, a [m].
+    carrier_speed : float
+        Mean speed Omega of the carrier [rad/s].
+
+    Returns
+    -------
+    MechanicalSystem
+        ``gyroscopic`` multiplies the carrier speed; K holds the centripetal terms, the load the centrifugal
+        forces of the planets.
+    """
+    system = model.system
+    place, mass = {name: i for i, name in enumerate(system.dofs)}, np.diag(system.M)
+    x = np.array([i for name, i in place.items() if name.endswith(": x")])
+    sine = model.ring_slice.start + np.flatnonzero(model.ring_phase == 1)
+    diameter = model.ring_diameter[sine - model.ring_slice.start]
+    first, second = np.concatenate([x, sine - 1]), np.concatenate([x + 1, sine])
+    waves = np.concatenate([np.ones(len(x)), diameter])
+    gyroscopic, centripetal, load = np.zeros_like(system.K), np.zeros(len(mass)), system.load.copy()
+    gyroscopic[first, second] = -2.0 * waves * mass[first]
+    gyroscopic[second, first] = 2.0 * waves * mass[first]
+    centripetal[first] = centripetal[second] = waves**2 * mass[first]
+    for number, psi in enumerate(model.planet_angles):
+        i = place[f"planet {number + 1}: x"]
+        centripetal[place["carrier: rotation"]] -= mass[i] * centre_distance**2
+        outwards = carrier_speed**2 * mass[i] * centre_distance
+        load[i : i + 2] += outwards * np.array([np.cos(psi), np.sin(psi)])
+    K = system.K - carrier_speed**2 * np.diag(centripetal)
+    return replace(system, K=K, load=load, gyroscopic=gyroscopic)
+
+
+def ring_wave_shares(model, shape) -> np.ndarray:
+    """Share the kinetic energy of complex modes out among the travelling waves of the ring.
+
+    Parameters
+    ----------
+    model : femgear.trains.elastic.model.ElasticSet
+    shape : (n, m) complex array
+        Mode shapes, motion ``Re(shape e^{i omega t})``.
+
+    Returns
+    -------
+    (2 n_max + 1, m) array
+        Row ``n_max + n``: the part of the whole that the waves ``e^{i n phi} e^{i omega t}`` hold, phi in the
+        carrier frame; a point of the ring hears them at ``omega - n Omega``. Standing waves have equal parts
+        of n and -n; the other bodies hold what the sum over n misses.
+    """
+    shape = np.asarray(shape, complex)
+    total = np.einsum("im,ij,jm->m", shape.conj(), model.system.M, shape).real
+    ring, n = shape[model.ring_slice], model.ring_diameter
+    largest = int(n.max(initial=0))
+    shares = np.zeros((2 * largest + 1, shape.shape[1]))
+    single = np.ones(len(n), bool)
+    sine = np.flatnonzero(model.ring_phase == 1)
+    single[sine] = single[sine - 1] = False
+    for sign in (1, -1):
+        wave = np.abs(ring[sine - 1] - sign * 1j * ring[sine]) ** 2 / 2.0
+        np.add.at(shares, largest + sign * n[sine], wave)
+    alone = np.flatnonzero(single)
+    for row in (largest + n[alone], largest - n[alone]):
+        np.add.at(shares, row, 0.5 * np.abs(ring[alone]) ** 2)
+    return shares / total
 
 
 def bare_ring(modes, below: float) -> list[tuple[int, float]]:

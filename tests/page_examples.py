@@ -25,3 +25,27 @@ def run_examples(name: str, examples: list[str]) -> list[str]:
             exec(compile(example, f"docs/{name}, example {number + 1}", "exec"), names)
         found.append(output.getvalue())
     return found
+
+
+def documented_variables(heading: str) -> dict[str, tuple[str, str]]:
+    """Dimensions and unit of every variable in the table under a heading of docs/results.md."""
+    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    section = text.split(heading + "\n")[1].split("\n#")[0]
+    rows = re.findall(r"^\|([^|]*)\|([^|]*)\|([^|]*)\|", section, flags=re.MULTILINE)[2:]
+    return {v: (d.strip(), u.strip()) for cell, d, u in rows for v in re.findall(r"`(\w+)`", cell)}
+
+
+def check_documented(data, heading: str) -> None:
+    """Assert that the page names the variables of a dataset with their dimensions and units."""
+    table = documented_variables(heading)
+    assert set(data.data_vars) == table.keys()
+    for name, variable in data.data_vars.items():
+        assert table[name][0] == ", ".join(variable.dims), name
+        assert (table[name][1] or "1") == variable.attrs["units"] and variable.attrs["long_name"]
+
+
+def undocumented_keys(page: str, schema: dict) -> set[str]:
+    """Keys of a case file that no first column of the tables on its page names."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8").split("## Case file")[1]
+    keys = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\|([^|]*)\|", text, flags=re.MULTILINE))))
+    return {k for part in (schema, *schema["$defs"].values()) for k in part.get("properties", {})} - keys

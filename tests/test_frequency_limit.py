@@ -5,13 +5,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.case import planetary_set
 from femgear.errors import CaseError
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_lines
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.trains.elastic.checks import HARMONICS, MEMORY, highest_excitation, limited, missing_level
-from femgear.trains.elastic.stages import _outputs, solve_dynamics, solve_housing, solve_modes, solve_response
+from femgear.trains.elastic.checks import missing_level
+from femgear.trains.elastic.response import (
+    HARMONICS,
+    MEMORY,
+    highest_excitation,
+    limited,
+    mesh_and_ring_outputs,
+)
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_response
 from femgear.trains.reading import read_case, with_value, with_values
 from femgear.trains.static.stages import solve_static
 
@@ -80,15 +86,14 @@ def test_a_limit_below_the_modes_of_the_meshes_is_warned_of(case, static, modes)
 
 
 def test_lines_end_at_the_frequency_and_at_what_memory_and_record_carry(case):
-    gears = planetary_set(case)
-    few = limited(case, gears, [90.0, 1116.0, 30e3], 20e3)
+    few = limited(case, [90.0, 1116.0, 30e3], 20e3)
     assert few.excitation.tolist() == [222, 17, 1]
     assert few.response.tolist() == [234, 29, 3]
     assert few.frequency == pytest.approx([222 * 90.0, 17 * 1116.0, 30e3])
-    assert limited(case, gears, [0.1], 20e3).excitation.tolist() == [HARMONICS]
-    many = limited(case, gears, np.linspace(90.0, 1116.0, 2000), 20e3)
+    assert limited(case, [0.1], 20e3).excitation.tolist() == [HARMONICS]
+    many = limited(case, np.linspace(90.0, 1116.0, 2000), 20e3)
     assert many.response.max() * 144 * 108 * 2000 < 1.5 * MEMORY
-    given = limited(case, gears, [90.0, 1116.0], 20e3, given=6)
+    given = limited(case, [90.0, 1116.0], 20e3, given=6)
     assert given.excitation.tolist() == [6, 6] and given.response.tolist() == [18, 18]
 
 
@@ -103,7 +108,7 @@ def test_speeds_too_slow_for_the_record_are_estimated_from_faster_ones(case, sta
     wide = solve_spectral(
         modes.modes, modes.excitation, [21.6], excitation_harmonics=1041, response_harmonics=1053
     )
-    field = _outputs(modes, wide)[1][0]
+    field = mesh_and_ring_outputs(modes, wide)[1][0]
     lines = fixed_sensor_lines(field, 108, np.array([dynamics.speeds[0].carrier]), 0.0)
     missing = 20 * np.log10(order_level(lines)[0] / found[0])
     assert missing > 3.0 and dynamics.level_change[0] == pytest.approx(missing, abs=1.0)

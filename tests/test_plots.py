@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.ndimage import maximum_filter1d
 
 from femgear.errors import StorageError
-from femgear.report import style
+from femgear.report import response, style
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, distinct_lines
 from femgear.trains.elastic import figures as elastic_figures
@@ -39,18 +39,18 @@ def all_figures():
         "sharing": static_figures.load_sharing(static),
         "sharing unequal": static_figures.load_sharing(unequal),
         "teeth": static_figures.tooth_loads(static),
-        "shapes": elastic_figures.mode_shapes(modes, gears),
+        "shapes": response.mode_shapes(modes, gears),
         "frequencies": elastic_figures.natural_frequencies(modes),
         "dte": elastic_figures.transmission_error_period(dynamics, static),
         "dte of four speeds": elastic_figures.transmission_error_period(
             synthetic.dynamics(speeds=np.arange(500, 3000, 500))
         ),
-        "dte spectrum": elastic_figures.transmission_error_spectrum(dynamics),
-        "sweep": elastic_figures.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
+        "dte spectrum": response.transmission_error_spectrum(dynamics),
+        "sweep": response.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
         "deflection": elastic_figures.ring_mean_deflection(dynamics, gears),
-        "signal": elastic_figures.housing_signal(housing, speed_index=1, ring_teeth=TEETH),
-        "orders": elastic_figures.order_spectrum(housing, speed_index=1, ring_teeth=TEETH),
-        "modulation": elastic_figures.modulation_polar(housing, speed_index=1, ring_teeth=TEETH),
+        "signal": elastic_figures.housing_signal(housing.isel(speed=[1]), ring_teeth=TEETH),
+        "orders": elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH),
+        "modulation": elastic_figures.modulation_polar(housing.isel(speed=[1]), ring_teeth=TEETH),
     }
 
 
@@ -179,7 +179,7 @@ def test_ring_deflection_of_two_nodal_diameters():
 def test_ring_mode_of_three_nodal_diameters():
     modes = synthetic.modes()
     mode = int(np.flatnonzero(modes["nodal_diameter"].values == 3)[0])
-    figure = elastic_figures.mode_shapes(modes, synthetic.planetary_set(), shown=[mode], scale=0.1)
+    figure = response.mode_shapes(modes, synthetic.planetary_set(), shown=[mode], scale=0.1)
     x, y = line_of(figure, "ring, outer surface").get_data()
     angle = np.arctan2(y, x)
     np.testing.assert_allclose(np.hypot(x, y), 0.1 * (1 + 0.1 * np.cos(3 * angle)), rtol=1e-12)
@@ -222,7 +222,7 @@ def test_envelope_of_the_housing_signal():
 def test_sweep_marks_speeds_without_convergence():
     dynamics = synthetic.dynamics(speeds=np.linspace(100, 6000, 30))
     dynamics["converged"].values[[3, 7]] = False
-    line = line_of(elastic_figures.speed_sweep(dynamics), "not converged")
+    line = line_of(response.speed_sweep(dynamics), "not converged")
     np.testing.assert_allclose(line.get_xdata(), dynamics["speed"].values[[3, 7]])
 
 
@@ -380,7 +380,7 @@ def test_no_line_is_drawn_where_there_is_none(harmonics):
     dynamics = dynamics.drop_dims("harmonic").assign_coords(harmonic=h)
     dynamics["dte_real"] = (("speed", "mesh", "harmonic"), lines.real)
     dynamics["dte_imag"] = (("speed", "mesh", "harmonic"), lines.imag)
-    figure = elastic_figures.transmission_error_spectrum(dynamics)
+    figure = response.transmission_error_spectrum(dynamics)
     for ax in figure.axes:
         low, high = ax.get_ylim()
         shown = {}
@@ -454,7 +454,7 @@ def test_the_whole_signal_lies_between_its_extremes():
     wave = housing["acceleration"].values
     wave[:] = np.maximum(wave, 0.2 * wave)
     signal, high, low, *_ = (
-        elastic_figures.housing_signal(housing, speed_index=1, ring_teeth=TEETH).axes[0].get_lines()
+        elastic_figures.housing_signal(housing.isel(speed=[1]), ring_teeth=TEETH).axes[0].get_lines()
     )
     assert np.max(high.get_ydata()) == np.max(wave[1]) and np.min(low.get_ydata()) == np.min(wave[1])
     assert np.all(high.get_ydata()[:-1] >= signal.get_ydata()) and np.all(
@@ -471,7 +471,7 @@ def test_spectra_of_hundreds_of_harmonics_stay_legible():
     housing = housing.drop_dims("order").assign_coords(order=order)
     for name in ("order_amplitude", "order_amplitude_exact"):
         housing[name] = (("speed", "order"), lines)
-    figure = elastic_figures.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH)
     renderer = drawn(figure)
     (top,) = figure.axes[0].child_axes
     boxes = [text.get_window_extent(renderer) for text in top.get_xticklabels()]
@@ -502,6 +502,6 @@ def test_order_spectrum_says_what_its_lines_are():
     assert names == ["Heaviside, linear interpolation", "exact circumferential Fourier"]
     housing["order_amplitude"] = housing["order_amplitude_exact"]
     housing["excitation_limit"] = ("speed", [1080.0, 2500.0])
-    figure = elastic_figures.order_spectrum(housing, speed_index=1, ring_teeth=TEETH)
+    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]), ring_teeth=TEETH)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["exact circumferential Fourier"]
     assert not any(ax.get_lines() for ax in figure.axes) and "excited up to 2.5 kHz" in figure.get_suptitle()

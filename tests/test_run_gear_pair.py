@@ -1,11 +1,8 @@
 """Runs of gear pairs: stages, files, figures, report, and numbers against other ways to them."""
 
-import json
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
+from page_examples import check_documented, undocumented_keys
 from published.multistage_example import CASES
 
 from femgear import cli, open_results
@@ -16,7 +13,6 @@ from femgear.trains.gear_pair.stages import solve_sweep
 from femgear.trains.reading import case_schema, read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
 
-ROOT = Path(__file__).parents[1]
 QUICK = {
     "response.from": 1.1, "response.to": 0.62, "response.harmonics": 6,
     "sweep": {"ranges": [{"from": 0.6, "to": 1.0, "count": 4}], "steps": 60, "most_periods": 60},
@@ -103,23 +99,16 @@ def test_sections_that_repeat_are_points(results):
     ],
 )
 def test_results_page_names_every_variable(results, heading, stage):
-    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
-    section = text.split(heading + "\n")[1].split("\n#")[0]
-    rows = re.findall(r"^\|([^|]*)\|([^|]*)\|([^|]*)\|", section, flags=re.MULTILINE)[2:]
-    table = {v: (d.strip(), u.strip()) for cell, d, u in rows for v in re.findall(r"`(\w+)`", cell)}
-    data = results.stage(stage)
-    assert set(data.data_vars) == table.keys()
-    for name, variable in data.data_vars.items():
-        assert table[name][0] == ", ".join(variable.dims), name
-        assert (table[name][1] or "1") == variable.attrs["units"] and variable.attrs["long_name"]
+    check_documented(results.stage(stage), heading)
 
 
 def test_case_page_names_every_key():
-    text = (ROOT / "docs" / "impacts.md").read_text(encoding="utf-8").split("## Case file")[1]
-    keys = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\|([^|]*)\|", text, flags=re.MULTILINE))))
-    schema = json.loads(json.dumps(case_schema("gear_pair")))
-    named = {key for part in (schema, *schema["$defs"].values()) for key in part.get("properties", {})}
-    assert named - {"gears", "mesh", "operation", "response"} <= keys
+    assert undocumented_keys("impacts.md", case_schema("gear_pair")) <= {
+        "gears",
+        "mesh",
+        "operation",
+        "response",
+    }
 
 
 def test_stages_that_a_case_does_not_ask_for(case, tmp_path, capsys):

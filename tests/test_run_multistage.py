@@ -1,20 +1,18 @@
 """Runs of planetary stages in series: stages, files, figures, report, and numbers against other ways."""
 
 import json
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from page_examples import check_documented, undocumented_keys
 from published.multistage_example import CASES, four_stage_case
 
 from femgear import cli, open_results
 from femgear.errors import CaseError
 from femgear.trains.multistage.model import multistage_system, train_speeds
-from femgear.trains.reading import read_case, to_toml, with_values
+from femgear.trains.multistage.section import multistage_of
+from femgear.trains.reading import case_schema, read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
-
-ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +38,7 @@ def test_stages_and_figures_of_a_run(results):
 
 def test_modes_solve_the_eigenvalue_problem(results):
     modes = results.modes
-    train_system = multistage_system(_train(results.case))
+    train_system = multistage_system(multistage_of(results.case))
     K = train_system.K + (train_system.W * modes["mesh_stiffness"].values) @ train_system.W.T
     shape, omega = modes["shape"].values, 2.0 * np.pi * modes["frequency"].values
     left, right = K @ shape, train_system.M @ shape * omega**2
@@ -48,12 +46,6 @@ def test_modes_solve_the_eigenvalue_problem(results):
     assert modes["energy"].sum("stage").values == pytest.approx(1.0)
     assert modes["dof"].values.tolist() == list(train_system.dofs)
     assert modes["kind"].values.tolist().count("planet") == 6
-
-
-def _train(case):
-    from femgear.trains.multistage.section import multistage_of
-
-    return multistage_of(case)
 
 
 def test_forces_are_sums_of_their_lines(results):
@@ -64,7 +56,7 @@ def test_forces_are_sums_of_their_lines(results):
     np.testing.assert_allclose(data["first_force"].values, rms.values, rtol=1e-12)
     total = np.sqrt((data["first_force"] ** 2).sum("excited_by"))
     np.testing.assert_allclose(data["total_force"].values, total.values, rtol=1e-12)
-    mesh = train_speeds(_train(results.case), 1.0).mesh_frequency
+    mesh = train_speeds(multistage_of(results.case), 1.0).mesh_frequency
     speed = data["speed"].values * np.pi / 30.0
     np.testing.assert_allclose(data["mesh_frequency"].values, np.outer(mesh, speed), rtol=1e-12)
 
@@ -87,33 +79,11 @@ def test_harmonic_balance_is_near_the_modal_summation(results):
     ],
 )
 def test_results_page_names_every_variable(results, heading, stage):
-    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
-    section = text.split(heading + "\n")[1].split("\n#")[0]
-    rows = re.findall(r"^\|([^|]*)\|([^|]*)\|([^|]*)\|", section, flags=re.MULTILINE)[2:]
-    table = {v: (d.strip(), u.strip()) for cell, d, u in rows for v in re.findall(r"`(\w+)`", cell)}
-    data = results.stage(stage)
-    assert set(data.data_vars) == table.keys()
-    for name, variable in data.data_vars.items():
-        assert table[name] == (", ".join(variable.dims), table[name][1])
-        assert (table[name][1] or "1") == variable.attrs["units"] and variable.attrs["long_name"]
+    check_documented(results.stage(stage), heading)
 
 
 def test_case_page_names_every_key():
-    text = (ROOT / "docs" / "multistage.md").read_text(encoding="utf-8").split("## Case file")[1]
-    keys = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\|([^|]*)\|", text, flags=re.MULTILINE))))
-    schema = json.dumps(_schema())
-    for one in _properties(json.loads(schema)) - {"sun_planet", "planet_ring"}:
-        assert one in keys, one
-
-
-def _schema():
-    from femgear.trains.reading import case_schema
-
-    return case_schema("multistage")
-
-
-def _properties(schema):
-    return {key for part in (schema, *schema["$defs"].values()) for key in part.get("properties", {})}
+    assert undocumented_keys("multistage.md", case_schema("multistage")) <= {"sun_planet", "planet_ring"}
 
 
 def test_stages_of_cases_without_gears_or_operation(tmp_path, capsys):

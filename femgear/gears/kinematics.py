@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
@@ -108,23 +109,36 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
     weight = {"sun": zs, "ring": zr, "carrier": -(zs + zr)}
     (free,) = (member for member in MEMBERS if member not in known)
     known[free] = -sum(weight[member] * value for member, value in known.items()) / weight[free]
-    relative = known["sun"] - known["carrier"]
-    return Speeds(
-        sun=known["sun"],
-        planet=known["carrier"] - relative * zs / zp,
-        ring=known["ring"],
-        carrier=known["carrier"],
-        mesh_frequency=abs(relative) * zs / (2.0 * math.pi),
-    )
+    planet, mesh_frequency = planet_motion(known["sun"], known["carrier"], zs, zp)
+    return Speeds(planet=planet, mesh_frequency=mesh_frequency, **known)
+
+
+def planet_motion(sun: Any, carrier: Any, sun_teeth: Any, planet_teeth: Any) -> tuple[Any, Any]:
+    """Speed of the planets about their own axes [rad/s] and mesh frequency [Hz].
+
+    Parameters
+    ----------
+    sun, carrier : float or (S,) array
+        Speeds [rad/s], of one set or of several.
+    sun_teeth, planet_teeth : int or (S,) array
+    """
+    relative = sun - carrier
+    return carrier - relative * sun_teeth / planet_teeth, abs(relative) * sun_teeth / (2.0 * math.pi)
+
+
+def torque_ratios(sun_teeth: int, ring_teeth: int) -> dict[str, float]:
+    """Torques of the members over that of the sun, which are the weights of their speeds (Willis), too.
+
+    Without losses ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``, and
+    ``T_s w_s + T_r w_r + T_c w_c = 0``.
+    """
+    ratio = ring_teeth / sun_teeth
+    return {"sun": 1.0, "ring": ratio, "carrier": -(1.0 + ratio)}
 
 
 def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
-    """External torques [N m] on sun, ring and carrier from that on one `member` of them, without losses.
-
-    ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``.
-    """
-    ratio = planetary.ring.teeth / planetary.sun.teeth
-    share = {"sun": 1.0, "ring": ratio, "carrier": -(1.0 + ratio)}
+    """External torques [N m] on sun, ring and carrier from that on one `member`, see `torque_ratios`."""
+    share = torque_ratios(planetary.sun.teeth, planetary.ring.teeth)
     sun = torque / share[member]
     return Torques(sun=sun, ring=sun * share["ring"], carrier=sun * share["carrier"])
 

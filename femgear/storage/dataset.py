@@ -118,10 +118,6 @@ def response_entries(result: Any) -> dict[str, tuple]:
     }
 
 
-def _mesh_names(n: int) -> list[str]:
-    return [f"sun-planet {i + 1}" for i in range(n)] + [f"planet {i + 1}-ring" for i in range(n)]
-
-
 def in_space(data: RigidSet, motions: np.ndarray, axes: tuple[str, ...]) -> tuple[np.ndarray, list[str]]:
     """Motions of every body along and about x, y (and z) with their names, held ones included.
 

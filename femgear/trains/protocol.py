@@ -104,6 +104,8 @@ class Stage:
         ``(case) -> str``: why the case cannot have the stage, empty where it can.
     needs : callable
         ``(case) -> tuple of str``: stages that must come before.
+    asked : callable
+        ``(case) -> case``: the case as it is computed where the stage is the last one by name.
     check : callable, optional
         ``(case)``: refuses, before a run, what the stage cannot represent.
     tables : callable
@@ -118,27 +120,26 @@ class Stage:
     wanted: Callable[[Any], bool] = lambda case: True
     unavailable: Callable[[Any], str] = lambda case: ""
     needs: Callable[[Any], tuple[str, ...]] = lambda case: ()
+    asked: Callable[[Any], Any] = lambda case: case
     check: Callable[[Any], object] | None = None
     tables: Callable[[Results], Iterable[Block]] = lambda results: ()
 
 
 @dataclass(frozen=True)
 class OwnFile:
-    """Case file of a train that is no planetary set.
+    """Case file of a train that is no planetary set: it names the train as its model.
 
     Parameters
     ----------
     claims : callable
-        ``(tables) -> bool``: whether a file is of this kind.
-    build : callable
-        ``(tables, text, name, *, numbered) -> case``; see `femgear.trains.reading`.
-    schema : callable
-        ``() -> dict``: JSON schema.
+        ``(tables) -> bool``: further files of this kind.
+    build : callable, optional
+        ``(tables, text, name, *, numbered) -> case``, where the tables do not go to the model as they are;
+        see `femgear.trains.reading`.
     """
 
-    claims: Callable[[dict], bool]
-    build: Callable[..., Any]
-    schema: Callable[[], dict]
+    claims: Callable[[dict], bool] = lambda tables: False
+    build: Callable[..., Any] | None = None
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from femgear.case.text import text_with_points
 from femgear.errors import CaseError, Finding
 from femgear.storage.results import Results, results_of
 from femgear.trains import registry
-from femgear.trains.protocol import OwnFile, Train
+from femgear.trains.protocol import Train
 
 
 def read_case(path: str | os.PathLike) -> Any:
@@ -203,14 +203,14 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
     CaseError
         E-MODEL: no train reads files of this model.
     """
-    own = _own_files()
     if model is None:
         return every_section().model_json_schema()
+    own = _own_files()
     if model not in own:
         raise CaseError(
             "there is no such model", code="E-MODEL", key="--model", value=model, limit=", ".join(own)
         )
-    return own[model].schema()
+    return own[model].model.model_json_schema()
 
 
 @cache
@@ -238,9 +238,14 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
             file=name,
         )
     lines = text if numbered else ""
-    for own_file in _own_files().values():
-        if own_file.claims(data):
-            return own_file.build(data, text, name, numbered=numbered)
+    for train in _own_files().values():
+        own_file = train.own_file
+        if own_file is not None and (data.get("model") == train.name or own_file.claims(data)):
+            if own_file.build is not None:
+                return own_file.build(data, text, name, numbered=numbered)
+            case = checked_case(train.model, data, lines, name, check=train.cross_check)
+            case.read_from(text, lines, name)
+            return case
     if "model" in data:
         raise combine([_unknown_model(data["model"])], lines, name)
     train = _train_of_set(data, lines, name)
@@ -260,9 +265,9 @@ def _build(data: dict, text: str, name: str, *, numbered: bool = True) -> Case:
     return with_shafts(case)
 
 
-def _own_files() -> dict[str, OwnFile]:
+def _own_files() -> dict[str, Train]:
     """Trains with a case file of their own, by the model that the file names."""
-    return {train.name: train.own_file for train in registry.TRAINS if train.own_file is not None}
+    return {train.name: train for train in registry.TRAINS if train.own_file is not None}
 
 
 def _unknown_model(value: object) -> CaseError:

@@ -13,14 +13,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from femgear.case.case import set_deviations
-from femgear.case.sections import MeshStiffnessSection, RigidCase, output_member
+from femgear.case.sections import Case, MeshStiffnessSection, RigidCase, output_member
 from femgear.errors import CaseError
+from femgear.gears.deviations import common_period
+from femgear.gears.kinematics import Speeds, speeds
 from femgear.storage.dataset import in_space
+from femgear.system.rigid_bodies import PlanarTorque
 
 if TYPE_CHECKING:
-    from femgear.gears.kinematics import Speeds
     from femgear.gears.planetary import PlanetarySet
-    from femgear.system.rigid_bodies import PlanarTorque, RigidSet
+    from femgear.system.rigid_bodies import RigidSet
     from femgear.system.system import Modes
 
 Entry = TypeVar("Entry")
@@ -97,14 +99,21 @@ def unheld_member(case: RigidCase, key: str, remedy: str) -> CaseError:
     )
 
 
-def check_one_period(case: RigidCase, gears: PlanetarySet, kind: str) -> None:
-    """Refuse errors whose static record spans several mesh periods (E-PERIODS)."""
-    from femgear.gears.deviations import common_period
+def check_one_period(case: Case, gears: PlanetarySet, takes: str) -> None:
+    """Refuse errors whose static record spans several mesh periods (E-PERIODS).
 
+    Parameters
+    ----------
+    case : Case
+    gears : PlanetarySet
+    takes : str
+        "the planar model takes", or whatever takes one period alone.
+    """
+    # whatever the longest record: one period cut out of many is no period
     periods, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
     if periods > 1:
         raise CaseError(
-            f"the errors of this set span {periods} mesh periods; the {kind} model takes one",
+            f"the errors of this set span {periods} mesh periods; {takes} one",
             code="E-PERIODS",
             key="operation.speeds",
             limit="errors that repeat with every tooth",
@@ -148,15 +157,11 @@ def stiffness_text(given: MeshStiffnessSection) -> str:
 
 def driving_torque(case: RigidCase, *, reacts: bool = True) -> PlanarTorque:
     """The driving torque, which the member that is neither driven nor held takes up, or the supports."""
-    from femgear.system.rigid_bodies import PlanarTorque
-
     return PlanarTorque(case.operation.torque, case.operation.input, output_member(case) if reacts else None)
 
 
-def member_speeds(case: RigidCase, gears: PlanetarySet, speed: float = 1.0) -> Speeds:
+def member_speeds(case: Case, gears: PlanetarySet, speed: float = 1.0) -> Speeds:
     """Speeds of all members at a speed of the input [rad/s]."""
-    from femgear.gears.kinematics import speeds
-
     return speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
 
 

@@ -1,14 +1,16 @@
 """The elastic set against exact kinematics, equilibrium, and a whole toothed ring of finite elements."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from gyroscopic import ring_wave_shares, turning_system
 from scipy.sparse.linalg import splu
 
 from femgear.contact.bodies import active_flank_load, make_sectors
 from femgear.contact.flank_pairs import mesh_pairs, separation
-from femgear.errors import CaseError, ContactError
+from femgear.errors import ContactError
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.fe.reduction import CyclicModes
@@ -20,24 +22,22 @@ from femgear.system.rigid_bodies import PlanarBody, planar_from_set
 from femgear.trains.elastic.model import (
     RADIAL,
     TANGENTIAL,
-    BodyData,
-    RigidBodies,
     RingModel,
-    ShaftData,
     elastic_set,
+    highest_mesh_mode,
     mesh_excitation,
     ring_displacement,
     ring_field,
     ring_mesh_compliance,
     ring_model,
-    ring_wave_shares,
-    turning_system,
 )
 
 STEEL = Material(206e9, 0.3, 7850.0)
-SUN, CARRIER = BodyData(0.22, 1e-4, 5e7), BodyData(3.0, 6e-3, 2e8)
-PLANET = BodyData(0.355, 2.17e-4, 3e8)
-MOTOR, BRAKE = ShaftData(0.02, 400.0), ShaftData(0.2, 5000.0)
+SUN = SimpleNamespace(mass=0.22, inertia=1e-4, support_stiffness=5e7)
+CARRIER = SimpleNamespace(mass=3.0, inertia=6e-3, support_stiffness=2e8)
+PLANET = SimpleNamespace(mass=0.355, inertia=2.17e-4, bearing_stiffness=3e8)
+MOTOR = SimpleNamespace(inertia=0.02, coupling_stiffness=400.0)
+BRAKE = SimpleNamespace(inertia=0.2, coupling_stiffness=5000.0)
 TORQUE = 100.0
 
 
@@ -78,8 +78,17 @@ def ring(sector):
     return make_ring(sector, gear_set())
 
 
+def bodies(*, motor=MOTOR, brake=BRAKE, bearing=PLANET.bearing_stiffness):
+    """What `elastic_set` reads of a case."""
+    planet = SimpleNamespace(mass=PLANET.mass, inertia=PLANET.inertia, bearing_stiffness=bearing)
+    operation = SimpleNamespace(input="sun")
+    return SimpleNamespace(
+        sun=SUN, carrier=CARRIER, planet=planet, motor=motor, brake=brake, operation=operation
+    )
+
+
 def make(gears, ring, *, motor=MOTOR, brake=BRAKE, torque=TORQUE):
-    return elastic_set(gears, ring, RigidBodies(SUN, CARRIER, PLANET, motor, brake), sun_torque=torque)
+    return elastic_set(bodies(motor=motor, brake=brake), gears, ring, sun_torque=torque)
 
 
 def place(model, name):
@@ -289,7 +298,7 @@ def test_compliance_between_meshes_is_that_of_the_ring_modes_with_their_static_p
     """All nodal diameters together give the compliance of the ring; symmetric, positive definite."""
     gears = gear_set()
     for own in (ring, make_ring(sector, gears, foundation_stiffness=1e17)):
-        C = ring_mesh_compliance(own.compliance, np.arange(27), 108, gears.planet_angles)
+        C = ring_mesh_compliance(own.compliance, 108, gears.planet_angles)
         assert np.array_equal(C, C.T) or np.abs(C - C.T).max() < 1e-18
         assert np.linalg.eigvalsh(C).min() > 0
         model = make(gears, own)
@@ -332,9 +341,6 @@ def test_spring_and_ring_in_series_are_the_static_mesh():
 def test_meshes_that_cannot_be_linearised_are_refused():
     k, force, still = np.full((6, 4), 5e8), np.full((6, 4), 1e3), np.full((6, 4), 2e-6)
     C = np.diag(np.full(3, 1e-10))
-    with pytest.raises(CaseError, match="without torque") as caught:
-        mesh_excitation(0 * k, 0 * still, 0 * force, C, backlash=0.0)
-    assert caught.value.code == "E-NO-LOAD"
     opened = k.copy()
     opened[[1, 4], 2] = 0.0
     with pytest.raises(ContactError, match="planet 2 carries nothing") as caught:
@@ -443,7 +449,7 @@ def test_turning_terms_are_those_of_the_kinetic_energy(sector, ring):
 
 def test_centrifugal_preload_of_the_pins_is_that_of_their_potential(ring):
     """Bearing and centrifugal potential with pins on their circle, differentiated numerically."""
-    gears, speed, k, m, a = gear_set(), 200.0, PLANET.stiffness, PLANET.mass, 0.051
+    gears, speed, k, m, a = gear_set(), 200.0, PLANET.bearing_stiffness, PLANET.mass, 0.051
     model = make(gears, ring)
     system = turning(model, speed)
     names = ["carrier: rotation", *(f"planet {n}: {axis}" for n in (1, 2, 3) for axis in "xy")]
@@ -473,7 +479,7 @@ def test_centrifugal_preload_of_the_pins_is_that_of_their_potential(ring):
 
     found = np.array([[second(i, j) for j in range(7)] for i in range(7)])
     # without the brake's shaft and with the planets' own motion alone
-    expected = system.K[np.ix_(rows, rows)] - np.diag([BRAKE.stiffness, *[0.0] * 6])
+    expected = system.K[np.ix_(rows, rows)] - np.diag([BRAKE.coupling_stiffness, *[0.0] * 6])
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     assert found / scale == pytest.approx(expected / scale, abs=3e-5)
     # the rotation of all together meets nothing
@@ -532,13 +538,13 @@ def test_turning_set_with_a_rigid_ring_is_the_planar_set():
     planar = gear_set_system(
         planar_from_set(
             gears,
-            sun=PlanarBody(SUN.mass, SUN.inertia, SUN.stiffness),
-            carrier=PlanarBody(CARRIER.mass, CARRIER.inertia, CARRIER.stiffness),
+            sun=PlanarBody(SUN.mass, SUN.inertia, SUN.support_stiffness),
+            carrier=PlanarBody(CARRIER.mass, CARRIER.inertia, CARRIER.support_stiffness),
             planet=PlanarBody(PLANET.mass, PLANET.inertia),
             ring=PlanarBody(1.0, 1.0, np.inf, np.inf),
             stiffness_sun_planet=5e8,
             stiffness_planet_ring=7e8,
-            planet_bearing=PLANET.stiffness,
+            planet_bearing=PLANET.bearing_stiffness,
         ),
         carrier_speed=speed,
     )
@@ -574,16 +580,9 @@ def test_wave_shares_tell_standing_from_travelling_waves(ring):
 
 def test_highest_mesh_mode_is_not_that_of_a_stiff_bearing():
     """Sun and planets in torsion: the reference set's 14 to 17 kHz, whatever the bearings are."""
-    from femgear.trains.elastic.model import highest_mesh_mode
-
     gears, stiffness = gear_set(), np.repeat([5e8, 6.8e8], 3)
     found = [
-        highest_mesh_mode(
-            gears,
-            stiffness,
-            RigidBodies(SUN, CARRIER, BodyData(0.355, 2.17e-4, bearing)),
-            sun_torque=100.0,
-        )
+        highest_mesh_mode(bodies(bearing=bearing), gears, stiffness, sun_torque=100.0)
         for bearing in (1e7, 3e8, 1e12, 1e15)
     ]
     assert found == pytest.approx(found[0] * np.ones(4), rel=0.1) and 12e3 < found[0] < 18e3

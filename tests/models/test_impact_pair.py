@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from published.multistage_example import CASES
 from scipy.optimize import fsolve
 from trains import example_pair, level_crossings
 
-from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import parameter_curve
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.stroboscopic import sweep_response
@@ -15,7 +15,9 @@ from femgear.system.contact_states import range_states
 from femgear.system.elements import GearMeshes
 from femgear.system.fourier import FourierSeries, SummedSeries, constant, harmonic_lines
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
-from femgear.trains.gear_pair.model import ImpactPair, PairBearings, pair_scales, separation_ratios
+from femgear.trains.gear_pair.model import ImpactPair, PairBearings, separation_ratios
+from femgear.trains.gear_pair.section import scales_of
+from femgear.trains.reading import read_case, with_values
 
 
 def describing_functions(mean, amplitude):
@@ -102,7 +104,11 @@ def test_relative_coordinates_against_displacements_and_moving_flanks():
 
 def test_units_of_a_pair_in_si():
     inertia, radius, k, play, zeta = (2e-3, 5e-3), (0.04, 0.06), 3e8, 80e-6, 0.09
-    scales = pair_scales(inertia=inertia, base_radius=radius, stiffness=k, backlash=play)
+    values = {
+        "gears.inertia": [f"{one} kg m^2" for one in inertia], "mesh.stiffness": f"{k} N/m",
+        "gears.base_radii": [f"{one} m" for one in radius], "mesh.backlash": f"{play} m",
+    }  # fmt: skip
+    scales = scales_of(with_values(read_case(CASES / "gear_pair.toml"), values))
     mass = 1.0 / (0.04**2 / 2e-3 + 0.06**2 / 5e-3)
     assert scales.frequency == pytest.approx(np.sqrt(k / mass))
     load, error, omega = 0.9 * scales.force, 0.72 * scales.length, 1.2 * scales.frequency
@@ -160,48 +166,3 @@ def test_damping_of_fifteen_per_cent_leaves_one_answer_and_nine_per_cent_does_no
     run = sweep_response(lambda r: (example_pair(0.09).problem(r), 1.0), ratios, steps=100, most=250)
     states = range_states(run.lowest[:, 0], run.highest[:, 0], drive=1.0, back=-1.0)
     assert states.tolist() == [1, 2, 0]
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"damping_ratio": -0.1},
-        {"load": np.nan},
-        {"tooth_error": (np.inf,)},
-        {"teeth": (0, 3)},
-        {"eccentricity": (1.0, 2.0, 3.0)},
-    ],
-)
-def test_wrong_pairs_are_refused(change):
-    with pytest.raises(CaseError, match="E-RANGE"):
-        replace(example_pair(0.1), **change)
-
-
-def test_wrong_ratios_and_bearings_are_refused():
-    with pytest.raises(CaseError, match="E-RANGE"):
-        example_pair(0.1).problem(0.0)
-    with pytest.raises(CaseError, match="E-RANGE"):
-        PairBearings(mass=(1.0, 0.0), stiffness=(1.0, 1.0))
-    with pytest.raises(CaseError, match="E-RANGE"):
-        pair_scales(inertia=(1.0, 1.0), base_radius=(1.0, 1.0), stiffness=0.0, backlash=1.0)
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: separation_ratios(damping_ratio=0.1, load=0.0, error=0.5),
-        lambda: separation_ratios(damping_ratio=0.1, load=np.nan, error=0.5),
-        lambda: separation_ratios(damping_ratio="a", load=1.0, error=0.5),
-        lambda: example_pair(0.1).problem(1.0, divided=1.5),
-        lambda: example_pair(0.1).problem("fast"),
-        lambda: ImpactPair(damping_ratio=0.1, load=1.0, teeth=(20, 20), eccentricity=(1.0, 1.0)),
-        lambda: ImpactPair(damping_ratio=0.1, load=1.0, teeth=(20.5, 30)),
-        lambda: ImpactPair(damping_ratio="a", load=1.0),
-        lambda: ImpactPair(damping_ratio=0.1, load="a"),
-        lambda: PairBearings(mass=("a", 1.0), stiffness=(1.0, 1.0)),
-        lambda: pair_scales(inertia=(1.0, "a"), base_radius=(1.0, 1.0), stiffness=1.0, backlash=1.0),
-    ],
-)
-def test_questions_without_answer_are_refused(make):
-    with pytest.raises(CaseError):
-        make()

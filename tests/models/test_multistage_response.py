@@ -12,7 +12,7 @@ from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import mesh_elements
-from femgear.system.fourier import FourierSeries, distinct_lines, harmonic_lines
+from femgear.system.fourier import FourierSeries, distinct_lines, harmonic_lines, tooth_lines
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.trains.multistage.model import (
     Member,
@@ -26,7 +26,7 @@ from femgear.trains.multistage.model import (
     turning_couplings,
 )
 from femgear.trains.multistage.section import stage_gears
-from femgear.trains.multistage.stages import base_frequencies, error_response, multistage_problem, stage_error
+from femgear.trains.multistage.stages import base_frequencies, error_response, multistage_problem
 from femgear.trains.planar.model import phased_series, planar_problem
 
 SPEED, TORQUE = 50.0 * np.pi, 350.0
@@ -52,7 +52,7 @@ def test_load_bends_the_train_as_the_torques_say():
 def test_modal_summation_is_the_direct_solution_for_every_stage():
     train = four_stage_train()
     waves = np.array([4e-6, 1e-6j]), np.array([-2e-6, 0.5e-6])
-    errors = {n: stage_error(one, *waves) for n, one in enumerate(train.stages, 1)}
+    errors = {n: tooth_lines(*waves, one.phases) for n, one in enumerate(train.stages, 1)}
     speeds = SPEED * np.linspace(0.3, 1.1, 7)
     found = error_response(train, speeds, errors, damping_ratio=0.03)
     system, k = multistage_system(train), mean_mesh_stiffness(train)
@@ -73,7 +73,7 @@ def test_phases_of_the_example_are_those_of_its_gears():
     case, train = four_stage_case(), four_stage_train()
     for one, section in zip(train.stages, case.stage):
         assert one.phases == pytest.approx(stage_gears(section).mesh_phases)
-    error = stage_error(train.stages[2], [1.0], [1.0])
+    error = tooth_lines([1.0], [1.0], train.stages[2].phases)
     assert error[:, 0] == pytest.approx(np.exp(2j * np.pi * train.stages[2].phases))
 
 
@@ -85,7 +85,9 @@ def linear_meshes(one, error):
 
 def test_harmonic_balance_of_linear_meshes_is_the_modal_summation():
     train, speed = two_stages(), 90.0
-    errors = {n: stage_error(one, [3e-6, 1e-6j], [-2e-6, 4e-7]) for n, one in enumerate(train.stages, 1)}
+    errors = {
+        n: tooth_lines([3e-6, 1e-6j], [-2e-6, 4e-7], one.phases) for n, one in enumerate(train.stages, 1)
+    }
     meshes = {n: linear_meshes(one, errors[n]) for n, one in enumerate(train.stages, 1)}
     problem = multistage_problem(train, meshes=meshes, damping=0.02)
     frequency = base_frequencies(train, speed)[:2]
@@ -245,7 +247,7 @@ def test_one_stage_is_the_planar_problem():
 
 def test_suns_that_turn_backwards_run_through_the_mesh_from_its_end():
     train, speed = two_stages(), 90.0
-    errors = {1: stage_error(train.stages[0], [3e-6 + 1e-6j], [2e-6])}
+    errors = {1: tooth_lines([3e-6 + 1e-6j], [2e-6], train.stages[0].phases)}
     there = error_response(train, speed, errors, damping_ratio=0.02)[1]
     mirrored = {1: errors[1].conj()}
     back = error_response(train, -speed, mirrored, damping_ratio=0.02)[1]

@@ -2,10 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from femgear.case.fields import Number, Quantity, Title
-from femgear.case.problems import combine, translate
 from femgear.case.text import ReadCase
 from femgear.case.units import MASS, STIFFNESS
 
@@ -26,14 +25,3 @@ class OscillatorCase(ReadCase):
     model: Literal["oscillator"]
     title: Title
     oscillator: OscillatorSection
-
-
-def build(data, text, name, *, numbered=True):
-    """Case of the tables of a TOML text."""
-    lines = text if numbered else ""
-    try:
-        case = OscillatorCase.model_validate(data)
-    except ValidationError as error:
-        raise combine(translate(error, OscillatorCase), lines, name) from None
-    case.read_from(text, lines, name)
-    return case

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from oscillator.section import OscillatorCase, build
+from oscillator.section import OscillatorCase
 
 from femgear.report.tables import Block
 from femgear.storage.dataset import dataset
@@ -69,7 +69,7 @@ OSCILLATOR = Train(
     name="oscillator",
     words="an oscillator",
     model=OscillatorCase,
-    own_file=OwnFile(lambda data: data.get("model") == "oscillator", build, OscillatorCase.model_json_schema),
+    own_file=OwnFile(),
     stages=(
         Stage(
             name="modes",

@@ -168,7 +168,7 @@ def more_torque() -> tuple[Row, ...]:
 def _mean_motion(modes, factor: float):
     """Mean transmission errors [m] and mesh forces [N] of the model at rest under a part of its load."""
     from femgear.solvers.periodic.spectral import solve_spectral
-    from femgear.trains.elastic.stages import _outputs
+    from femgear.trains.elastic.response import mesh_and_ring_outputs
 
     basis, system = modes.modes, modes.model.system
     basis = replace(
@@ -178,7 +178,7 @@ def _mean_motion(modes, factor: float):
     response = solve_spectral(
         basis, modes.excitation, [1e-3], excitation_harmonics=40, response_harmonics=60, tolerance=1e-9
     )
-    dte, _ = _outputs(replace(modes, modes=basis, model=model), response)
+    dte, _ = mesh_and_ring_outputs(replace(modes, modes=basis, model=model), response)
     return dte[0, :, 0].real, response.force[0, :, 0].real
 
 

@@ -240,8 +240,9 @@ def whole_ring() -> tuple[Row, ...]:
 
 def turning_carrier() -> tuple[Row, ...]:
     """Natural frequencies in the carrier frame, gyroscopic and convective terms included, up to 120 rad/s."""
+    from gyroscopic import ring_wave_shares, turning_system
+
     from femgear.solvers.linear.tracking import campbell_data
-    from femgear.trains.elastic.model import ring_wave_shares, turning_system
 
     basis = reference_modes()
     distance = reference_static().planetary_set.centre_distance
@@ -287,8 +288,9 @@ def turning_carrier() -> tuple[Row, ...]:
 
 def _bare_ring_turning(basis) -> list[Row]:
     """The ring alone on its foundation, seen from the carrier at 120 rad/s."""
+    from gyroscopic import turning_system
+
     from femgear.solvers.linear.modal import complex_modes
-    from femgear.trains.elastic.model import turning_system
 
     alone = replace(basis.model.system, W=np.zeros((len(basis.model.system.M), 0)), flexibility=None)
     alone = turning_system(replace(basis.model, system=alone), centre_distance=0.0, carrier_speed=FASTEST)

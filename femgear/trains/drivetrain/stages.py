@@ -356,7 +356,7 @@ DRIVETRAIN = Train(
     name="drivetrain",
     words="a drivetrain",
     model=DrivetrainCase,
-    own_file=OwnFile(is_drivetrain, build_drivetrain, DrivetrainCase.model_json_schema),
+    own_file=OwnFile(is_drivetrain, build_drivetrain),
     stages=(
         Stage(
             name="modes",

@@ -1,31 +1,25 @@
-"""Refusals and warnings of a case with an elastic ring, and how far up its excitation reaches.
+"""Refusals and warnings of a case with an elastic ring.
 
 Before anything is computed the case is refused where modes, dynamics or housing cannot represent it;
 afterwards a warning says what the housing would feel beyond the excitation.
-
-Mesh stiffness jumps where tooth pairs begin and cease to carry: its harmonics fall like one over their order,
-while the acceleration of the housing grows towards the modes in which meshes are the springs. A fixed number
-of mesh harmonics ends below those modes at low speed. The excitation therefore ends at a frequency, the same
-at all speeds, and the level of the housing is computed again with twice that frequency.
 """
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.case import planetary_set
 from femgear.case.checks import check_floating
-from femgear.case.sections import Case
+from femgear.case.sections import RPM, Case, output_member
 from femgear.errors import CaseError, Finding
-from femgear.gears.kinematics import MEMBERS, torques
+from femgear.gears.kinematics import torques
 from femgear.report.tables import response_warnings
 from femgear.trains.elastic.model import MAX_DIAMETER
+from femgear.trains.rigid import check_one_period, member_speeds
 from femgear.trains.static.description import set_warnings
 
 if TYPE_CHECKING:
@@ -36,17 +30,6 @@ if TYPE_CHECKING:
 
 HIGHEST_RESPONSE = 200e3
 """The wavelength of shear in steel there is 16 mm: shorter waves are no matter of plane gear bodies [Hz]."""
-LOWEST = 20e3
-"""The excitation reaches the end of hearing at least [Hz]."""
-ABOVE_MESHES = 1.4
-"""And this many times the highest natural frequency of the rigid gears on their meshes."""
-STEP = 2500.0
-"""In whole steps, so that variants of one set are excited alike [Hz]."""
-HARMONICS = 512
-"""The record of the static state carries this many harmonics: the jumps are 2^-13 of a period wide. Slower
-speeds are excited less far, and `levels_below` tells what they lose."""
-MEMORY = 1.5e9
-"""Largest size of the lines and signals of a run [bytes]."""
 CHECKED = 12
 """Speeds at which the level is computed again, at most."""
 NOTICEABLE = 1.0
@@ -64,8 +47,6 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
         The ring is not the fixed member, there is no torque, the errors span several mesh periods, or the
         response reaches beyond `HIGHEST_RESPONSE`.
     """
-    from femgear.gears.deviations import common_period
-
     if case.operation.fixed != "ring":
         raise CaseError(
             "modes, dynamics and housing need a fixed ring: it is the housing of this model",
@@ -85,16 +66,7 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
             limit="not zero for modes, dynamics and housing",
             remedy="give a torque, or run with --only static",
         )
-    # whatever the longest record: one period cut out of many is no period
-    periods, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
-    if periods > 1:
-        raise CaseError(
-            f"the errors of this set span {periods} mesh periods; modes, dynamics and housing take one",
-            code="E-PERIODS",
-            key="operation.speeds",
-            limit="errors that repeat with every tooth",
-            remedy="run with --only static, or leave pitch errors and runouts out",
-        )
+    check_one_period(case, gears, "modes, dynamics and housing take")
     fastest_mesh_frequency(case, gears)
 
 
@@ -147,14 +119,13 @@ def check_rim_speed(ring_modes: CyclicModes, carrier_speeds) -> None:
     critical = 2.0 * np.pi * ring_modes.frequency[wave] / ring_modes.nodal_diameter[wave]
     lowest, fastest = int(np.argmin(critical)), float(np.max(np.abs(carrier_speeds)))
     if fastest >= critical[lowest]:
-        rpm = 30.0 / np.pi
         raise CaseError(
-            f"the carrier turns at {fastest * rpm:.6g} rpm, faster than the wave of "
+            f"the carrier turns at {fastest / RPM:.6g} rpm, faster than the wave of "
             f"{ring_modes.nodal_diameter[wave][lowest]} nodal diameters around the ring",
             code="E-SPEED",
             key="operation.speeds",
-            value=f"{fastest * rpm:.6g} rpm of the carrier",
-            limit=f"below {critical[lowest] * rpm:.6g} rpm of the carrier",
+            value=f"{fastest / RPM:.6g} rpm of the carrier",
+            limit=f"below {critical[lowest] / RPM:.6g} rpm of the carrier",
             remedy="leave the highest speeds out, or stiffen the ring or its foundation",
         )
 
@@ -196,8 +167,7 @@ def case_warnings(case: Case) -> tuple[Finding, ...]:
 def _wound_up(case: Case) -> Iterator[Finding]:
     """Couplings that the torque turns further than any stands: a slip of units, as a rule."""
     acting = torques(planetary_set(case), member=case.operation.input, torque=case.operation.torque)
-    output = next(name for name in MEMBERS if name not in (case.operation.input, case.operation.fixed))
-    for name, member in (("motor", case.operation.input), ("brake", output)):
+    for name, member in (("motor", case.operation.input), ("brake", output_member(case))):
         section = getattr(case, name)
         if section is None:
             continue
@@ -214,8 +184,6 @@ def _wound_up(case: Case) -> Iterator[Finding]:
 
 def max_nodal_diameter(case: Case) -> int:
     """Largest nodal diameter of the ring model; beyond half the teeth there are none."""
-    from femgear.trains.elastic.model import MAX_DIAMETER
-
     return max(min(MAX_DIAMETER, case.ring.teeth // 2 - 1), 2)
 
 
@@ -227,9 +195,7 @@ def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
     CaseError
         When the response reaches beyond what a plane model of the ring means anything for.
     """
-    from femgear.gears.kinematics import speeds
-
-    fastest = speeds(gears, input=case.operation.input, fixed="ring", speed=max(case.operation.speeds))
+    fastest = member_speeds(case, gears, max(case.operation.speeds))
     harmonics = case.response_harmonics or 3
     response = max(harmonics * fastest.mesh_frequency, case.dynamics.up_to or 0.0)
     up_to = case.dynamics.up_to
@@ -249,96 +215,16 @@ def fastest_mesh_frequency(case: Case, gears: PlanetarySet) -> float:
             f"{harmonics} harmonics of {fastest.mesh_frequency:.4g} Hz reach {response:.3g} Hz",
             code="E-RANGE",
             key="operation.speeds",
-            value=f"{max(case.operation.speeds) * 30 / np.pi:.6g} rpm",
-            limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed * 30 / np.pi:.4g} rpm here",
+            value=f"{max(case.operation.speeds) / RPM:.6g} rpm",
+            limit=f"up to {HIGHEST_RESPONSE:.3g} Hz, {allowed / RPM:.4g} rpm here",
             remedy="leave the highest speeds out, or fewer dynamics.response_harmonics",
         )
     return fastest.mesh_frequency
 
 
-@dataclass(frozen=True)
-class FrequencyLimit:
-    """Harmonics of excitation and response at every speed, (n_speeds,) integer arrays.
-
-    Parameters
-    ----------
-    frequency : (n_speeds,) array
-        Highest excitation frequency [Hz].
-    """
-
-    excitation: np.ndarray
-    response: np.ndarray
-    frequency: np.ndarray
-
-
-def highest_excitation(case: Case, mesh_mode: float, mesh_frequency: float) -> float:
-    """Frequency to which the excitation reaches unless the case says less [Hz].
-
-    Parameters
-    ----------
-    case : Case
-    mesh_mode : float
-        Highest natural frequency of the rigid gears on their meshes [Hz].
-    mesh_frequency : float
-        Of the fastest speed [Hz].
-    """
-    lowest = STEP * math.ceil(max(LOWEST, ABOVE_MESHES * mesh_mode, 3 * mesh_frequency) / STEP)
-    given = max((case.dynamics.mesh_harmonics or 0) * mesh_frequency, case.dynamics.up_to or 0.0)
-    return max(min(lowest, 0.5 * HIGHEST_RESPONSE), given)
-
-
-def limited(
-    case: Case, gears: PlanetarySet, mesh_frequency, up_to: float, *, given: int | None = None
-) -> FrequencyLimit:
-    """Harmonics up to a frequency, or a given number of them.
-
-    Parameters
-    ----------
-    case : Case
-    gears : PlanetarySet
-    mesh_frequency : (n_speeds,) array
-        [Hz]
-    up_to : float
-        [Hz]; less at the lowest of so many speeds that their lines would fill the memory.
-    given : int, optional
-        Mesh harmonics of the excitation at all speeds.
-    """
-    frequency = np.asarray(mesh_frequency, float)
-    if given is None:
-        # lines of the sensor with their signal, modes, ring field and meshes, a harmonic of all speeds
-        size = len(frequency) * (144 * gears.ring.teeth + 8000 + 96 * gears.n_planets)
-        most = min(HARMONICS, max(int(MEMORY / size), 18))
-        excitation = np.clip(np.floor(up_to / frequency * (1 + 1e-12)), 1, most).astype(int)
-    else:
-        excitation = np.full(len(frequency), given)
-    # products with the low harmonics of the stiffness reach beyond the excitation
-    beyond = excitation + 2 * np.minimum(excitation, 6)
-    response = np.maximum(case.dynamics.response_harmonics or beyond, excitation)
-    return FrequencyLimit(excitation, response, excitation * frequency)
-
-
-def checked_speeds(count: int) -> np.ndarray:
+def checked_speeds(count: int, most: int = CHECKED) -> np.ndarray:
     """Numbers of the speeds at which the level is computed again: all of a few, the ends of many."""
-    return np.unique(np.linspace(0, count - 1, min(count, CHECKED)).round().astype(int))
-
-
-def levels_below(lines, frequency) -> np.ndarray:
-    """Level of the lines of a sensor at one speed up to each of the frequencies, over that of all lines.
-
-    Harmonics of a stiffness that jumps fall as one over their order, so that lines of a slower speed are
-    weaker and closer by the same factor: the share of the level below a frequency depends little on the
-    speed (within 1 dB from 250 to 60 rpm of the reference set).
-
-    Parameters
-    ----------
-    lines : SensorLines
-        Of one speed.
-    frequency : (n,) array
-        [Hz]
-    """
-    power = np.cumsum(np.abs(lines.acceleration) ** 2)
-    place = np.searchsorted(lines.frequency, frequency, side="right") - 1
-    return np.sqrt(power[place] / power[-1])
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
 def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:

@@ -17,12 +17,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from femgear.case.case import material_of, planetary_set
+from femgear.case.sections import RPM
+from femgear.contact.bodies import active_flank_load, make_sectors
+from femgear.fe.elasticity import mass
+from femgear.fe.reduction import cyclic_modes, sector_basis
 from femgear.housing.orders import BandAnalysis, analyse_band
 from femgear.housing.orders import order_spectrum as _spectrum
+from femgear.report.animation import animate_operating_deflection
 from femgear.report.response import (
-    MANY_SPEEDS,
+    MODE_CAPTIONS,
+    RESPONSE_CAPTIONS,
     draw_static,
     excited_harmonics,
     fine_positions,
@@ -30,15 +37,20 @@ from femgear.report.response import (
     mode_shapes,
     name_kinds,
     panels,
+    response_figures,
     shown_speeds,
     some_speeds,
-    speed_sweep,
-    transmission_error_spectrum,
+)
+from femgear.report.scene import (
+    deformed_picture,
+    ring_modes_grid,
+    write_vtu,
 )
 from femgear.report.style import (
     BLACK,
     BLUE,
     COLOURS,
+    MARKERS,
     ORANGE,
     SIZE,
     SKY,
@@ -65,14 +77,12 @@ if TYPE_CHECKING:
 
 _BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
 
-_MARKERS = "osD^vPX*"
-
 # share of the height below the strongest line that a letter above it takes
 _ROOM = 0.068
 # numbers along an axis, and lines of a spectrum that can be told apart, at most
 _TICKS, _STEMS = 20, 4000
 _LINEAR, _EXACT = "Heaviside, linear interpolation", "exact circumferential Fourier"
-ACCELERATION = "acceleration [m/s²]"
+_ACCELERATION = "acceleration [m/s²]"
 
 
 def natural_frequencies(modes: xr.Dataset) -> Figure:
@@ -91,7 +101,7 @@ def natural_frequencies(modes: xr.Dataset) -> Figure:
         ax.plot(
             diameter[rows],
             frequency[rows] * 1e-3,
-            _MARKERS[i % len(_MARKERS)],
+            MARKERS[i % len(MARKERS)],
             color=COLOURS[i % len(COLOURS)],
             markersize=6,
             markerfacecolor="none",
@@ -196,47 +206,40 @@ def _free_angle(angles) -> float:
     return float(np.degrees(sorted_angles[widest] + gaps[widest] / 2))
 
 
-def shown_harmonics(housing: xr.Dataset, *, speed_index: int, ring_teeth: int) -> tuple[int, ...]:
+def _shown_harmonics(housing: xr.Dataset, ring_teeth: int) -> tuple[int, ...]:
     """The first mesh harmonic, and the one with the strongest line where that is another one."""
-    order, amplitude = housing["order"].values, housing["order_amplitude"].values[speed_index]
+    order, amplitude = housing["order"].values, housing["order_amplitude"].values[0]
     audible = order > ring_teeth / 2
     strongest = round(float(order[audible][np.argmax(amplitude[audible])]) / ring_teeth)
     return tuple(sorted({1, max(1, strongest)}))
 
 
-def band(housing: xr.Dataset, *, speed_index: int, ring_teeth: int, harmonic: int) -> BandAnalysis:
+def _band(housing: xr.Dataset, ring_teeth: int, harmonic: int) -> BandAnalysis:
     """Lines, signal, envelope and lobes around one mesh harmonic; see `analyse_band`."""
-    spectrum = _spectrum(housing["acceleration"].values[speed_index])
-    return analyse_band(spectrum, ring_teeth, harmonic)
+    return analyse_band(_spectrum(housing["acceleration"].values[0]), ring_teeth, harmonic)
 
 
-def housing_signal(
-    housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int, harmonics: Sequence[int] | None = None
-) -> Figure:
+def housing_signal(housing: xr.Dataset, *, ring_teeth: int, harmonics: Sequence[int] | None = None) -> Figure:
     """Acceleration over one carrier revolution: whole, and around mesh harmonics with its envelope.
 
     Parameters
     ----------
     housing : xarray.Dataset
-        With ``acceleration`` (speed, time) [m/s^2].
-    speed_index : int
+        With ``acceleration`` (speed, time) [m/s^2]; the first speed is drawn.
     ring_teeth : int
     harmonics : sequence of int, optional
         Mesh harmonics of the bands; the first and the one with the strongest line when omitted.
     """
-    if harmonics is None:
-        harmonics = shown_harmonics(housing, speed_index=speed_index, ring_teeth=ring_teeth)
-    speed = rpm(housing["speed"].values[speed_index])
-    figure, axes = new_figure(
-        rows=1 + len(harmonics), width=9.5, height=1.0 + 2.5 * (1 + len(harmonics)), sharex=True
-    )
-    signal = housing["acceleration"].values[speed_index]
+    harmonics = _shown_harmonics(housing, ring_teeth) if harmonics is None else harmonics
+    speed, count = rpm(housing["speed"].values[0]), 1 + len(harmonics)
+    figure, axes = new_figure(rows=count, width=9.5, height=1.0 + 2.5 * count, sharex=True)
+    signal = housing["acceleration"].values[0]
     text = "largest and smallest within a mesh period"
     around = _extremes(signal, ring_teeth)
-    title = f"{speed}{excited_to(housing, speed_index)}: all orders"
+    title = f"{speed}{excited_to(housing, 0)}: all orders"
     _draw_signal(axes[0], signal, around, title, text=text, colour=ORANGE)
     for ax, harmonic in zip(axes[1:], harmonics):
-        found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
+        found = _band(housing, ring_teeth, harmonic)
         around = found.envelope, -found.envelope
         _draw_signal(ax, found.signal, around, _band_title(speed, found))
         lobes = found.lobes
@@ -255,13 +258,11 @@ def _draw_signal(ax, signal, around, title, *, text="envelope", colour=VERMILION
     for side in around:
         at = np.append(np.arange(len(side)) / len(side), 1.0)
         ax.plot(at, np.append(side, side[0]), color=colour, linewidth=1.3, label=text)
-    label(ax, y=ACCELERATION, title=title)
+    label(ax, y=_ACCELERATION, title=title)
 
 
 def _extremes(signal, ring_teeth):
     """Largest and smallest value within one mesh period around every sample: signals may lack symmetry."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
     size = max(len(signal) // ring_teeth, 1)
     return maximum_filter1d(signal, size, mode="wrap"), minimum_filter1d(signal, size, mode="wrap")
 
@@ -274,7 +275,7 @@ def _band_title(speed: str, found: BandAnalysis) -> str:
     )
 
 
-def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int, zooms: int = 2) -> Figure:
+def order_spectrum(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
     """Order spectrum with the mesh harmonics marked, and the strongest bands with their lines labelled.
 
     A line of harmonic ``h`` and nodal diameter ``n`` stands at order ``h z_ring - n``.
@@ -282,17 +283,13 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     Parameters
     ----------
     housing : xarray.Dataset
-        With ``order_amplitude`` and ``order_amplitude_exact`` (speed, order) [m/s^2].
-    speed_index : int
+        With ``order_amplitude`` and ``order_amplitude_exact`` (speed, order) [m/s^2]; the first speed is
+        drawn.
     ring_teeth : int
-    zooms : int
-        Number of bands shown enlarged.
     """
     order = housing["order"].values
-    linear, exact = (
-        housing[name].values[speed_index] for name in ("order_amplitude", "order_amplitude_exact")
-    )
-    bands = _strongest_bands(order, linear, ring_teeth, zooms)
+    linear, exact = (housing[name].values[0] for name in ("order_amplitude", "order_amplitude_exact"))
+    bands = _strongest_bands(order, linear, ring_teeth)
     figure, axes = new_figure(rows=1 + len(bands), width=9.5, height=3.2 + 3.8 * len(bands))
     largest = max(linear.max(initial=0.0), exact.max(initial=0.0)) or 1.0
     floor = 1e-4 * largest
@@ -309,22 +306,22 @@ def order_spectrum(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int
     top.set_xticks(multiples * ring_teeth, [str(h) for h in multiples])
     top.tick_params(labelsize=SIZE - 2)
     top.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
-    label(axes[0], "carrier order [1]", ACCELERATION)
+    label(axes[0], "carrier order [1]", _ACCELERATION)
     axes[0].set_ylim(floor, 2.5 * largest)
     for ax, harmonic in zip(axes[1:], bands):
         _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form)
-    speed = rpm(housing["speed"].values[speed_index]) + excited_to(housing, speed_index)
+    speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
     figure.suptitle(f"Order spectrum of the fixed sensor, {speed}", fontsize=12)
     legend_below(figure)
     return figure
 
 
-def _strongest_bands(order, amplitude, ring_teeth, count):
-    """Mesh harmonics whose bands hold the strongest lines, ascending."""
+def _strongest_bands(order, amplitude, ring_teeth):
+    """Two mesh harmonics whose bands hold the strongest lines, ascending."""
     harmonics = np.rint(order / ring_teeth).astype(int)
     peaks = {int(h): amplitude[harmonics == h].max() for h in np.unique(harmonics) if h > 0}
     ranked = sorted((h for h in peaks if peaks[h] > 0), key=lambda h: (-peaks[h], h))
-    return sorted(ranked[:count])
+    return sorted(ranked[:2])
 
 
 def _stems(ax, order, amplitude, floor, *, text, colour=BLUE, width=1.0):
@@ -359,13 +356,10 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
         ax.plot(order[shown], exact[shown], "o", markerfacecolor="none", color=VERMILION, label=_EXACT)
     peak = np.maximum(linear, exact)
     limit, longest = peak[inside].max(initial=floor), 0
+    multiple = str(ring_teeth) if harmonic == 1 else f"{harmonic}·{ring_teeth}"
     for k in _labelled(order, peak, inside & (peak > floor), spacing=reach / 22):
         offset = round(order[k]) - centre
-        text = (
-            f"{order[k]:g}"
-            if offset == 0
-            else f"{order[k]:g} = {_multiple(harmonic, ring_teeth)} {offset:+d}"
-        )
+        text = f"{order[k]:g}" if offset == 0 else f"{order[k]:g} = {multiple} {offset:+d}"
         longest = max(longest, len(text))
         ax.annotate(
             text.replace("-", "−"),
@@ -383,11 +377,7 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     # room above the strongest line for its label on the logarithmic axis
     ax.set_ylim(floor, limit * (limit / floor) ** (_ROOM * longest) if limit > floor else 10 * floor)
     ax.set_xlim(centre - reach, centre + reach)
-    label(ax, "carrier order [1]", ACCELERATION, f"around mesh harmonic {harmonic} (order {centre})")
-
-
-def _multiple(harmonic, ring_teeth):
-    return str(ring_teeth) if harmonic == 1 else f"{harmonic}·{ring_teeth}"
+    label(ax, "carrier order [1]", _ACCELERATION, f"around mesh harmonic {harmonic} (order {centre})")
 
 
 def _labelled(order, amplitude, candidates, *, spacing, limit=12):
@@ -401,21 +391,20 @@ def _labelled(order, amplitude, candidates, *, spacing, limit=12):
     return chosen
 
 
-def modulation_polar(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: int) -> Figure:
+def modulation_polar(housing: xr.Dataset, *, ring_teeth: int) -> Figure:
     """Envelope around the shown mesh harmonics over the angle of the carrier, one polar diagram for each.
 
     Parameters
     ----------
     housing : xarray.Dataset
-        With ``acceleration`` (speed, time) [m/s^2].
-    speed_index : int
+        With ``acceleration`` (speed, time) [m/s^2]; the first speed is drawn.
     ring_teeth : int
     """
-    harmonics = shown_harmonics(housing, speed_index=speed_index, ring_teeth=ring_teeth)
-    speed = rpm(housing["speed"].values[speed_index])
+    harmonics = _shown_harmonics(housing, ring_teeth)
+    speed = rpm(housing["speed"].values[0])
     figure, axes = new_figure(columns=len(harmonics), width=5.2 * len(harmonics), height=6.2, polar=True)
     for i, (ax, harmonic) in enumerate(zip(axes, harmonics)):
-        found = band(housing, speed_index=speed_index, ring_teeth=ring_teeth, harmonic=harmonic)
+        found = _band(housing, ring_teeth, harmonic)
         lobes, angle = found.lobes, np.linspace(0.0, 2 * np.pi, len(found.envelope) + 1)
         value = np.append(found.envelope, found.envelope[0])
         ax.plot(angle, value, color=COLOURS[i % len(COLOURS)], linewidth=2.0)
@@ -440,8 +429,6 @@ def modulation_polar(housing: xr.Dataset, *, speed_index: int = 0, ring_teeth: i
 
 def _around(values):
     """Mean over the fifteenth of a turn around every value."""
-    from scipy.ndimage import uniform_filter1d
-
     return uniform_filter1d(values, max(len(values) // 15, 1), mode="wrap")
 
 
@@ -468,15 +455,9 @@ def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
 
 def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     """Modes of the toothed ring on its foundation for 0 to 6 nodal diameters, as VTU and picture."""
-    from femgear.contact.bodies import active_flank_load, make_sectors
-    from femgear.fe.elasticity import mass
-    from femgear.fe.reduction import cyclic_modes, sector_basis
-    from femgear.report.scene import deformed_picture, ring_modes_grid, write_vtu
-
     static, case = drawn.results.get("static"), drawn.case
     if static is None:
         return []
-
     gears, material = static.planetary_set, material_of(case)
     sector = make_sectors(
         gears, material, flank_elements=PICTURE_FLANK_ELEMENTS, refine=PICTURE_REFINE, cache=drawn.cache
@@ -514,16 +495,13 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
 
 def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
     dynamics, data = drawn.data["dynamics"], drawn.data
-    figures = {
-        "dynamic_spectrum": transmission_error_spectrum(dynamics),
-        "dynamic_transmission_error": transmission_error_period(
+    return response_figures(
+        dynamics,
+        dynamic_transmission_error=transmission_error_period(
             dynamics, _on_supports(data.get("modes"), data.get("static"))
         ),
-        "ring_static_deflection": ring_mean_deflection(dynamics, planetary_set(drawn.case)),
-    }
-    if dynamics.sizes["speed"] > MANY_SPEEDS:
-        figures["speed_sweep"] = speed_sweep(dynamics)
-    return figures
+        ring_static_deflection=ring_mean_deflection(dynamics, planetary_set(drawn.case)),
+    )
 
 
 def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Dataset | None:
@@ -535,43 +513,39 @@ def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Data
 
 def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
     """The ring's operating deflection while the carrier turns, at the last speed."""
-    from femgear.report.animation import animate_operating_deflection
-
     case, dynamics = drawn.case, drawn.results.get("dynamics")
     if dynamics is None:
         return []
-
-    last = dynamics.speeds[-1]
-    rpm = case.operation.speeds[-1] * 30 / np.pi
     animate_operating_deflection(
         folder / "operating_deflection.gif",
         drawn.results["static"].planetary_set,
         radial=dynamics.ring_radial[-1],
         tangential=dynamics.ring_tangential[-1],
         sensor_angle=case.housing.sensor_angle,
-        clockwise=last.carrier < 0,
-        title=f"{case.operation.input} at {rpm:.0f} rpm",
+        clockwise=dynamics.speeds[-1].carrier < 0,
+        title=f"{case.operation.input} at {case.operation.speeds[-1] / RPM:.0f} rpm",
     )
     return ["operating_deflection.gif"]
 
 
 def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
     figures, housing, teeth = {}, drawn.data["housing"], planetary_set(drawn.case).ring.teeth
-    drawings = (("housing_signal", housing_signal), ("order_spectrum", order_spectrum))
+    drawings = (
+        ("housing_signal", housing_signal),
+        ("order_spectrum", order_spectrum),
+        ("modulation", modulation_polar),
+    )
     for s in shown_speeds(housing):
-        rpm = round(float(housing["speed"][s]))
-        for name, draw in (*drawings, ("modulation", modulation_polar)):
-            figures[f"{name}_{rpm}_rpm"] = draw(housing, speed_index=s, ring_teeth=teeth)
+        one = housing.isel(speed=[s])
+        for name, draw in drawings:
+            figures[f"{name}_{round(float(one['speed'][0]))}_rpm"] = draw(one, ring_teeth=teeth)
     return figures
 
 
 FIGURES = STATIC | {
     "modes": Figures(
-        {
-            "mode_shapes": (
-                "Mode shapes with mean mesh stiffness: bodies with a mark of their rotation, and the outer "
-                "surface of the ring; at rest in grey."
-            ),
+        MODE_CAPTIONS
+        | {
             "natural_frequencies": "Natural frequencies over the nodal diameters of the ring.",
             "ring_mode": "A mode of the toothed ring on its foundation, on the finite-element grid.",
         },
@@ -579,20 +553,8 @@ FIGURES = STATIC | {
         write=(_write_ring_modes,),
     ),
     "dynamics": Figures(
-        {
-            "dynamic_transmission_error": (
-                "Dynamic transmission error over one mesh period (thick) beside the static one of the set "
-                "on its supports, both without their mean. The thin static curve has the harmonics of the "
-                "excitation alone: what rings in both curves is the cut series, not vibration. Pale: the "
-                "whole static curve."
-            ),
-            "dynamic_spectrum": (
-                "Harmonics of the dynamic transmission error, down to five decades below the largest."
-            ),
-            "speed_sweep": (
-                "Fluctuation of the transmission error over the speed, and the verdicts on the solution: "
-                "the fixed point contracts below 1, the motion is stable up to 1."
-            ),
+        RESPONSE_CAPTIONS
+        | {
             "ring_static_deflection": (
                 "Mean radial deflection of the ring's outer surface, which turns with the carrier."
             ),

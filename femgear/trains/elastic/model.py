@@ -1,8 +1,8 @@
 """Planetary set with an elastic toothed ring: rigid sun, planets and carrier, FE ring on a foundation.
 
 All bodies move in the plane; coordinates are those of the carrier frame, in which the mean motion is removed.
-`elastic_set`, and with it the dynamics, leaves the gyroscopic and convective terms of that frame out;
-`turning_system` adds them, to see what they do to the natural frequencies.
+The gyroscopic and convective terms of that frame are left out; `scripts/gyroscopic.py` shows what they do to
+the natural frequencies.
 
 In the carrier frame the teeth of the ring pass under a load that stands still. `ring_model` therefore
 represents the ring by its cyclic modes on the foundation, with a load spread over the active flank of one
@@ -16,54 +16,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.errors import CaseError, ContactError
+from femgear.errors import ContactError
+from femgear.fe.compliance import condense_sector, cyclic_harmonics
+from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis
+from femgear.gears.gear import half_thickness_angle
+from femgear.gears.kinematics import mesh_normals, torques
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 if TYPE_CHECKING:
+    from femgear.case.sections import Case
     from femgear.fe.grid import Grid
-    from femgear.fe.reduction import CyclicModes
     from femgear.gears.planetary import PlanetarySet
 
 RADIAL, TANGENTIAL = 0, 1
 # nodal diameters of the ring model: their amplitudes fall fast, and 54 points of the housing resolve them
 MAX_DIAMETER = 26
-
-
-@dataclass(frozen=True)
-class BodyData:
-    """A rigid body: mass [kg], polar inertia [kg m^2], isotropic radial support or bearing [N/m]."""
-
-    mass: float
-    inertia: float
-    stiffness: float
-
-
-@dataclass(frozen=True)
-class ShaftData:
-    """A rotating inertia [kg m^2] behind a torsional spring [N m/rad]."""
-
-    inertia: float
-    stiffness: float
-
-
-@dataclass(frozen=True)
-class RigidBodies:
-    """What turns beside the ring.
-
-    Parameters
-    ----------
-    sun, carrier, planet : BodyData
-        Stiffness is the support of sun and carrier, and the bearing between a planet and the carrier.
-    motor, brake : ShaftData, optional
-        Inertias behind springs at the driven member and at the output; without one, its torque acts on the
-        member itself.
-    """
-
-    sun: BodyData
-    carrier: BodyData
-    planet: BodyData
-    motor: ShaftData | None = None
-    brake: ShaftData | None = None
 
 
 @dataclass(frozen=True)
@@ -94,7 +61,7 @@ class ElasticSet:
     planet_angles: np.ndarray
 
 
-def rigid_dofs(n_planets: int, motor: bool, brake: bool) -> tuple[str, ...]:
+def _rigid_dofs(n_planets: int, motor: bool = False, brake: bool = False) -> tuple[str, ...]:
     """Names of the rigid-body degrees of freedom."""
     bodies = ["sun", "carrier", *(f"planet {n + 1}" for n in range(n_planets))]
     names = [f"{body}: {axis}" for body in bodies for axis in ("x", "y", "rotation")]
@@ -102,49 +69,37 @@ def rigid_dofs(n_planets: int, motor: bool, brake: bool) -> tuple[str, ...]:
 
 
 def elastic_set(
-    planetary_set: PlanetarySet,
-    ring: RingModel,
-    bodies: RigidBodies,
-    *,
-    sun_torque: float,
-    driven: str = "sun",
-    flexibility=None,
+    case: Case, planetary_set: PlanetarySet, ring: RingModel, *, sun_torque: float, flexibility=None
 ) -> ElasticSet:
     """Assemble the mechanical system.
 
     Parameters
     ----------
+    case : Case
+        Bodies with their supports and bearings; the input, at which the motor turns, and the brake at the
+        output. Without one of these its torque acts on the member itself.
     planetary_set : PlanetarySet
     ring : RingModel
-    bodies : RigidBodies
     sun_torque : float
         Torque on the sun [N m]; its sign tells which flanks carry.
-    driven : {"sun", "carrier"}
-        Input member.
     flexibility : (2N, 2N) array, optional
         Compliance of the bodies between the meshes, see `body_flexibility` [m/N].
     """
-    motor, brake = ("motor", bodies.motor), ("brake", bodies.brake)
-    names = rigid_dofs(planetary_set.n_planets, bodies.motor is not None, bodies.brake is not None)
+    names = _rigid_dofs(planetary_set.n_planets, case.motor is not None, case.brake is not None)
     place = {name: i for i, name in enumerate(names)}
-    n_rigid = len(names)
-    modes = ring.modes
+    n_rigid, n_p, modes = len(names), planetary_set.n_planets, ring.modes
     paired = modes.paired
     ring_mode = np.repeat(np.arange(len(paired)), np.where(paired, 2, 1))
     ring_phase = np.concatenate([np.arange(2 if p else 1) for p in paired]).astype(int)
     n = n_rigid + len(ring_mode)
-    M, K, W, load = np.zeros(n), np.zeros((n, n)), np.zeros((n, 2 * planetary_set.n_planets)), np.zeros(n)
+    M, K, load, rigid = np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros((n, 2 * n_p))
     M[n_rigid:] = 1.0
     K[range(n_rigid, n), range(n_rigid, n)] = (2 * np.pi * modes.frequency[ring_mode]) ** 2
-    _place_bodies(M, K, place, planetary_set, bodies)
-    shafts = (motor, brake) if driven == "sun" else (brake, motor)
-    _place_shafts(M, K, load, place, planetary_set, shafts, sun_torque)
-    side = 1.0 if sun_torque >= 0 else -1.0
-    rigid = np.zeros_like(W)
-    _mesh_directions(rigid, place, planetary_set, side)
-    W[:] = rigid
+    _place_bodies(M, K, place, planetary_set, case)
+    _place_shafts(M, K, load, place, planetary_set, case, sun_torque)
+    _mesh_directions(rigid, place, planetary_set, sun_torque)
+    W = rigid.copy()
     angles = np.asarray(planetary_set.planet_angles) + ring.load_angle
-    n_p = planetary_set.n_planets
     W[n_rigid:, n_p:] -= ring_displacement(modes, ring_mode, ring_phase, angles)
     ring_names = tuple(
         f"ring: n={modes.nodal_diameter[m]} mode {m} {'sine' if p else 'cosine'}"
@@ -179,15 +134,14 @@ def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.nd
     return ring.norm[ring_mode, None] * np.where(sine, factor.imag, factor.real)
 
 
-def _place_bodies(M, K, place, planetary_set, bodies: RigidBodies) -> None:
-    planet = bodies.planet
-    for name, body in (("sun", bodies.sun), ("carrier", bodies.carrier)):
+def _place_bodies(M, K, place, planetary_set: PlanetarySet, case: Case) -> None:
+    for name, body in (("sun", case.sun), ("carrier", case.carrier)):
         for axis in ("x", "y"):
             i = place[f"{name}: {axis}"]
             M[i] = body.mass
-            K[i, i] += body.stiffness
+            K[i, i] += body.support_stiffness
         M[place[f"{name}: rotation"]] = body.inertia
-    a = planetary_set.centre_distance
+    a, planet = planetary_set.centre_distance, case.planet
     c = [place[f"carrier: {axis}"] for axis in ("x", "y", "rotation")]
     for n, psi in enumerate(planetary_set.planet_angles):
         p = [place[f"planet {n + 1}: {axis}"] for axis in ("x", "y", "rotation")]
@@ -196,82 +150,74 @@ def _place_bodies(M, K, place, planetary_set, bodies: RigidBodies) -> None:
         for planet_dof, carrier_dof, arm in ((p[0], c[0], -a * np.sin(psi)), (p[1], c[1], a * np.cos(psi))):
             column = np.zeros(len(K))
             column[planet_dof], column[carrier_dof], column[c[2]] = 1.0, -1.0, -arm
-            K += planet.stiffness * np.outer(column, column)
+            K += planet.bearing_stiffness * np.outer(column, column)
 
 
-def _place_shafts(M, K, load, place, planetary_set, shafts, sun_torque):
-    ratio = 1.0 + planetary_set.ring.teeth / planetary_set.sun.teeth
-    torques = {"sun": sun_torque, "carrier": -ratio * sun_torque}
-    for (name, shaft), (member, torque) in zip(shafts, torques.items(), strict=True):
+def _place_shafts(M, K, load, place, planetary_set: PlanetarySet, case: Case, sun_torque: float) -> None:
+    """Motor at the input, brake at the output, and the torques behind them."""
+    acting = torques(planetary_set, member="sun", torque=sun_torque)
+    output = "carrier" if case.operation.input == "sun" else "sun"
+    for name, shaft, member in (("motor", case.motor, case.operation.input), ("brake", case.brake, output)):
         end = place[f"{member}: rotation"]
         if shaft is not None:
             i = place[f"{name}: rotation"]
             M[i] = shaft.inertia
-            K[np.ix_([i, end], [i, end])] += shaft.stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
+            K[np.ix_([i, end], [i, end])] += shaft.coupling_stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
             end = i
-        load[end] += torque
+        load[end] += getattr(acting, member)
 
 
-def _mesh_directions(W, place, planetary_set, side):
+def _mesh_directions(W, place, planetary_set: PlanetarySet, sun_torque: float) -> None:
     """Columns whose product with the motions is the approach of the flanks, ring displacement excluded."""
-    s = planetary_set
-    N = s.n_planets
-    for n, psi in enumerate(s.planet_angles):
-        on_planet = psi + side * (np.pi / 2 - s.working_pressure_angle_sun_planet)
-        on_ring = psi - side * (np.pi / 2 - s.working_pressure_angle_planet_ring)
-        for j, angle, body, sign in (
-            (n, on_planet, "sun", 1.0),
-            (n, on_planet, f"planet {n + 1}", -1.0),
-            (N + n, on_ring, f"planet {n + 1}", 1.0),
-        ):
-            W[place[f"{body}: x"], j] = sign * np.cos(angle)
-            W[place[f"{body}: y"], j] = sign * np.sin(angle)
+    s, back = planetary_set, sun_torque < 0.0
+    N, side, normals = s.n_planets, -1.0 if back else 1.0, mesh_normals(s, back=back)
+    for n in range(N):
+        planet = f"planet {n + 1}"
+        for j, body, sign in ((n, "sun", 1.0), (n, planet, -1.0), (N + n, planet, 1.0)):
+            W[[place[f"{body}: x"], place[f"{body}: y"]], j] = sign * normals[j]
         W[place["sun: rotation"], n] = side * s.sun.base_radius
-        W[place[f"planet {n + 1}: rotation"], n] = side * s.planet.base_radius
-        W[place[f"planet {n + 1}: rotation"], N + n] = -side * s.planet.base_radius
+        W[place[f"{planet}: rotation"], n] = side * s.planet.base_radius
+        W[place[f"{planet}: rotation"], N + n] = -side * s.planet.base_radius
 
 
-def highest_mesh_mode(
-    planetary_set: PlanetarySet, stiffness, bodies: RigidBodies, *, sun_torque: float
-) -> float:
+def highest_mesh_mode(case: Case, planetary_set: PlanetarySet, stiffness, *, sun_torque: float) -> float:
     """Highest natural frequency of the rigid gears in a rigid ring whose strain is in the meshes [Hz].
 
-    Modes with less than a tenth of it there are left out: those of stiff bearings and supports.
+    Modes with less than a tenth of it there are left out: those of stiff bearings and supports. So are motor
+    and brake.
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
+    case, planetary_set, sun_torque
+        As for `elastic_set`.
     stiffness : (2N,) array
         Mean mesh stiffness [N/m].
-    bodies, sun_torque
-        As for `elastic_set`; motor and brake are left out.
     """
-    names = rigid_dofs(planetary_set.n_planets, False, False)
+    names = _rigid_dofs(planetary_set.n_planets)
     place = {name: i for i, name in enumerate(names)}
     M, K, W = np.zeros(len(names)), np.zeros((len(names),) * 2), np.zeros((len(names), len(stiffness)))
-    _place_bodies(M, K, place, planetary_set, bodies)
-    _mesh_directions(W, place, planetary_set, 1.0 if sun_torque >= 0 else -1.0)
+    _place_bodies(M, K, place, planetary_set, case)
+    _mesh_directions(W, place, planetary_set, sun_torque)
     K += (W * stiffness) @ W.T
     values, shapes = np.linalg.eigh(K / np.sqrt(np.outer(M, M)))
     strain = stiffness @ (W.T @ (shapes / np.sqrt(M)[:, None])) ** 2
     return float(np.sqrt(values[strain > 0.1 * np.abs(values)].max()) / (2 * np.pi))
 
 
-def ring_mesh_compliance(harmonic_compliance, nodal_diameters, count, angles) -> np.ndarray:
+def ring_mesh_compliance(harmonic_compliance, count: int, angles) -> np.ndarray:
     """Static compliance of the dynamic ring between its mesh points, shape (N, N) [m/N].
 
     Parameters
     ----------
     harmonic_compliance : (m,) array
-        ``H_n`` of the ring's load functional for each nodal diameter.
-    nodal_diameters : (m,) int array
-        The nodal diameters that the dynamic ring keeps, from zero.
+        ``H_n`` of the ring's load functional for the nodal diameters that the dynamic ring keeps, from zero
+        [m/N].
     count : int
         Number of teeth.
     angles : (N,) array
         Planet angles [rad].
     """
-    n = np.asarray(nodal_diameters)
+    n = np.arange(len(harmonic_compliance))
     weight = np.where((n == 0) | (2 * n == count), 1.0, 2.0) / count
     offset = np.asarray(angles)[:, None] - np.asarray(angles)[None, :]
     wave = np.exp(1j * n[:, None, None] * offset)
@@ -319,8 +265,6 @@ def mesh_excitation(
 
     Raises
     ------
-    CaseError
-        Without torque there is no mesh stiffness to linearise.
     ContactError
         When a mesh opens at some position, or the bodies are softer than their meshes.
     """
@@ -328,14 +272,6 @@ def mesh_excitation(
     N = len(force) // 2
     flexibility = np.zeros((2 * N, 2 * N)) if flexibility is None else flexibility
     ring_compliance = held_compliance if ring_compliance is None else ring_compliance
-    if not force.any():
-        raise CaseError(
-            "without torque no tooth carries load, so there is no mesh stiffness for the dynamic model",
-            code="E-NO-LOAD",
-            key="operation.torque",
-            limit="not zero for modes, dynamics and housing",
-            remedy="give a torque, or run with --only static",
-        )
     opened = np.flatnonzero((stiffness <= 0).any(axis=1))
     if len(opened):
         planets = sorted(set(opened % N + 1))
@@ -398,87 +334,6 @@ def ring_field(
     return np.asarray(coordinates) @ columns
 
 
-def turning_system(model: ElasticSet, *, centre_distance: float, carrier_speed: float) -> MechanicalSystem:
-    """Add the inertia terms of the turning carrier frame to the matrices of the set.
-
-    A body of mass m at rest in that frame has ``m (x'' - 2 Omega y' - Omega^2 x)`` and
-    ``m (y'' + 2 Omega x' - Omega^2 y)`` (J. Lin and R. G. Parker, J. Vib. Acoust. 121, 1999, 316-321). The
-    ring does not turn: its points run backwards through the frame, ``d/dt - Omega d/dphi`` (S. C. Huang and
-    W. Soedel, J. Sound Vib. 115, 1987, 253-274). The pair ``q = c - i s`` of n nodal diameters, displacement
-    ``Re(q U e^{i n phi})``, has the velocity ``q' - i n Omega q``: the terms of a body of mass 1 at the speed
-    ``n Omega``. Alone it has ``f +- n Omega / 2 pi`` in the frame and f on the ring.
-
-    The centrifugal force ``m Omega^2 a`` of a planet pulls its pin outwards; when the carrier turns by theta
-    the pin comes inwards by ``a theta^2 / 2``, which stiffens that rotation by ``m (Omega a)^2`` a planet. It
-    balances the centripetal term of the planets, so that the rotation of the mechanism stays free.
-
-    Parameters
-    ----------
-    model : ElasticSet
-    centre_distance : float
-        Of sun and planets, a [m].
-    carrier_speed : float
-        Mean speed Omega of the carrier [rad/s].
-
-    Returns
-    -------
-    MechanicalSystem
-        ``gyroscopic`` multiplies the carrier speed; K holds the centripetal terms, the load the centrifugal
-        forces of the planets.
-    """
-    system = model.system
-    place, mass = {name: i for i, name in enumerate(system.dofs)}, np.diag(system.M)
-    x = np.array([i for name, i in place.items() if name.endswith(": x")])
-    sine = model.ring_slice.start + np.flatnonzero(model.ring_phase == 1)
-    diameter = model.ring_diameter[sine - model.ring_slice.start]
-    first, second = np.concatenate([x, sine - 1]), np.concatenate([x + 1, sine])
-    waves = np.concatenate([np.ones(len(x)), diameter])
-    gyroscopic, centripetal, load = np.zeros_like(system.K), np.zeros(len(mass)), system.load.copy()
-    gyroscopic[first, second] = -2.0 * waves * mass[first]
-    gyroscopic[second, first] = 2.0 * waves * mass[first]
-    centripetal[first] = centripetal[second] = waves**2 * mass[first]
-    for number, psi in enumerate(model.planet_angles):
-        i = place[f"planet {number + 1}: x"]
-        centripetal[place["carrier: rotation"]] -= mass[i] * centre_distance**2
-        outwards = carrier_speed**2 * mass[i] * centre_distance
-        load[i : i + 2] += outwards * np.array([np.cos(psi), np.sin(psi)])
-    K = system.K - carrier_speed**2 * np.diag(centripetal)
-    return replace(system, K=K, load=load, gyroscopic=gyroscopic)
-
-
-def ring_wave_shares(model: ElasticSet, shape) -> np.ndarray:
-    """Share the kinetic energy of complex modes out among the travelling waves of the ring.
-
-    Parameters
-    ----------
-    model : ElasticSet
-    shape : (n, m) complex array
-        Mode shapes, motion ``Re(shape e^{i omega t})``.
-
-    Returns
-    -------
-    (2 n_max + 1, m) array
-        Row ``n_max + n``: the part of the whole that the waves ``e^{i n phi} e^{i omega t}`` hold, phi in the
-        carrier frame; a point of the ring hears them at ``omega - n Omega``. Standing waves have equal parts
-        of n and -n; the other bodies hold what the sum over n misses.
-    """
-    shape = np.asarray(shape, complex)
-    total = np.einsum("im,ij,jm->m", shape.conj(), model.system.M, shape).real
-    ring, n = shape[model.ring_slice], model.ring_diameter
-    largest = int(n.max(initial=0))
-    shares = np.zeros((2 * largest + 1, shape.shape[1]))
-    single = np.ones(len(n), bool)
-    sine = np.flatnonzero(model.ring_phase == 1)
-    single[sine] = single[sine - 1] = False
-    for sign in (1, -1):
-        wave = np.abs(ring[sine - 1] - sign * 1j * ring[sine]) ** 2 / 2.0
-        np.add.at(shares, largest + sign * n[sine], wave)
-    alone = np.flatnonzero(single)
-    for row in (largest + n[alone], largest - n[alone]):
-        np.add.at(shares, row, 0.5 * np.abs(ring[alone]) ** 2)
-    return shares / total
-
-
 @dataclass(frozen=True)
 class RingModel:
     """Modes of the ring and its static compliance at the meshes.
@@ -500,15 +355,6 @@ class RingModel:
     load_angle: float
     compliance: np.ndarray
     held_compliance: np.ndarray
-
-
-def outer_surface_outputs(grid: Grid) -> np.ndarray:
-    """Radial and tangential displacement of the outer surface at the tooth centreline, shape (2n, 2)."""
-    rim = np.unique(grid.boundaries["rim"])
-    node = rim[np.argmin(np.abs(grid.points[rim, 1]))]
-    outputs = np.zeros((2 * len(grid.points), 2))
-    outputs[2 * node, RADIAL] = outputs[2 * node + 1, TANGENTIAL] = 1.0
-    return outputs
 
 
 def ring_model(
@@ -540,10 +386,6 @@ def ring_model(
     side : float
         Sign of the sun's torque: which flanks carry.
     """
-    from femgear.fe.compliance import condense_sector, cyclic_harmonics
-    from femgear.fe.reduction import cyclic_modes, sector_basis
-    from femgear.gears.gear import half_thickness_angle
-
     ring = planetary_set.ring
     diameters = np.arange(max_diameter + 1)
     basis = sector_basis(grid, stiffness + foundation, mass, count=ring.teeth, loads=load)
@@ -551,7 +393,7 @@ def ring_model(
         basis,
         nodal_diameters=diameters,
         loads=load,
-        outputs=outer_surface_outputs(grid),
+        outputs=_outer_surface_outputs(grid),
         max_frequency=max_frequency,
     )
     compliance = [
@@ -570,3 +412,12 @@ def ring_model(
         compliance=compliance[0],
         held_compliance=compliance[1],
     )
+
+
+def _outer_surface_outputs(grid: Grid) -> np.ndarray:
+    """Radial and tangential displacement of the outer surface at the tooth centreline, shape (2n, 2)."""
+    rim = np.unique(grid.boundaries["rim"])
+    node = rim[np.argmin(np.abs(grid.points[rim, 1]))]
+    outputs = np.zeros((2 * len(grid.points), 2))
+    outputs[2 * node, RADIAL] = outputs[2 * node + 1, TANGENTIAL] = 1.0
+    return outputs

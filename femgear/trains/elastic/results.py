@@ -11,10 +11,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.case import planetary_set
 from femgear.case.dependencies import Entries
 from femgear.errors import Finding
+from femgear.housing.orders import analyse_band, order_level, order_spectrum
+from femgear.housing.sensor import (
+    HousingSignal,
+    SensorLines,
+    fixed_sensor_lines,
+    fixed_sensor_signal,
+    hanning_model,
+)
 from femgear.report.tables import Block, chosen
-from femgear.storage.dataset import FOURIER, RPM, _mesh_names, complex_entries, dataset, response_entries
+from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset, response_entries
+from femgear.system.assembler import mesh_names
+from femgear.trains.elastic.checks import checked_speeds, missing_level
+from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,11 +34,9 @@ if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
-    from femgear.housing.sensor import HousingSignal, SensorLines
     from femgear.solvers.stability.parametric import Stability
     from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
-    from femgear.trains.elastic.model import ElasticSet, RingModel
 
 # speeds, and bands at each of them, that are listed
 _FEW = 4
@@ -60,8 +70,6 @@ class ModesResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc."""
-        from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ring_field
-
         modes, model, state, n_max = self.modes, self.model, self.state, self.max_diameter
         record, supported = "mesh supported_position", "static transmission error of the set on its supports"
         between = "compliance between the meshes through their bodies"
@@ -86,7 +94,7 @@ class ModesResult:
             )
             for part in ("real", "imag"):
                 variables[f"{name}_{part}"] = ("mode circumferential", getattr(field, part), "kg^-1/2", words)
-        names, diameters = _mesh_names(len(modes.mesh_stiffness) // 2), np.arange(-n_max, n_max + 1)
+        names, diameters = mesh_names(len(modes.mesh_stiffness) // 2), np.arange(-n_max, n_max + 1)
         denser = "position in mesh periods, denser near jumps of the stiffness"
         return dataset(
             variables,
@@ -124,7 +132,6 @@ class DynamicsResult:
     dte: np.ndarray
     ring_radial: np.ndarray
     ring_tangential: np.ndarray
-    mesh_names: tuple[str, ...]
     ring_teeth: int
     excitation_limit: np.ndarray
     level_change: np.ndarray
@@ -134,10 +141,9 @@ class DynamicsResult:
     @property
     def warnings(self) -> tuple[Finding, ...]:
         """What an engineer should not overlook in this result."""
-        from femgear.trains.elastic.checks import missing_level
-
-        rpm = self.input_speed * 30.0 / np.pi
-        return missing_level(rpm, self.level_change, self.excitation_limit, self.compared_to)
+        return missing_level(
+            self.input_speed / RPM, self.level_change, self.excitation_limit, self.compared_to
+        )
 
     def dataset(self) -> xr.Dataset:
         """Contents of dynamics.nc."""
@@ -166,7 +172,7 @@ class DynamicsResult:
             response_entries(self) | reach | complex_entries(entries),
             coords={
                 "speed": ("speed", self.input_speed / RPM, "rpm", "speed of the input"),
-                "mesh": ("mesh", list(self.mesh_names), "1", "gear mesh"),
+                "mesh": ("mesh", mesh_names(self.dte.shape[1] // 2), "1", "gear mesh"),
                 "harmonic": ("harmonic", harmonics, "1", "harmonic of the mesh frequency"),
                 "circumferential": ("circumferential", diameters, "1", "signed nodal diameter n"),
             },
@@ -200,8 +206,6 @@ class HousingResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of housing.nc."""
-        from femgear.housing.orders import order_level
-
         signal, lines, exact = self.signal, self.lines, self.exact
         heard = np.abs(lines.acceleration), np.abs(exact.acceleration), np.angle(exact.displacement)
         words = (
@@ -260,13 +264,10 @@ def describe_housing(data: xr.Dataset) -> Block:
 
 def mesh_bands(results: Results) -> Block:
     """Dominant lines and lobes around every mesh harmonic of the excitation, at a few speeds."""
-    from femgear.housing.orders import analyse_band, order_spectrum
-
     housing, case = results.housing, results.case
     teeth = int(housing.attrs["ring_teeth"])
     rows, threshold = [], 0.0
-    count = housing.sizes["speed"]
-    for s in sorted({round(i) for i in np.linspace(0, count - 1, min(count, _FEW))}):
+    for s in checked_speeds(housing.sizes["speed"], _FEW):
         spectrum = order_spectrum(housing["acceleration"].values[s])
         windowed = _hanning_spectrum(results, s)
         rpm = float(housing["speed"][s])
@@ -313,10 +314,6 @@ def _shown_harmonics(spectrum, teeth: int, given: int | None) -> list[int]:
 
 def _hanning_spectrum(results: Results, speed: int):
     """Order spectrum of the Hanning-window model with the planet-ring forces of the dynamic solution."""
-    from femgear.case.case import planetary_set
-    from femgear.housing.orders import order_spectrum
-    from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, hanning_model
-
     if "dynamics" not in results.stages:
         return None
     data = results.dynamics
@@ -336,7 +333,7 @@ def _hanning_spectrum(results: Results, speed: int):
 def _published(case, rpm: float, harmonic: int) -> str:
     """What the case file says was published for a speed and mesh harmonic."""
     for entry in case.housing.published:
-        if entry.harmonic == harmonic and np.isclose(entry.speed * 30 / np.pi, rpm):
+        if entry.harmonic == harmonic and np.isclose(entry.speed / RPM, rpm):
             lobes = "" if entry.lobes is None else f"; {entry.lobes} lobes"
             return f"{', '.join(map(str, entry.orders))}{lobes}"
     return "-"

@@ -178,27 +178,19 @@ def _state_numbers(data: xr.Dataset) -> np.ndarray:
     return np.vectorize(STATE_NAMES.index, otypes=[int])(data["state"].values)
 
 
-def draw_response(drawn: Drawn) -> dict[str, Figure]:
+def _draw_response(drawn: Drawn) -> dict[str, Figure]:
     """Amplitude and mean of the branch, with the sweeps as markers."""
     data, names = drawn.data["response"], ("ratio", "amplitude", "mean")
     curve = ("harmonic balance", *(data[name].values for name in names), data["stable"].values)
     sweeps = []
-    if "sweep" in drawn.data:
-        sweep = drawn.data["sweep"]
+    if (sweep := drawn.data.get("sweep")) is not None:
         for n, direction in enumerate(sweep["direction"].values):
-            sweeps.append(
-                (f"sweep {direction}", sweep["ratio"].values, *(sweep[k].values[n] for k in names[1:]))
-            )
+            amplitude, mean = (sweep[name].values[n] for name in names[1:])
+            sweeps.append((f"sweep {direction}", sweep["ratio"].values, amplitude, mean))
     return {"amplitude_and_mean": amplitude_and_mean([curve], sweeps)}
 
 
-def draw_states(drawn: Drawn) -> dict[str, Figure]:
-    """Contact states along the branch and in the sweeps."""
-    rows = contact_rows(drawn.data.get("response"), drawn.data["sweep"])
-    return {"contact_states": state_bands(rows)}
-
-
-def draw_chaos(drawn: Drawn) -> dict[str, Figure]:
+def _draw_chaos(drawn: Drawn) -> dict[str, Figure]:
     """Bifurcation diagram with the exponents, and the long sections."""
     data = drawn.data["chaos"]
     figures = {"chaos": bifurcation_and_exponent(data)}
@@ -214,14 +206,16 @@ FIGURES = {
             "harmonic balance, dashed where the motion is not known to be stable; triangles: settled motions "
             "of the sweeps in time, without those that do not repeat every tooth period."
         },
-        draw_response,
+        _draw_response,
     ),
     "sweep": Figures(
         {
             "contact_states": "Contact over the frequency ratio: drive flanks closed, impacts on one side, "
             "impacts on both; a border is drawn halfway between two computed ratios."
         },
-        draw_states,
+        lambda drawn: {
+            "contact_states": state_bands(contact_rows(drawn.data.get("response"), drawn.data["sweep"]))
+        },
     ),
     "chaos": Figures(
         {
@@ -230,6 +224,6 @@ FIGURES = {
             "sections": "Deflection and velocity once a tooth period at some ratios Ω, with the largest "
             "exponent λ.",
         },
-        draw_chaos,
+        _draw_chaos,
     ),
 }

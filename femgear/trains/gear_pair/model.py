@@ -25,8 +25,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
-from femgear.errors import CaseError, checked_count, checked_numbers
 from femgear.solvers.continuation.branches import Branch
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.elements import GearMeshes
@@ -59,16 +59,6 @@ class PairBearings:
     stiffness: tuple[float, ...]
     damping_ratio: float = 0.0
 
-    def __post_init__(self):
-        given = (self.mass, self.stiffness)
-        values = [checked_numbers(one, "bearings", code="E-RANGE", unit="") for one in given]
-        if any(v.shape != (2,) or not np.all(np.isfinite(v) & (v > 0.0)) for v in values):
-            raise CaseError(
-                f"bearings with masses {self.mass} and stiffnesses {self.stiffness}", code="E-RANGE",
-                limit="two of each, above 0",
-            )  # fmt: skip
-        _not_negative("damping ratio of the bearings", self.damping_ratio)
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ImpactPair:
@@ -100,30 +90,6 @@ class ImpactPair:
     teeth: tuple[int, ...] = (20, 30)
     bearings: PairBearings | None = None
 
-    def __post_init__(self):
-        _not_negative("damping ratio", self.damping_ratio)
-        _number("load", self.load)
-        for name in ("stiffness", "tooth_error", "eccentricity"):
-            given = checked_numbers(getattr(self, name), name, code="E-RANGE", unit="", kind=complex)
-            values = np.atleast_1d(given)
-            if values.ndim != 1 or not np.all(np.isfinite(values)):
-                raise CaseError(f"{name} {values.tolist()}", code="E-RANGE", key=name, limit="finite numbers")
-            object.__setattr__(self, name, tuple(values.tolist()))
-        teeth = checked_numbers(self.teeth, "teeth", code="E-RANGE", unit="")
-        whole = teeth.shape == (2,) and np.all(teeth >= 1) and np.all(teeth == np.floor(teeth))
-        if len(self.eccentricity) != 2 or not whole or not np.all(np.isfinite(teeth)):
-            raise CaseError(
-                f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth", code="E-RANGE",
-                limit="two of each, whole numbers of teeth, one or more",
-            )  # fmt: skip
-        object.__setattr__(self, "teeth", tuple(int(z) for z in teeth))
-        if len(set(self.frequency)) < len(self.frequency):
-            raise CaseError(
-                f"eccentricities {self.eccentricity} of gears with {self.teeth} teeth make two base "
-                "frequencies one", code="E-RANGE", key="eccentricity", limit="every base frequency once",
-                remedy="give the sum of both to one gear where only the mesh counts, or other teeth",
-            )  # fmt: skip
-
     @property
     def frequency(self) -> np.ndarray:
         """Base frequencies of the scaled time: the teeth, then the shafts that are eccentric."""
@@ -140,10 +106,6 @@ class ImpactPair:
         Coordinates x, or y_1, y_2 and x; the one column is x. Solvers are given `frequency`; for motions that
         repeat after several tooth periods ``divided`` counts these, and the first base is 1 / divided.
         """
-        divided = checked_count(divided, "divided", code="E-RANGE")
-        ratio = _number("ratio", ratio, code="E-RANGE")
-        if not (math.isfinite(ratio) and ratio > 0.0):
-            raise CaseError(f"a frequency ratio of {ratio}", code="E-RANGE", key="ratio", limit="above 0")
         M, C, K, along = self._matrices()
         system = MechanicalSystem(
             M=ratio**2 * M, C=ratio * C, K=K, W=np.eye(len(M))[:, -1:], load=self.load * along,
@@ -180,46 +142,6 @@ class ImpactPair:
                 yield HarmonicForce((ratio / z) ** 2 * error * along, _orders(base, 1, count))
 
 
-@dataclass(frozen=True)
-class PairScales:
-    """Units of the dimensionless pair.
-
-    Parameters
-    ----------
-    length : float
-        Half backlash along the line of action [m].
-    frequency : float
-        omega_n [rad/s].
-    force : float
-        k b [N].
-    """
-
-    length: float
-    frequency: float
-    force: float
-
-
-def pair_scales(*, inertia, base_radius, stiffness: float, backlash: float) -> PairScales:
-    """Units of a pair with polar inertias [kg m^2], base radii [m], mesh stiffness [N/m] and play [m].
-
-    Parameters
-    ----------
-    inertia, base_radius : (float, float)
-    stiffness : float
-        Mean.
-    backlash : float
-        Total play along the line of action.
-    """
-    given = {"inertia": inertia, "base_radius": base_radius, "stiffness": stiffness, "backlash": backlash}
-    values = np.concatenate(
-        [np.ravel(checked_numbers(one, key, code="E-RANGE", unit="")) for key, one in given.items()]
-    ).tolist()
-    if np.shape(inertia) != (2,) or len(values) != 6 or not all(math.isfinite(v) and v > 0.0 for v in values):
-        raise CaseError(f"a gear pair with the data {values}", code="E-RANGE", limit="all above 0")
-    mass = 1.0 / sum(r * r / i for r, i in zip(base_radius, inertia))
-    return PairScales(0.5 * backlash, math.sqrt(stiffness / mass), 0.5 * stiffness * backlash)
-
-
 def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tuple[float, ...]:
     """Frequency ratios at which drive flanks begin to part, ascending: none, one or two.
 
@@ -227,23 +149,10 @@ def separation_ratios(*, damping_ratio: float, load: float, error: float) -> tup
     they part where ``error Omega^2 / |1 - Omega^2 + 2 i zeta Omega| = load``, a quadratic equation of
     Omega^2 (Kahraman and Singh 1990, transition from no impact to single-sided impact).
     """
-    given = {"damping_ratio": damping_ratio, "load": load, "error": error}
-    damping_ratio, load, error = (_number(key, value) for key, value in given.items())
-    _not_negative("damping ratio", damping_ratio)
-    if load == 0.0:
-        raise CaseError(
-            "a pair without load has no closed flanks that could part", code="E-RANGE", key="load",
-            limit="not 0",
-        )  # fmt: skip
     s = (error / load) ** 2
     roots = np.roots([1.0 - s, 4.0 * damping_ratio**2 - 2.0, 1.0])
     real = roots[np.abs(roots.imag) < 1e-12].real
     return tuple(float(value) for value in np.sort(np.sqrt(real[real > 0.0])))
-
-
-def lowest_deflection(solution) -> float:
-    """Smallest deflection of a solution in scaled time, over 2048 phases."""
-    return float(solution.at(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES).min())
 
 
 def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray:
@@ -259,18 +168,8 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
         Over the frequency ratio, from ``parameter_curve(pair.problem, ..., 1.0)``.
     level : float
         `DRIVE` for the first impacts, `BACK` for impacts on both flanks.
-
-    Raises
-    ------
-    CaseError
-        A level that is no finite number (E-RANGE).
     """
-    from scipy.optimize import brentq
-
-    number = checked_numbers(level, "level", code="E-RANGE", unit="")
-    if number.ndim or not np.isfinite(number):
-        raise CaseError(f"a level of {number.tolist()}", code="E-RANGE", key="level", limit="a finite number")
-    away = np.array([lowest_deflection(one) for one in branch.solutions]) - level
+    away = np.array([_lowest_deflection(one) for one in branch.solutions]) - level
     borders = []
     for i in np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:])):
         ends, near = branch.parameter[i : i + 2], branch.solutions[i]
@@ -282,24 +181,16 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
             found = solve_harmonic_balance(
                 pair.problem(ratio), 1.0, orders=near.orders, start=near, samples=1024, stability=False
             )
-            return lowest_deflection(found) - level
+            return _lowest_deflection(found) - level
 
         borders.append(brentq(lowest, *ends, xtol=1e-6))
     return np.array(borders)
 
 
+def _lowest_deflection(solution) -> float:
+    """Smallest deflection of a solution in scaled time, over 2048 phases."""
+    return float(solution.at(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES).min())
+
+
 def _orders(base: int, order: int, count: int) -> tuple[int, ...]:
     return tuple(order if place == base else 0 for place in range(count))
-
-
-def _number(key: str, value, code: str = "E-RANGE") -> float:
-    """One finite number."""
-    number = checked_numbers(value, key, code=code, unit="")
-    if number.ndim or not np.isfinite(number):
-        raise CaseError(f"a {key} of {number.tolist()}", code=code, key=key, limit="one finite number")
-    return float(number)
-
-
-def _not_negative(name: str, value: float) -> None:
-    if _number(name, value) < 0.0:
-        raise CaseError(f"{name} {value}", code="E-RANGE", limit="0 or more")

@@ -5,17 +5,17 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from femgear.case.fields import PAIR, Count, Number, Quantity, Section, Title
-from femgear.case.problems import checked_case
 from femgear.case.sections import FORMAT, Inertia, Mass, Radius, Stiffness
 from femgear.case.text import ReadCase
 from femgear.case.units import ANGLE, LENGTH, STIFFNESS, TORQUE
 from femgear.errors import CaseError
-from femgear.trains.gear_pair.model import ImpactPair, PairBearings, PairScales, pair_scales
+from femgear.trains.gear_pair.model import ImpactPair, PairBearings
 
 Angle = Annotated[float, Quantity(ANGLE, -2 * math.pi, 2 * math.pi)]
 Ratio = Annotated[float, Number(1e-3, 100.0)]
@@ -109,20 +109,6 @@ class GearPairCase(Section, ReadCase):
     chaos: ChaosSection | None = None
 
 
-def build_gear_pair(data: dict, text: str, name: str, *, numbered: bool = True) -> GearPairCase:
-    """Case of the tables of a TOML text; see `femgear.trains.protocol.OwnFile`.
-
-    Raises
-    ------
-    CaseError
-        Everything that is wrong, at once.
-    """
-    lines = text if numbered else ""
-    case = checked_case(GearPairCase, data, lines, name, check=cross_check)
-    case.read_from(text, lines, name)
-    return case
-
-
 def cross_check(case: GearPairCase) -> Iterator[CaseError]:
     """What no entry shows alone."""
     mesh, gears = case.mesh, case.gears
@@ -163,14 +149,21 @@ def cross_check(case: GearPairCase) -> Iterator[CaseError]:
                             limit="another ratio than from")  # fmt: skip
 
 
+@dataclass(frozen=True)
+class PairScales:
+    """What counts as one: half backlash [m], natural angular frequency omega_n [rad/s] and force k b [N]."""
+
+    length: float
+    frequency: float
+    force: float
+
+
 def scales_of(case: GearPairCase) -> PairScales:
     """Half backlash, natural frequency and force that count as one."""
     gears, mesh = case.gears, case.mesh
-    return pair_scales(
-        inertia=gears.inertia,
-        base_radius=gears.base_radii,
-        stiffness=mesh.stiffness,
-        backlash=mesh.backlash,
+    mass = 1.0 / sum(r * r / i for r, i in zip(gears.base_radii, gears.inertia))
+    return PairScales(
+        0.5 * mesh.backlash, math.sqrt(mesh.stiffness / mass), 0.5 * mesh.stiffness * mesh.backlash
     )
 
 

@@ -14,6 +14,10 @@ import numpy as np
 
 from femgear.errors import Finding
 from femgear.report.tables import Block
+from femgear.solvers.continuation.branches import Branch, parameter_curve
+from femgear.solvers.continuation.corrector import StepOptions
+from femgear.solvers.stability.lyapunov import LyapunovExponents, lyapunov_exponents
+from femgear.solvers.time.stroboscopic import SweepResponse, sweep_up_and_down
 from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
 from femgear.system.contact_states import (
     STATE_NAMES,
@@ -22,15 +26,11 @@ from femgear.system.contact_states import (
     state_regions,
 )
 from femgear.trains.gear_pair.model import BACK, DRIVE, impact_borders, separation_ratios
-from femgear.trains.gear_pair.section import GearPairCase, build_gear_pair, pair_of, scales_of
+from femgear.trains.gear_pair.section import GearPairCase, cross_check, pair_of, scales_of
 from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train, one_blas_thread
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from femgear.solvers.continuation.branches import Branch
-    from femgear.solvers.stability.lyapunov import LyapunovExponents
-    from femgear.solvers.time.stroboscopic import SweepResponse
 
 # instants of a period at which extremes and contact are looked for
 _INSTANTS = 512
@@ -59,21 +59,21 @@ class ResponseResult:
     def dataset(self) -> xr.Dataset:
         """Contents of response.nc."""
         branch = self.branch
-        variables = _motions(("point",), self.lowest, self.highest, np.real(branch.lines[:, 0, 0]))
+        variables = _motions("point", self.lowest, self.highest, np.real(branch.lines[:, 0, 0]))
         variables |= _numbers(
-            ("point",),
+            "point",
             stable=(branch.stable, "whether the motion is known to be stable"),
             multiplier=(branch.largest_multiplier, "largest Floquet multiplier"),
             **{name: (share, _SHARES[name.partition("_")[0]]) for name, share in self.shares.items()},
         )
-        variables |= _numbers(("limit_point",), fold=(branch.folds, "number of the point, from 0"))
+        variables |= _numbers("limit_point", fold=(branch.folds, "number of the point, from 0"))
         words = "frequency ratio from which {} flanks {}"
         for name, level, verb in (("drive", DRIVE, "part"), ("back", BACK, "touch")):
             border = {f"{name}_border": (self.borders[level], words.format(name, verb))}
-            variables |= _numbers((f"{name}_crossing",), **border)
-        lines = [("deflection", ("point", "line"), branch.lines[:, 0], "1", f"relative deflection {_LENGTH}")]
+            variables |= _numbers(f"{name}_crossing", **border)
+        lines = [("deflection", "point line", branch.lines[:, 0], "1", f"relative deflection {_LENGTH}")]
         coords = _ratios(self.case, "point", branch.parameter)
-        coords |= _numbers(("line",), line=(branch.orders[:, 0], "harmonic of the tooth frequency"))
+        coords |= _numbers("line", line=(branch.orders[:, 0], "harmonic of the tooth frequency"))
         attrs = {"message": branch.message, "complete": int(branch.complete), "fourier_convention": FOURIER}
         title = "periodic motions by harmonic balance"
         return dataset(variables | complex_entries(lines), coords, _units(self.case, title) | attrs)
@@ -93,26 +93,21 @@ class SweepResult:
         def both(name: str) -> np.ndarray:
             return np.array([getattr(self.up, name), getattr(self.down, name)[::-1]])
 
-        dims = ("direction", "ratio")
+        dims = "direction ratio"
         extremes = both("lowest")[..., 0], both("highest")[..., 0], np.real(both("lines")[..., 0, 0])
         variables, settled = _motions(dims, *extremes), both("settled")
         for name in ("amplitude", "mean"):
             # one period of a motion that needs several is not its amplitude, nor its mean
             _, values, unit, words = variables[name]
-            values = np.where(settled, values, np.nan)
-            variables[name] = (
-                dims,
-                values,
-                unit,
-                f"{words}; NaN where it does not repeat every tooth period",
-            )
+            words += "; NaN where it does not repeat every tooth period"
+            variables[name] = dims, np.where(settled, values, np.nan), unit, words
         variables |= _numbers(
             dims,
             settled=(settled, "whether the motion repeats"),
             periods=(both("periods"), "periods until then"),
         )
         coords = _ratios(self.case, "ratio", self.up.frequency)
-        coords |= _numbers(("direction",), direction=(["up", "down"], "direction of the sweep"))
+        coords |= _numbers("direction", direction=(["up", "down"], "direction of the sweep"))
         return dataset(variables, coords, _units(self.case, "settled motions, ratio up and down"))
 
 
@@ -129,7 +124,7 @@ class ChaosResult:
         """Contents of chaos.nc; exponents are per unit of time 1 / omega_n."""
         ratio, found = self.ratio, self.found
         variables = _numbers(
-            ("ratio",),
+            "ratio",
             exponent=(ratio * [one.largest for one in found], f"largest Lyapunov exponent {_RATE}"),
             error=(ratio * [one.error[0] for one in found], f"its error {_RATE}"),
             lowest=([one.lowest[0] for one in found], f"smallest deflection {_LENGTH}"),
@@ -138,18 +133,18 @@ class ChaosResult:
             chaotic=([_CHAOTIC[one.chaotic] for one in found], "yes, no or not told"),
         )
         points = [one.section.deflection[-_SHOWN:, 0] for one in found]
-        variables |= _numbers(("ratio", "period"), point=(points, f"deflection once a period {_LENGTH}"))
+        variables |= _numbers("ratio period", point=(points, f"deflection once a period {_LENGTH}"))
         if self.sections:
             at, long = np.array([r for r, _ in self.sections]), [one for _, one in self.sections]
             velocity = at[:, None] * [one.section.velocity[:, -1] for one in long]
             variables |= _numbers(
-                ("section",),
+                "section",
                 section_ratio=(at, "frequency ratio of the section"),
                 section_exponent=(at * [one.largest for one in long], f"largest exponent {_RATE}"),
                 section_error=(at * [one.error[0] for one in long], f"its error {_RATE}"),
             )
             variables |= _numbers(
-                ("section", "run"),
+                "section run",
                 section_deflection=([one.section.deflection[:, 0] for one in long], f"deflection {_LENGTH}"),
                 section_velocity=(velocity, f"velocity {_LENGTH}, {_RATE}"),
             )
@@ -157,12 +152,12 @@ class ChaosResult:
         return dataset(variables, _ratios(self.case, "ratio", ratio), _units(self.case, title))
 
 
-def _numbers(dims: tuple[str, ...], **entries: tuple) -> dict[str, tuple]:
+def _numbers(dims: str, **entries: tuple) -> dict[str, tuple]:
     """Entries ``(values, words)`` without a unit."""
     return {name: (dims, values, "1", words) for name, (values, words) in entries.items()}
 
 
-def _motions(dims: tuple[str, ...], lowest, highest, mean) -> dict[str, tuple]:
+def _motions(dims: str, lowest, highest, mean) -> dict[str, tuple]:
     return _numbers(
         dims,
         amplitude=(0.5 * (highest - lowest), f"half of largest less smallest, {_LENGTH}"),
@@ -181,8 +176,8 @@ def _ratios(case: GearPairCase, dimension: str, ratio) -> dict[str, tuple]:
     speed = ratio * scales_of(case).frequency / case.gears.teeth[0]
     words = "tooth frequency over natural frequency"
     return {
-        "ratio": ((dimension,), ratio, "1", words),
-        "speed": ((dimension,), speed / RPM, "rpm", "speed of the driving gear"),
+        "ratio": (dimension, ratio, "1", words),
+        "speed": (dimension, speed / RPM, "rpm", "speed of the driving gear"),
     }
 
 
@@ -197,9 +192,6 @@ def _units(case: GearPairCase, title: str) -> dict[str, Any]:
 @one_blas_thread()
 def solve_response(case: GearPairCase) -> ResponseResult:
     """Periodic motions over the frequency ratio past limit points, with stability and contact."""
-    from femgear.solvers.continuation.branches import parameter_curve
-    from femgear.solvers.continuation.corrector import StepOptions
-
     pair, given = pair_of(case), case.response
     branch = parameter_curve(
         pair.problem, (given.start, given.to), 1.0, harmonics=given.harmonics, samples=1024, radius=False,
@@ -216,8 +208,6 @@ def solve_response(case: GearPairCase) -> ResponseResult:
 @one_blas_thread()
 def solve_sweep(case: GearPairCase) -> SweepResult:
     """Integrate at every ratio until the motion repeats, upwards and from there back."""
-    from femgear.solvers.time.stroboscopic import sweep_up_and_down
-
     pair, given = pair_of(case), case.sweep
     assert given is not None
     ratios = np.concatenate([np.linspace(one.start, one.to, one.count) for one in given.ranges])
@@ -231,8 +221,6 @@ def solve_sweep(case: GearPairCase) -> SweepResult:
 @one_blas_thread()
 def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> ChaosResult:
     """Lyapunov exponents over the ratio, each from the last point of the one before, and long sections."""
-    from femgear.solvers.stability.lyapunov import lyapunov_exponents
-
     pair, given, found = pair_of(case), case.chaos, []
     assert given is not None
     ratios, start = np.linspace(given.start, given.to, given.count), None
@@ -259,7 +247,7 @@ def solve_chaos(case: GearPairCase, *, progress: Progress | None = None) -> Chao
     return ChaosResult(case, ratios, found, sections)
 
 
-def describe_gear_pair(case: GearPairCase) -> tuple[Block, ...]:
+def _describe_case(case: GearPairCase) -> tuple[Block, ...]:
     """Title, units, numbers of the pair, and warnings of a case."""
     scales, pair = scales_of(case), pair_of(case)
     numbers = {
@@ -281,11 +269,11 @@ def describe_gear_pair(case: GearPairCase) -> tuple[Block, ...]:
         )
         ends = " and ".join(f"{ratio:.4f}" for ratio in parting) or "no ratio"
         notes = (f"with constant stiffness drive flanks begin to part at {ends} of the natural frequency",)
-    warnings = tuple(map(str, gear_pair_warnings(case))) or ("none",)
+    warnings = tuple(map(str, _case_warnings(case))) or ("none",)
     return Block(case.title), Block("Gear pair", (), tuple(rows), notes), Block("Warnings", notes=warnings)
 
 
-def gear_pair_warnings(case: GearPairCase) -> Iterator[Finding]:
+def _case_warnings(case: GearPairCase) -> Iterator[Finding]:
     """What is allowed but deserves a look."""
     if case.operation.torque == 0.0:
         yield Finding("W-LOAD", "operation.torque", "without load nothing keeps the flanks on one side")
@@ -294,7 +282,7 @@ def gear_pair_warnings(case: GearPairCase) -> Iterator[Finding]:
         yield Finding("W-EXCITATION", "mesh", text)
 
 
-def result_warnings(results) -> Iterator[Finding]:
+def _result_warnings(results) -> Iterator[Finding]:
     """What the solvers say against their own results."""
     if "response" in results.stages and not results.response.attrs["complete"]:
         yield Finding("W-BRANCH", "response", str(results.response.attrs["message"]))
@@ -352,9 +340,8 @@ GEAR_PAIR = Train(
     name="gear_pair",
     words="a gear pair",
     model=GearPairCase,
-    own_file=OwnFile(
-        lambda data: data.get("model") == "gear_pair", build_gear_pair, GearPairCase.model_json_schema
-    ),
+    own_file=OwnFile(),
+    cross_check=cross_check,
     stages=(
         Stage(
             name="response",
@@ -381,8 +368,8 @@ GEAR_PAIR = Train(
             unavailable=lambda case: "" if case.chaos else "the case has no section chaos",
         ),
     ),
-    describe=describe_gear_pair,
-    warnings=gear_pair_warnings,
-    result_warnings=result_warnings,
+    describe=_describe_case,
+    warnings=_case_warnings,
+    result_warnings=_result_warnings,
     figures=_figures,
 )

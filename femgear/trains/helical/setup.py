@@ -279,7 +279,7 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
     if case.helical.mesh_stiffness is not None:
         return
     _check_torque(case, gears)
-    check_one_period(case, gears, "helical")
+    check_one_period(case, gears, "the helical model takes")
     if case.helical.section == "normal":
         virtual_gears(case, gears)
 

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-KINDS = ("rotational", "translational", "planet", "mixed")
+_DASHES = {"rotational": "-", "translational": "--", "planet": ":", "mixed": "-."}
+"""Kinds of modes, and of their lines."""
 
 
 def stage_energy(modes: xr.Dataset) -> Figure:
@@ -22,7 +23,7 @@ def stage_energy(modes: xr.Dataset) -> Figure:
     Modes of one frequency are drawn once, with their mean share.
     """
     frequency, kinds = modes["frequency"].values, modes["kind"].values
-    present = [kind for kind in KINDS if np.any(kinds == kind)]
+    present = [kind for kind in _DASHES if np.any(kinds == kind)]
     figure, axes = new_figure(rows=len(present), width=9.0, height=1.0 + 2.2 * len(present))
     for ax, kind in zip(axes, present):
         own = np.flatnonzero(kinds == kind)
@@ -53,10 +54,9 @@ def mesh_orders(modes: xr.Dataset, response: xr.Dataset) -> Figure:
     harmonics = response.sizes["harmonic"]
     figure, (ax,) = new_figure(width=8.5, height=5.4)
     top, low = harmonics * mesh.max(), mesh.min()
-    dashes = {"rotational": "-", "translational": "--", "planet": ":", "mixed": "-."}
     for hertz, kind in zip(modes["frequency"].values, modes["kind"].values):
         if low < hertz < top:
-            ax.axhline(hertz, color=GREY, linestyle=dashes[kind], linewidth=0.9, label=f"{kind} mode")
+            ax.axhline(hertz, color=GREY, linestyle=_DASHES[kind], linewidth=0.9, label=f"{kind} mode")
     for stage, line in enumerate(mesh):
         style = {
             "color": COLOURS[stage % len(COLOURS)],
@@ -98,7 +98,7 @@ def stage_forces(response: xr.Dataset, balance: xr.Dataset | None = None) -> Fig
     return figure
 
 
-def draw_response(drawn: Drawn) -> dict[str, Figure]:
+def _draw_response(drawn: Drawn) -> dict[str, Figure]:
     """Mesh frequencies with the modes that they meet, and the dynamic forces."""
     data = drawn.data
     return {
@@ -122,6 +122,6 @@ FIGURES = {
             "stage_forces": "Dynamic forces of mesh sun-planet 1 of every stage over the speed of the input, "
             "by the stage whose meshes excite; circles: harmonic balance with the stiffnesses of all meshes.",
         },
-        draw_response,
+        _draw_response,
     ),
 }

@@ -22,14 +22,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from femgear.errors import CaseError, checked_count, checked_numbers
-from femgear.system.assembler import (
-    dof_names,
-    free_motions,
-    gear_set_system,
-    mesh_directions,
-)
+from femgear.errors import CaseError
+from femgear.gears.kinematics import planet_motion, torque_ratios
+from femgear.system.assembler import dof_names, free_motions, gear_set_system, mesh_directions
 from femgear.system.rigid_bodies import (
     CENTRAL,
     PlanarSet,
@@ -56,23 +53,18 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True, order=True)
 class Member:
-    """A central member of a stage.
-
-    Parameters
-    ----------
-    stage : int
-        From 1.
-    name : {"carrier", "ring", "sun"}
-    """
+    """A central member, "carrier", "ring" or "sun", of a stage, counted from 1."""
 
     stage: int
     name: str
 
-    def __post_init__(self):
-        object.__setattr__(self, "stage", checked_count(self.stage, "stage", code="E-RANGE"))
-
     def __str__(self) -> str:
         return f"stage {self.stage} {self.name}"
+
+    @property
+    def place(self) -> int:
+        """Among the central members of all stages."""
+        return 3 * (self.stage - 1) + CENTRAL.index(self.name)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,8 +86,8 @@ class Stage:
     Raises
     ------
     CaseError
-        Tooth numbers that do not fit the base radii (E-TEETH), an unknown fixed member or one that nothing
-        holds (E-MECHANISM), phases of another number of meshes (E-SHAPE).
+        Tooth numbers that do not fit the base radii (E-TEETH), a fixed member that nothing holds
+        (E-MECHANISM).
     """
 
     data: PlanarSet
@@ -105,29 +97,23 @@ class Stage:
     angle: float = 0.0
 
     def __post_init__(self):
-        if self.fixed is not None and self.fixed not in CENTRAL:
-            raise CaseError(
-                f"a fixed member {self.fixed!r}", code="E-MECHANISM", key="fixed", limit=", ".join(CENTRAL)
-            )
         if self.fixed is not None and not getattr(self.data, self.fixed).torsional_support > 0.0:
             raise CaseError(
                 f"the {self.fixed} is fixed but has no torsional support", code="E-MECHANISM",
                 key=f"{self.fixed}.torsional_support", limit="above 0, or infinite",
             )  # fmt: skip
-        angle = checked_numbers(self.angle, "angle", code="E-RANGE", unit="rad")
-        if angle.ndim or not np.isfinite(angle):
-            raise CaseError(f"a stage angle of {self.angle} rad", code="E-RANGE", key="angle", limit="finite")
-        if self.teeth is not None:
-            object.__setattr__(self, "teeth", _checked_teeth(self.data, self.teeth))
-        if self.phases is not None:
-            phases = np.array(checked_numbers(self.phases, "phases", code="E-SHAPE", unit=""))
-            if phases.shape != (2 * self.data.n_planets,) or not np.all(np.isfinite(phases)):
+        if self.teeth is None:
+            return
+        data, (sun, planet, ring) = self.data, self.teeth
+        for name, ratio, radii in (
+            ("planet", planet / sun, data.planet_radius / data.sun_radius),
+            ("ring", ring / sun, data.ring_radius / data.sun_radius),
+        ):
+            if abs(radii / ratio - 1.0) > _RADII:
                 raise CaseError(
-                    f"mesh phases of shape {phases.shape}", code="E-SHAPE", key="phases",
-                    limit=f"{2 * self.data.n_planets} finite numbers",
+                    f"{name} and sun have {ratio:.6g} as ratio of teeth and {radii:.6g} as ratio of base "
+                    "radii", code="E-TEETH", key="teeth", value=self.teeth, limit="the same to 0.1 %",
                 )  # fmt: skip
-            phases.setflags(write=False)
-            object.__setattr__(self, "phases", phases)
 
 
 @dataclass(frozen=True)
@@ -148,7 +134,7 @@ class StageCoupling:
     Raises
     ------
     CaseError
-        Members that are none or of one stage, stiffnesses out of range (E-RANGE).
+        Members of one stage, a stiffness above `STIFFEST` (E-RANGE).
     """
 
     first: Member
@@ -157,17 +143,12 @@ class StageCoupling:
     lateral: float = 0.0
 
     def __post_init__(self):
-        for member in (self.first, self.second):
-            if member.name not in CENTRAL:
-                _refuse(f"a coupling of the {member.name!r}", f"members {', '.join(CENTRAL)}")
         if self.first.stage == self.second.stage:
-            _refuse(f"a coupling inside stage {self.first.stage}", "members of two stages")
-        units = {"torsional": "N m/rad", "lateral": "N/m"}
-        for name, unit in units.items():
-            value = checked_numbers(getattr(self, name), name, code="E-RANGE", unit=unit)
-            if value.ndim or not (value >= 0.0 and (value or name == "lateral")):
-                lowest = "0 or more" if name == "lateral" else "above 0"
-                _refuse(f"a {name} stiffness of {value.tolist()} {unit}", f"{lowest}, or infinite")
+            raise CaseError(
+                f"a coupling inside stage {self.first.stage}", code="E-RANGE", limit="members of two stages"
+            )
+        for name, unit in (("torsional", "N m/rad"), ("lateral", "N/m")):
+            value = getattr(self, name)
             if STIFFEST[name] < value < math.inf:
                 raise CaseError(
                     f"a {name} stiffness of {value:g} {unit}", code="E-RANGE", key=name,
@@ -191,8 +172,7 @@ class MultistageSet:
     Raises
     ------
     CaseError
-        No stage, members of stages that are not there (E-RANGE), one member for input and output, or one
-        that is fixed (E-MECHANISM).
+        One member for input and output, or one that is fixed (E-MECHANISM).
     """
 
     stages: tuple[Stage, ...]
@@ -201,15 +181,6 @@ class MultistageSet:
     output: Member
 
     def __post_init__(self):
-        object.__setattr__(self, "stages", tuple(self.stages))
-        object.__setattr__(self, "couplings", tuple(self.couplings))
-        if not self.stages or not all(isinstance(one, Stage) for one in self.stages):
-            _refuse("a train without stages, or of something else", "one Stage or more")
-        named = [self.input, self.output]
-        named += [member for one in self.couplings for member in (one.first, one.second)]
-        for member in named:
-            if not 1 <= member.stage <= len(self.stages) or member.name not in CENTRAL:
-                _refuse(f"{member} in a train of {len(self.stages)} stages", "members of its stages")
         for member in (self.input, self.output):
             if self.input == self.output or self.stages[member.stage - 1].fixed == member.name:
                 raise CaseError(
@@ -240,42 +211,9 @@ def in_series(stages: Sequence[Stage], *, torsional: float = math.inf, lateral: 
     return MultistageSet(stages=tuple(stages), couplings=couplings, **ends)
 
 
-def _checked_teeth(data: PlanarSet, teeth) -> tuple[int, int, int]:
-    numbers = checked_numbers(teeth, "teeth", code="E-TEETH", unit="")
-    if numbers.shape != (3,) or not np.all(np.isfinite(numbers) & (numbers >= 1) & (numbers % 1 == 0)):
-        raise CaseError(
-            f"tooth numbers {numbers.tolist()}",
-            code="E-TEETH",
-            key="teeth",
-            limit="sun, planet and ring, above 0",
-        )
-    sun, planet, ring = (int(z) for z in teeth)
-    for name, ratio, radii in (
-        ("planet", planet / sun, data.planet_radius / data.sun_radius),
-        ("ring", ring / sun, data.ring_radius / data.sun_radius),
-    ):
-        if abs(radii / ratio - 1.0) > _RADII:
-            raise CaseError(
-                f"{name} and sun have {ratio:.6g} as ratio of teeth and {radii:.6g} as ratio of base radii",
-                code="E-TEETH", key="teeth", value=(sun, planet, ring), limit="the same to 0.1 %",
-            )  # fmt: skip
-    return sun, planet, ring
-
-
-def _refuse(message: str, limit: str):
-    raise CaseError(message, code="E-RANGE", limit=limit)
-
-
 @dataclass(frozen=True, eq=False)
 class TrainSpeeds:
-    """Absolute speeds [rad/s] and mesh frequencies [Hz], one a stage.
-
-    Parameters
-    ----------
-    sun, ring, carrier, planet : (S,) arrays
-        The planet's about its own axis, in the fixed frame.
-    mesh_frequency : (S,) array
-    """
+    """Absolute speeds [rad/s] (planet: its own axis too), mesh frequencies [Hz]; (S,) arrays."""
 
     sun: np.ndarray
     ring: np.ndarray
@@ -296,10 +234,6 @@ class TrainTorques:
     ----------
     sun, ring, carrier : (S,) arrays
         What couplings, housing, input and output give the members; they add up to zero in every stage.
-    coupling : (C,) array
-        On the second member of every coupling, its reaction on the first.
-    housing : (S,) array
-        On the fixed member of every stage; zero where there is none.
     output : float
         On the output member.
     """
@@ -307,8 +241,6 @@ class TrainTorques:
     sun: np.ndarray
     ring: np.ndarray
     carrier: np.ndarray
-    coupling: np.ndarray
-    housing: np.ndarray
     output: float
 
 
@@ -330,25 +262,15 @@ def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
     Raises
     ------
     CaseError
-        A stage without teeth (E-TEETH), members that are free or held twice (E-MECHANISM), a speed that is
-        not finite (E-RANGE).
+        A stage without teeth (E-TEETH), members that are free or held twice (E-MECHANISM).
     """
-    _check_finite("speed", speed, "rad/s")
-    weights = _tooth_weights(data)
-    rows = np.vstack([_rows(data, weights), _unit(data, data.input)])
+    rows = np.vstack([_rows(data, _tooth_weights(data)), _unit(data, data.input)])
     right = np.zeros(len(rows))
     right[-1] = speed
-    w = _solved(data, rows, right).reshape(-1, 3)
-    carrier, ring, sun = (w[:, CENTRAL.index(name)] for name in ("carrier", "ring", "sun"))
-    teeth = np.array([stage.teeth for stage in data.stages], float)
-    relative = sun - carrier
-    return TrainSpeeds(
-        sun=sun,
-        ring=ring,
-        carrier=carrier,
-        planet=carrier - relative * teeth[:, 0] / teeth[:, 1],
-        mesh_frequency=np.abs(relative) * teeth[:, 0] / (2.0 * math.pi),
-    )
+    carrier, ring, sun = _solved(data, rows, right).reshape(-1, 3).T
+    sun_teeth, planet_teeth, _ = np.array([stage.teeth for stage in data.stages], float).T
+    planet, mesh_frequency = planet_motion(sun, carrier, sun_teeth, planet_teeth)
+    return TrainSpeeds(sun, ring, carrier, planet, mesh_frequency)
 
 
 def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) -> TrainTorques:
@@ -368,27 +290,12 @@ def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) ->
     CaseError
         As `train_speeds`.
     """
-    _check_finite("torque", torque, "N m")
     weights = _radius_weights(data) if radii else _tooth_weights(data)
-    rows = _rows(data, weights)
     # unknown: lambda of every row, and the torque of the output
-    matrix = np.vstack([rows, -_unit(data, data.output)]).T
-    right = torque * _unit(data, data.input)
-    solution = _solved(data, matrix, right)
-    count, stages = len(data.couplings), len(data.stages)
-    on_stage = (solution[:stages, None] * weights).T
-    housing = np.zeros(stages)
-    held = [n for n, stage in enumerate(data.stages) if stage.fixed is not None]
-    housing[held] = -solution[stages + count : -1]
-    carrier, ring, sun = on_stage
-    return TrainTorques(
-        sun=sun,
-        ring=ring,
-        carrier=carrier,
-        coupling=solution[stages : stages + count],
-        housing=housing,
-        output=float(solution[-1]),
-    )
+    matrix = np.vstack([_rows(data, weights), -_unit(data, data.output)]).T
+    solution = _solved(data, matrix, torque * _unit(data, data.input))
+    carrier, ring, sun = (solution[: len(data.stages), None] * weights).T
+    return TrainTorques(sun, ring, carrier, float(solution[-1]))
 
 
 def speed_ratio(data: MultistageSet) -> float:
@@ -427,28 +334,27 @@ def check_turns(data: MultistageSet) -> None:
 
 def _rows(data: MultistageSet, weights: np.ndarray) -> np.ndarray:
     """Stages, couplings (first less second), and fixed members (rows, 3 S)."""
-    rows = np.zeros((len(data.stages), 3 * len(data.stages)))
-    for n, weight in enumerate(weights):
-        rows[n, 3 * n : 3 * n + 3] = weight
     couplings = [_unit(data, one.first) - _unit(data, one.second) for one in data.couplings]
     held = [
-        _unit(data, Member(n + 1, stage.fixed))
-        for n, stage in enumerate(data.stages)
+        _unit(data, Member(number, stage.fixed))
+        for number, stage in enumerate(data.stages, 1)
         if stage.fixed is not None
     ]
-    return np.vstack([rows, *couplings, *held])
+    return np.vstack([np.asarray(block_diag(*weights)), *couplings, *held])
 
 
 def _tooth_weights(data: MultistageSet) -> np.ndarray:
-    """Carrier, ring and sun (S, 3) of ``z_s w_s + z_r w_r - (z_s + z_r) w_c = 0``, per tooth of the sun."""
-    missing = [n + 1 for n, stage in enumerate(data.stages) if stage.teeth is None]
-    if missing:
-        raise CaseError(
-            f"no tooth numbers in stage {missing[0]}", code="E-TEETH", key=f"stages[{missing[0] - 1}].teeth",
-            remedy="give the teeth of sun, planet and ring",
-        )  # fmt: skip
-    ratio = np.array([stage.teeth[2] / stage.teeth[0] for stage in data.stages if stage.teeth is not None])
-    return np.column_stack([-(1.0 + ratio), ratio, np.ones(len(ratio))])
+    """Weights (S, 3) of the speeds of carrier, ring and sun in Willis' equation of every stage."""
+    weights = []
+    for number, stage in enumerate(data.stages, 1):
+        if stage.teeth is None:
+            raise CaseError(
+                f"no tooth numbers in stage {number}", code="E-TEETH", key=f"stages[{number - 1}].teeth",
+                remedy="give the teeth of sun, planet and ring",
+            )  # fmt: skip
+        ratios = torque_ratios(stage.teeth[0], stage.teeth[2])
+        weights.append([ratios[name] for name in CENTRAL])
+    return np.array(weights)
 
 
 def _radius_weights(data: MultistageSet) -> np.ndarray:
@@ -462,9 +368,7 @@ def _radius_weights(data: MultistageSet) -> np.ndarray:
 
 
 def _unit(data: MultistageSet, member: Member) -> np.ndarray:
-    unit = np.zeros(3 * len(data.stages))
-    unit[3 * (member.stage - 1) + CENTRAL.index(member.name)] = 1.0
-    return unit
+    return np.eye(3 * len(data.stages))[member.place]
 
 
 def _solved(data: MultistageSet, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -482,11 +386,6 @@ def _solved(data: MultistageSet, matrix: np.ndarray, right: np.ndarray) -> np.nd
     solution = np.linalg.solve(matrix, right)
     # one step of refinement: ratios of hundreds keep their last digits
     return solution + np.linalg.solve(matrix, right - matrix @ solution)
-
-
-def _check_finite(name: str, value: float, unit: str) -> None:
-    if not math.isfinite(value):
-        raise CaseError(f"a {name} of {value} {unit}", code="E-RANGE", key=name, limit="finite")
 
 
 def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float = 0.0) -> MechanicalSystem:
@@ -515,30 +414,26 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
         A torque on a held member, a train that is not determined or locked (E-MECHANISM), centres joined
         rigidly between frames of different speeds (E-RANGE).
     """
-    from scipy.linalg import block_diag
-
     check_turns(data)
     turning = turning_couplings(data, speed)
     carrier = train_speeds(data, speed).carrier if speed else np.zeros(len(data.stages))
     parts = [gear_set_system(one.data, carrier_speed=w) for one, w in zip(data.stages, carrier.tolist())]
-    Z = joined_motions(data)
+    T, Z = _stage_motions(data), joined_motions(data)
     K = block_diag(*(part.K for part in parts)) + _centrifugal_stiffness(data, carrier)
     for number, coupling in enumerate(data.couplings):
-        columns, stiffness = _springs(data, coupling, lateral=number not in turning)
+        columns, stiffness = _springs(data, T, coupling, lateral=number not in turning)
         K += (columns * stiffness) @ columns.T
     meshes = [free_motions(one.data).T @ mesh_directions(one.data, sign)
-              for one, sign in zip(data.stages, stage_flanks(data, torque))]  # fmt: skip
-    W = np.hstack(
-        [np.asarray(block_diag(*meshes)), *(_ends(data, data.couplings[number]) for number in turning)]
-    )
-    load = np.concatenate([part.load for part in parts]) + _torque_load(data, torque)
+              for one, sign in zip(data.stages, _stage_flanks(data, torque))]  # fmt: skip
+    ends = [_ends(data, T, data.couplings[number]) for number in turning]
+    load = np.concatenate([part.load for part in parts]) + _torque_load(data, T, torque)
     return MechanicalSystem(
         M=Z.T @ block_diag(*(part.M for part in parts)) @ Z,
         C=np.zeros((Z.shape[1], Z.shape[1])),
         K=Z.T @ K @ Z,
-        W=Z.T @ W,
+        W=Z.T @ np.hstack([np.asarray(block_diag(*meshes)), *ends]),
         load=Z.T @ load,
-        dofs=_names(data, Z),
+        dofs=_names(data, T, Z),
         gyroscopic=Z.T @ _gyroscopic(parts, carrier / speed) @ Z if speed else None,
     )
 
@@ -554,7 +449,7 @@ def mean_mesh_stiffness(data: MultistageSet) -> np.ndarray:
     return np.concatenate([stage.data.mesh_stiffness for stage in data.stages])
 
 
-def stage_flanks(data: MultistageSet, torque: float) -> tuple[int, ...]:
+def _stage_flanks(data: MultistageSet, torque: float) -> tuple[int, ...]:
     """Loaded flanks of every stage: 1 where the sun drives counter-clockwise, else -1."""
     if not torque:
         return (1,) * len(data.stages)
@@ -605,10 +500,12 @@ def joined_motions(data: MultistageSet) -> np.ndarray:
     The rows are those of the `gear_set_system` of every stage, one after the other. Of two joined coordinates
     that of the earlier place stays.
     """
-    size = sum(free_motions(stage.data).shape[1] for stage in data.stages)
-    Z = np.eye(size)
+    T = _stage_motions(data)
+    Z = np.eye(T.shape[1])
     for coupling in data.couplings:
-        for row in _rigid_rows(data, coupling):
+        rows = [_twist(data, T, coupling)] if math.isinf(coupling.torsional) else []
+        rows += list(_shift(data, T, coupling).T) if math.isinf(coupling.lateral) else []
+        for row in rows:
             row = row @ Z
             moved = np.flatnonzero(np.abs(row) > _ROUNDING * np.abs(row).max(initial=0.0))
             if not len(moved):
@@ -625,6 +522,11 @@ def stage_slices(data: MultistageSet) -> tuple[slice, ...]:
     return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
 
+def _stage_motions(data: MultistageSet) -> np.ndarray:
+    """All coordinates of all stages, held ones included, per unit of those that are free in each stage."""
+    return np.asarray(block_diag(*(free_motions(stage.data) for stage in data.stages)))
+
+
 def _centrifugal_stiffness(data: MultistageSet, carrier: np.ndarray) -> np.ndarray:
     """What makes the centripetal stiffness of the planets leave the rotation of the train free.
 
@@ -633,8 +535,6 @@ def _centrifugal_stiffness(data: MultistageSet, carrier: np.ndarray) -> np.ndarr
     + u_c / a))`` Lagrange's equations have the same gyroscopic terms, and the centripetal ones of zeta and
     ``eta - u_c``. The difference is ``m Omega^2 (eta^2 - (eta - u_c)^2)`` a planet.
     """
-    from scipy.linalg import block_diag
-
     blocks = []
     for stage, speed in zip(data.stages, carrier.tolist()):
         T, N = free_motions(stage.data), stage.data.n_planets
@@ -646,83 +546,70 @@ def _centrifugal_stiffness(data: MultistageSet, carrier: np.ndarray) -> np.ndarr
 
 def _gyroscopic(parts: list[MechanicalSystem], ratio: np.ndarray) -> np.ndarray:
     """Matrix per unit of the input's speed; ``ratio`` (S,) of the carriers' speeds to it."""
-    from scipy.linalg import block_diag
-
     still = (np.zeros_like(part.M) if part.gyroscopic is None else part.gyroscopic for part in parts)
     return np.asarray(block_diag(*(one * matrix for one, matrix in zip(ratio, still))))
 
 
-def _axis(data: MultistageSet, member: Member, axis: int) -> np.ndarray:
-    """Unit column of x, y or u of a member in the coordinates of all stages; zero where it is held."""
-    blocks = []
-    for number, stage in enumerate(data.stages, 1):
-        T = free_motions(stage.data)
-        rows = T[3 * CENTRAL.index(member.name) + axis] if number == member.stage else np.zeros(T.shape[1])
-        blocks.append(rows)
-    return np.concatenate(blocks)
+def _axis(data: MultistageSet, T: np.ndarray, member: Member, axis: int) -> np.ndarray:
+    """Row of `_stage_motions` of x, y or u of a member; zero where it is held."""
+    first = sum(3 * (stage.data.n_planets + 3) for stage in data.stages[: member.stage - 1])
+    return T[first + 3 * CENTRAL.index(member.name) + axis]
 
 
-def _twist(data: MultistageSet, coupling: StageCoupling) -> np.ndarray:
+def _rotation(data: MultistageSet, T: np.ndarray, member: Member) -> np.ndarray:
+    """Rotation of a member [rad] per coordinate."""
+    return _axis(data, T, member, 2) / member_radius(data.stages[member.stage - 1].data, member.name)
+
+
+def _twist(data: MultistageSet, T: np.ndarray, coupling: StageCoupling) -> np.ndarray:
     """Rotation of the first member less that of the second, per coordinate."""
-    one, other = (
-        _axis(data, member, 2) / member_radius(data.stages[member.stage - 1].data, member.name)
-        for member in (coupling.first, coupling.second)
-    )
-    return one - other
+    return _rotation(data, T, coupling.first) - _rotation(data, T, coupling.second)
 
 
-def _shift(data: MultistageSet, coupling: StageCoupling) -> np.ndarray:
+def _shift(data: MultistageSet, T: np.ndarray, coupling: StageCoupling) -> np.ndarray:
     """x and y (n, 2) of the first centre less the second, in the first frame, both as they stand."""
     turn = data.stages[coupling.second.stage - 1].angle - data.stages[coupling.first.stage - 1].angle
-    ends, c, s = _ends(data, coupling), math.cos(turn), math.sin(turn)
+    ends, c, s = _ends(data, T, coupling), math.cos(turn), math.sin(turn)
     return ends[:, :2] - ends[:, 2:] @ np.array([[c, s], [-s, c]])
 
 
-def _ends(data: MultistageSet, coupling: StageCoupling) -> np.ndarray:
+def _ends(data: MultistageSet, T: np.ndarray, coupling: StageCoupling) -> np.ndarray:
     """x and y of the first and of the second member (n, 4)."""
-    return np.stack([_axis(data, m, k) for m in (coupling.first, coupling.second) for k in (0, 1)], axis=1)
+    members = (coupling.first, coupling.second)
+    return np.stack([_axis(data, T, member, k) for member in members for k in (0, 1)], axis=1)
 
 
-def _springs(data: MultistageSet, coupling: StageCoupling, *, lateral: bool):
+def _springs(data: MultistageSet, T: np.ndarray, coupling: StageCoupling, *, lateral: bool):
     """Columns (n, g) and stiffnesses (g,) of what is elastic in a coupling."""
-    columns, stiffness = [], []
+    columns, stiffness = [np.empty((T.shape[1], 0))], []
     if math.isfinite(coupling.torsional):
-        columns, stiffness = [_twist(data, coupling)[:, None]], [coupling.torsional]
+        columns.append(_twist(data, T, coupling)[:, None])
+        stiffness.append(coupling.torsional)
     if lateral and coupling.lateral and math.isfinite(coupling.lateral):
-        columns.append(_shift(data, coupling))
+        columns.append(_shift(data, T, coupling))
         stiffness += [coupling.lateral] * 2
-    size = sum(free_motions(stage.data).shape[1] for stage in data.stages)
-    return np.hstack([np.empty((size, 0)), *columns]), np.array(stiffness)
+    return np.hstack(columns), np.array(stiffness)
 
 
-def _rigid_rows(data: MultistageSet, coupling: StageCoupling) -> list[np.ndarray]:
-    rows = [_twist(data, coupling)] if math.isinf(coupling.torsional) else []
-    return rows + (list(_shift(data, coupling).T) if math.isinf(coupling.lateral) else [])
-
-
-def _torque_load(data: MultistageSet, torque: float) -> np.ndarray:
+def _torque_load(data: MultistageSet, T: np.ndarray, torque: float) -> np.ndarray:
     """Forces on ``u`` of input and output."""
+    load = np.zeros(T.shape[1])
     if not torque:
-        return np.zeros(sum(free_motions(stage.data).shape[1] for stage in data.stages))
+        return load
     output = train_torques(data, torque, radii=True).output
-    load = 0.0
     for member, value in ((data.input, torque), (data.output, output)):
-        column = _axis(data, member, 2)
-        if not np.any(column):
+        rotation = _rotation(data, T, member)
+        if not np.any(rotation):
             raise CaseError(
                 f"the torque acts on the {member}, which is held", code="E-MECHANISM",
                 remedy="choose members that can turn",
             )  # fmt: skip
-        load = load + column * value / member_radius(data.stages[member.stage - 1].data, member.name)
+        load += rotation * value
     return load
 
 
-def _names(data: MultistageSet, Z: np.ndarray) -> tuple[str, ...]:
+def _names(data: MultistageSet, T: np.ndarray, Z: np.ndarray) -> tuple[str, ...]:
     """Name of every coordinate that is left: its own row of ``Z`` is a unit row."""
-    names = []
-    for number, stage in enumerate(data.stages, 1):
-        T = free_motions(stage.data)
-        own = np.argmax(T == 1.0, axis=0)
-        all_names = dof_names(stage.data)
-        names += [f"stage {number} {all_names[row]}" for row in own]
-    return tuple(names[row] for row in np.argmax(Z == 1.0, axis=0))
+    names = [f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in dof_names(one.data)]
+    own = np.argmax(T == 1.0, axis=0)
+    return tuple(names[own[row]] for row in np.argmax(Z == 1.0, axis=0))

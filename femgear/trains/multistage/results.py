@@ -14,6 +14,7 @@ import numpy as np
 from femgear.errors import Finding
 from femgear.report.tables import Block
 from femgear.storage.dataset import FOURIER, RPM, complex_entries, dataset
+from femgear.system.assembler import mesh_names
 from femgear.trains.multistage.model import (
     MultistageSet,
     mean_mesh_stiffness,
@@ -23,13 +24,13 @@ from femgear.trains.multistage.model import (
     train_speeds,
     train_torques,
 )
+from femgear.trains.multistage.section import MultistageCase, multistage_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.solvers.linear.receptance import MeshErrorResponse
     from femgear.system.system import Modes
-    from femgear.trains.multistage.section import MultistageCase
 
 _SHOWN = 16
 """Modes of the table."""
@@ -75,7 +76,10 @@ class MultistageModes:
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc."""
         modes, along = self.modes, ("mode",)
-        parts = [*(f"meshes of stage {n}" for n in _stages(self.data)), "supports, bearings and couplings"]
+        parts = [
+            *(f"meshes of stage {n}" for n in range(1, len(self.share) + 1)),
+            "supports, bearings and couplings",
+        ]
         deflection, numbers = modes.mesh_deflection, np.arange(1, len(modes.frequency) + 1)
         variables = {
             "frequency": (along, modes.frequency, "Hz", "undamped natural frequency"),
@@ -168,10 +172,6 @@ class BalanceResult:
         return dataset(variables | complex_entries(lines), _coordinates(self.data, self.speed), attrs)
 
 
-def _stages(data: MultistageSet) -> range:
-    return range(1, len(data.stages) + 1)
-
-
 def _first_meshes(data: MultistageSet) -> list[int]:
     """Columns of sun-planet 1 of every stage."""
     return [int(columns[0]) for columns in mesh_columns(data)]
@@ -179,19 +179,21 @@ def _first_meshes(data: MultistageSet) -> list[int]:
 
 def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
     """Stages, meshes, and speeds of the input where there are some."""
-    names = []
-    for number, stage in enumerate(data.stages, 1):
-        planets = range(1, stage.data.n_planets + 1)
-        names += [f"stage {number} sun-planet {n}" for n in planets]
-        names += [f"stage {number} planet {n}-ring" for n in planets]
-    found = {"mesh": (("mesh",), names, "1", "gear mesh"), "stage": (("stage",), _stages(data), "1", "stage")}
+    names = [
+        f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in mesh_names(one.data.n_planets)
+    ]
+    found = {
+        "mesh": (("mesh",), names, "1", "gear mesh"),
+        "stage": (("stage",), range(1, len(data.stages) + 1), "1", "stage"),
+    }
     if speed is not None:
         found["speed"] = ("speed",), speed / RPM, "rpm", "speed of the input"
     return found
 
 
-def describe_multistage(case: MultistageCase, train: MultistageSet) -> tuple[Block, ...]:
+def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
     """Title, stages with speeds and torques, couplings, and warnings of a case."""
+    train = multistage_of(case)
     header = ["stage", "teeth", "planets", "fixed", "sun-planet [N/m]", "planet-ring [N/m]"]
     rows = []
     for n, one in enumerate(train.stages, 1):

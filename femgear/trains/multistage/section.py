@@ -25,7 +25,6 @@ from femgear.case.fields import (
     described,
     refuse,
 )
-from femgear.case.problems import checked_case
 from femgear.case.sections import FORMAT, Inertia, Mass, MeshStiffnessSection, Radius
 from femgear.case.text import ReadCase
 from femgear.case.units import ANGLE, LENGTH, SPEED, STIFFNESS, TORQUE, TORSION
@@ -186,20 +185,6 @@ class MultistageCase(Section, ReadCase):
     def geared(self) -> bool:
         """Whether every stage has gears, and with them mesh phases and tooth pairs in contact."""
         return all(one.gears is not None for one in self.stage)
-
-
-def build_multistage(data: dict, text: str, name: str, *, numbered: bool = True) -> MultistageCase:
-    """Case of the tables of a TOML text; see `femgear.trains.protocol.OwnFile`.
-
-    Raises
-    ------
-    CaseError
-        Everything that is wrong with the entries, or why they make no train.
-    """
-    lines = text if numbered else ""
-    case = checked_case(MultistageCase, data, lines, name, check=cross_check)
-    case.read_from(text, lines, name)
-    return case
 
 
 def cross_check(case: MultistageCase) -> Iterator[CaseError]:

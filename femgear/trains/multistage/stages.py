@@ -8,22 +8,21 @@ the end is the train: the table of its stages, with what the report says and dra
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
 from femgear.solvers.linear.receptance import MeshErrorResponse, modal_response
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.assembler import gear_set_system, mesh_elements
 from femgear.system.elements import GearMeshes, TurningSprings, turning_wave
-from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample
+from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, sample, tooth_lines
 from femgear.system.mode_kinds import class_energies, gear_set_motions, named_kinds
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 from femgear.trains.multistage.model import (
     MultistageSet,
-    Stage,
     joined_motions,
     mean_mesh_stiffness,
     mesh_columns,
@@ -47,7 +46,7 @@ from femgear.trains.multistage.section import (
     MultistageCase,
     OperationSection,
     ResponseSection,
-    build_multistage,
+    cross_check,
     multistage_of,
     stage_gears,
 )
@@ -62,46 +61,27 @@ def multistage_modes(data: MultistageSet, *, damping_ratio: float | Sequence[flo
     """Modes of the train at rest with mean mesh stiffnesses, with their kinds and stages."""
     system = multistage_system(data)
     modes = solve_modes(system, mean_mesh_stiffness(data), damping_ratio=damping_ratio)
-    masses = stage_masses(data)
+    masses = _stage_masses(data)
     modes = _by_stage(modes, masses)
-    share = stage_shares(masses, modes.shape)
-    kinds = multistage_kinds(data, modes.shape, frequency=modes.frequency)
+    share = _stage_shares(masses, modes.shape)
+    kinds = _multistage_kinds(data, modes.shape, frequency=modes.frequency)
     return MultistageModes(data, replace(modes, kind=kinds), share, _strain(data, system, modes))
 
 
-def stage_masses(data: MultistageSet) -> np.ndarray:
-    """Assemble the mass matrix of every stage in the coordinates of the train, (S, n, n)."""
-    Z = joined_motions(data)
-    return np.array(
-        [
-            Z[rows].T @ gear_set_system(stage.data).M @ Z[rows]
-            for stage, rows in zip(data.stages, stage_slices(data))
-        ]
-    )
+def _stage_masses(data: MultistageSet) -> np.ndarray:
+    """Mass matrix of every stage in the coordinates of the train, (S, n, n)."""
+    Z, parts = joined_motions(data), zip(data.stages, stage_slices(data))
+    return np.array([Z[rows].T @ gear_set_system(stage.data).M @ Z[rows] for stage, rows in parts])
 
 
-def stage_shares(masses, shape) -> np.ndarray:
-    """Share (S, m) of every stage in the kinetic energy of shapes (n, m), real or complex.
-
-    ``masses`` (S, n, n) as from `stage_masses`.
-    """
-    shape = np.asarray(shape)
-    energy = (shape.conj() * (np.asarray(masses) @ shape)).sum(axis=1).real
+def _stage_shares(masses: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """Share (S, m) of every stage in the kinetic energy of shapes (n, m)."""
+    energy = (shape * (masses @ shape)).sum(axis=1)
     return energy / energy.sum(axis=0)
 
 
-def multistage_kinds(data: MultistageSet, shape, *, frequency) -> tuple[str, ...]:
-    """Kind of every mode from its shape (n, m) in the coordinates of `multistage_system`.
-
-    The classes of `femgear.system.mode_kinds.class_energies`, added over the stages.
-
-    Parameters
-    ----------
-    data : MultistageSet
-    shape : (n, m) array
-    frequency : (m,) array
-        Zero for rigid motions.
-    """
+def _multistage_kinds(data: MultistageSet, shape, *, frequency) -> tuple[str, ...]:
+    """Kind of every mode (n, m): `femgear.system.mode_kinds.class_energies`, added over the stages."""
     full = joined_motions(data) @ np.asarray(shape)
     classes, total = 0.0, 0.0
     for stage, rows in zip(data.stages, stage_slices(data)):
@@ -142,33 +122,6 @@ def _strain(data: MultistageSet, system: MechanicalSystem, modes: Modes) -> np.n
     return np.where(elastic, np.array(parts) / total, 0.0)
 
 
-def stage_error(stage: Stage, sun_planet, planet_ring) -> np.ndarray:
-    """Transmission errors (2N, H) of all meshes of a stage from one wave of each kind and the mesh phases.
-
-    Parameters
-    ----------
-    stage : Stage
-        With phases phi_j.
-    sun_planet, planet_ring : (H,) complex arrays
-        Harmonics 1 to H at phase zero [m]; ``e_j(tau) = e(tau + phi_j)`` (Parker and Lin, J. Mech. Des. 126,
-        2004).
-
-    Raises
-    ------
-    CaseError
-        A stage without phases (E-RANGE), waves of different length (E-SHAPE).
-    """
-    if stage.phases is None:
-        raise CaseError(
-            "the stage has no mesh phases", code="E-RANGE", key="phases",
-            remedy="give phases, such as those of the gears",
-        )  # fmt: skip
-    waves = np.array([np.atleast_1d(one) for one in (sun_planet, planet_ring)], complex)
-    h = np.arange(1, waves.shape[1] + 1)
-    shift = np.exp(2j * np.pi * np.asarray(stage.phases)[:, None] * h)
-    return np.repeat(waves, stage.data.n_planets, axis=0) * shift
-
-
 def error_response(
     data: MultistageSet,
     speed,
@@ -191,7 +144,9 @@ def error_response(
     speed : (F,) array
         Of the input [rad/s], not zero, of one sign.
     errors : mapping of int to (2N, H) complex array
-        Of the stages named (from 1), harmonics 1 to H of every mesh [m]: `stage_error`.
+        Of the stages named (from 1), harmonics 1 to H of every mesh [m], as of
+        `femgear.system.transmission_errors.tooth_lines` with the phases of the stage: ``e_j(tau) = e(tau +
+        phi_j)`` (Parker and Lin, J. Mech. Des. 126, 2004).
     damping_ratio : float
         Of all modes; ignored where modes are given.
     modes : Modes, optional
@@ -205,38 +160,26 @@ def error_response(
     Raises
     ------
     CaseError
-        Stages that are not there, errors that do not fit (E-SHAPE), as `train_speeds`.
+        As `train_speeds`.
     """
     speed = np.atleast_1d(np.asarray(speed, float))
     system, k = multistage_system(data), mean_mesh_stiffness(data)
     if modes is None:
         modes = multistage_modes(data, damping_ratio=damping_ratio).modes
-    frequencies, forward = _mesh_frequencies(data, speed)
-    found = {}
-    for number, columns in enumerate(mesh_columns(data), 1):
-        if number not in errors:
-            continue
-        error = _checked_error(errors[number], number, len(columns))
+    unit, found = train_speeds(data, math.copysign(1.0, speed[0])), {}
+    for number, error in errors.items():
+        columns, hertz = mesh_columns(data)[number - 1], np.abs(speed) * unit.mesh_frequency[number - 1]
         # where the sun turns backwards the mesh runs through its period from the end
-        error = error if forward[number - 1] else error.conj()
-        found[number] = _stage_response(system, modes, frequencies[:, number - 1], columns, error, k)
-    if unknown := set(errors) - set(found):
-        raise CaseError(
-            f"transmission errors of stage {sorted(unknown)[0]}", code="E-SHAPE", key="errors",
-            limit=f"stages 1 to {len(data.stages)}",
-        )  # fmt: skip
+        error = np.asarray(error) if unit.sun[number - 1] > unit.carrier[number - 1] else np.conj(error)
+        harmonics, inputs = np.arange(1, error.shape[1] + 1), system.W[:, columns] * k[columns]
+        transfer = modal_response(system, modes, np.outer(hertz, harmonics).ravel(), inputs, system.W.T)
+        transfer = transfer.reshape(len(hertz), len(harmonics), len(k), len(columns))
+        deflection = np.einsum("fhoj,jh->fho", transfer, error)
+        force = k * deflection
+        force[..., columns] -= k[columns] * error.T
+        output = np.empty((*force.shape[:2], 0))
+        found[number] = MeshErrorResponse(hertz, harmonics, deflection, force, output)
     return found
-
-
-def _checked_error(error, number: int, meshes: int) -> np.ndarray:
-    """Transmission errors (meshes, H) of a stage."""
-    error = np.asarray(error, complex)
-    if error.ndim != 2 or len(error) != meshes or not np.all(np.isfinite(error)):
-        raise CaseError(
-            f"transmission errors of shape {error.shape} in stage {number}", code="E-SHAPE",
-            key=f"errors[{number}]", limit=f"({meshes}, harmonics), finite",
-        )  # fmt: skip
-    return error
 
 
 def base_frequencies(data: MultistageSet, speed: float) -> np.ndarray:
@@ -280,8 +223,7 @@ def multistage_problem(
     Raises
     ------
     CaseError
-        A load that accelerates the train (E-LOAD-BALANCE), meshes of stages or columns that are not there
-        (E-SHAPE), as `multistage_system`.
+        A load that accelerates the train (E-LOAD-BALANCE), as `multistage_system`.
     """
     turning = turning_couplings(data, speed)
     bases = len(data.stages) + len(turning)
@@ -289,8 +231,8 @@ def multistage_problem(
     if speed:
         turns = train_speeds(data, speed)
         forward = turns.sun > turns.carrier
-    elements = _stage_elements(data, dict(meshes or {}), forward, bases)
-    turned = _turning_elements(data, turning, bases)
+    elements = tuple(_stage_elements(data, meshes or {}, forward, bases))
+    turned = tuple(_turning_elements(data, turning, bases))
     still = multistage_system(data, torque=torque)
     # refuses a load that nothing takes up before a solver drifts away with it
     solve_modes(still, NonlinearSystem(still, elements).reference)
@@ -298,80 +240,32 @@ def multistage_problem(
     problem = NonlinearSystem(system, elements + turned, speed=speed)
     if damping is None:
         return problem
-    # standing frames with the columns of the turning ones
-    centred = replace(system, K=_standing(data, turning), gyroscopic=None)
-    return replace(problem, system=replace(system, C=viscous_damping(centred, problem.reference, damping)))
-
-
-def _standing(data: MultistageSet, turning) -> np.ndarray:
-    """``K`` without centripetal terms and without the lateral couplings that turn."""
+    # frames at rest, without the lateral springs that turn: these are columns
     couplings = tuple(
         replace(one, lateral=0.0) if number in turning else one for number, one in enumerate(data.couplings)
     )
-    return multistage_system(replace(data, couplings=couplings)).K
+    standing = multistage_system(replace(data, couplings=couplings)).K
+    centred = replace(system, K=standing, gyroscopic=None)
+    return replace(problem, system=replace(system, C=viscous_damping(centred, problem.reference, damping)))
 
 
-def _stage_response(system, modes, mesh_frequency, columns, error, k) -> MeshErrorResponse:
-    """Answer of all meshes to the errors (columns, H) of one stage."""
-    harmonics = np.arange(1, error.shape[1] + 1)
-    inputs = system.W[:, columns] * k[columns]
-    transfer = modal_response(system, modes, np.outer(mesh_frequency, harmonics).ravel(), inputs, system.W.T)
-    transfer = transfer.reshape(len(mesh_frequency), len(harmonics), len(k), len(columns))
-    deflection = np.einsum("fhoj,jh->fho", transfer, error)
-    force = k * deflection
-    force[..., columns] -= k[columns] * error.T
-    return MeshErrorResponse(mesh_frequency, harmonics, deflection, force, np.empty((*force.shape[:2], 0)))
-
-
-def _mesh_frequencies(data: MultistageSet, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(F, S) [Hz], proportional to the speed, and whether suns turn forwards against their carriers (S,)."""
-    if speed.ndim != 1 or not np.all(np.isfinite(speed)) or np.any(speed == 0.0):
-        raise CaseError(
-            "speeds of the input must be finite and not zero", code="E-RANGE", key="speed", limit="rad/s"
-        )
-    if speed.min() < 0.0 < speed.max():
-        raise CaseError("speeds of both signs", code="E-RANGE", key="speed", limit="one sense of rotation")
-    unit = train_speeds(data, math.copysign(1.0, speed[0]))
-    return np.abs(speed)[:, None] * unit.mesh_frequency, unit.sun > unit.carrier
-
-
-def _stage_elements(data: MultistageSet, meshes: dict[int, GearMeshes], forward, bases: int):
+def _stage_elements(
+    data: MultistageSet, meshes: Mapping[int, GearMeshes], forward, bases: int
+) -> Iterator[GearMeshes]:
     """The meshes of all stages on their columns, each with its own base frequency."""
-    elements = []
     for number, (stage, columns) in enumerate(zip(data.stages, mesh_columns(data)), 1):
-        made = meshes.pop(number, None) or mesh_elements(stage.data)
-        if not np.array_equal(made.columns[:, 0], np.arange(len(columns))):
-            raise CaseError(
-                f"meshes of stage {number} on columns {made.columns[:, 0].tolist()}", code="E-SHAPE",
-                key=f"meshes[{number}]", limit=f"columns 0 to {len(columns) - 1} in order",
-                remedy="make them with mesh_elements of the stage's set",
-            )  # fmt: skip
-        sense = 1 if forward[number - 1] else -1
-        own = {name: _on_base(getattr(made, name), number - 1, bases, sense)
-               for name in ("stiffness", "deflection", "force")}  # fmt: skip
-        elements.append(replace(made, columns=columns, **own))
-    if meshes:
-        raise CaseError(
-            f"meshes of stage {sorted(meshes)[0]}", code="E-SHAPE", key="meshes",
-            limit=f"stages 1 to {len(data.stages)}",
-        )  # fmt: skip
-    return tuple(elements)
+        made = meshes.get(number) or mesh_elements(stage.data)
+        orders = [0] * bases
+        orders[number - 1] = 1 if forward[number - 1] else -1
+        own = {}
+        for name in ("stiffness", "deflection", "force"):
+            series = getattr(made, name)
+            own[name] = replace(series, orders=tuple(series.orders[0] * one for one in orders))
+        yield replace(made, columns=columns, **own)
 
 
-def _on_base(series, base: int, bases: int, sense: int):
-    """The series with its single order moved to a base."""
-    if any(series.orders[1:]):
-        raise CaseError(
-            f"a mesh series of orders {series.orders}", code="E-HARMONICS", key="meshes",
-            limit="multiples of the stage's own mesh frequency, such as (1,)",
-        )  # fmt: skip
-    orders = [0] * bases
-    orders[base] = sense * series.orders[0]
-    return replace(series, orders=tuple(orders))
-
-
-def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int):
-    elements = []
+def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int) -> Iterator[TurningSprings]:
+    """Lateral springs between frames that turn apart, each with its own base frequency."""
     for place, (number, relative) in enumerate(turning.items()):
         one = data.couplings[number]
         orders = [0] * bases
@@ -379,8 +273,7 @@ def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int
         phase = data.stages[one.second.stage - 1].angle - data.stages[one.first.stage - 1].angle
         first = data.n_meshes + 4 * place
         wave = turning_wave(tuple(orders), phase=phase)
-        elements.append(TurningSprings(np.arange(first, first + 4)[None], np.array([one.lateral]), wave))
-    return tuple(elements)
+        yield TurningSprings(np.arange(first, first + 4)[None], np.array([one.lateral]), wave)
 
 
 def solve_multistage_modes(case: MultistageCase) -> MultistageModes:
@@ -401,14 +294,12 @@ def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResu
 @one_blas_thread()
 def solve_balance(case: MultistageCase, *, progress: Progress | None = None) -> BalanceResult:
     """Harmonic balance with the stiffnesses k(t) of all meshes, first orders of two stages together."""
-    from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-
     train, (operation, given) = multistage_of(case), _asked(case)
     stages, unit = len(train.stages), np.eye(len(train.stages), dtype=int)
     orders = [h * unit[n] for n in range(stages) for h in range(1, given.harmonics + 1)]
     orders += [unit[n] + sign * unit[m] for n in range(stages) for m in range(n) for sign in (-1, 1)]
     problem = multistage_problem(
-        train, meshes=wave_meshes(case, train), torque=operation.torque, damping=given.damping_ratio
+        train, meshes=_wave_meshes(case, train), torque=operation.torque, damping=given.damping_ratio
     )
     speeds = np.linspace(given.lowest, given.highest, given.balance_points + 2)[1:-1]
     found = []
@@ -423,23 +314,12 @@ def solve_balance(case: MultistageCase, *, progress: Progress | None = None) -> 
     return BalanceResult(train, speeds, found[0].orders, force, converged)
 
 
-def stiffness_waves(case: MultistageCase, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Harmonics 1 to H of sun-planet and planet-ring stiffness over its mean, at phase zero.
+def _stiffness_waves(case: MultistageCase, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Harmonics (H,) of sun-planet and planet-ring stiffness over its mean, at phase zero; stages from 1.
 
     Stiffness in proportion to the number of tooth pairs in contact: a pair is, from the start s to the end e
     of its path in base pitches from the pitch point, so that ``k_h / k_0 = (exp(-2 pi i h s) - exp(-2 pi i h
     e)) / (pi i h (e - s))``.
-
-    Parameters
-    ----------
-    case : MultistageCase
-        H is ``response.harmonics``.
-    number : int
-        Of the stage, from 1.
-
-    Returns
-    -------
-    two (H,) complex arrays
     """
     geared, h = stage_gears(case.stage[number - 1]), np.arange(1, _asked(case)[1].harmonics + 1)
     waves = []
@@ -459,10 +339,10 @@ def loaded_errors(case: MultistageCase, train: MultistageSet) -> dict[int, np.nd
     errors = {}
     on_sun = train_torques(train, _asked(case)[0].torque).sun
     for number, stage in enumerate(train.stages, 1):
-        data, mean = stage.data, stage.data.mesh_stiffness[[0, -1]]
+        data, waves = stage.data, _stiffness_waves(case, number)
         force = abs(on_sun[number - 1]) / (data.n_planets * data.sun_radius)
-        waves = stiffness_waves(case, number)
-        errors[number] = stage_error(stage, *(force / k * _inverse(wave) for k, wave in zip(mean, waves)))
+        first, second = (force / k * _inverse(wave) for k, wave in zip(data.mesh_stiffness[[0, -1]], waves))
+        errors[number] = tooth_lines(first, second, stage.phases)
     return errors
 
 
@@ -472,12 +352,14 @@ def _inverse(wave: np.ndarray) -> np.ndarray:
     return harmonics_of(1.0 / sample(np.concatenate([[1.0], wave]), samples), len(wave))[1:]
 
 
-def wave_meshes(case: MultistageCase, train: MultistageSet) -> dict[int, GearMeshes]:
+def _wave_meshes(case: MultistageCase, train: MultistageSet) -> dict[int, GearMeshes]:
     """Meshes with the stiffness waves, for `multistage_problem`; they do not part."""
     made = {}
     for number, stage in enumerate(train.stages, 1):
         mean = stage.data.mesh_stiffness
-        lines = np.column_stack([np.ones(len(mean)), stage_error(stage, *stiffness_waves(case, number))])
+        lines = np.column_stack(
+            [np.ones(len(mean)), tooth_lines(*_stiffness_waves(case, number), stage.phases)]
+        )
         stiffness = FourierSeries(mean[:, None] * lines)
         made[number] = mesh_elements(stage.data, stiffness=stiffness, separates=False)
     return made
@@ -509,9 +391,8 @@ MULTISTAGE = Train(
     name="multistage",
     words="a multistage case",
     model=MultistageCase,
-    own_file=OwnFile(
-        lambda data: data.get("model") == "multistage", build_multistage, MultistageCase.model_json_schema
-    ),
+    own_file=OwnFile(),
+    cross_check=cross_check,
     stages=(
         RunStage(
             name="modes",
@@ -538,7 +419,7 @@ MULTISTAGE = Train(
             unavailable=_no_balance,
         ),
     ),
-    describe=lambda case: describe_multistage(case, multistage_of(case)),
+    describe=describe_multistage,
     warnings=multistage_warnings,
     result_warnings=lambda results: balance_warnings(results.balance) if "balance" in results.stages else (),
     figures=_figures,

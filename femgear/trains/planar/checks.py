@@ -48,7 +48,7 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
             file=case.location("planar.back_flanks"),
         )
     if planar.mesh_stiffness is None:
-        check_one_period(case, gears, "planar")
+        check_one_period(case, gears, "the planar model takes")
 
 
 def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -> None:
