@@ -256,15 +256,15 @@ def mesh_windows(
 
 
 def in_windows(
-    attempt: Callable[[float, float], tuple[Found, float, float]], share: float, nearest: float
+    attempt: Callable[[float, float], tuple[Found | None, float, float]], share: float, nearest: float
 ) -> Found:
     """Find something in windows that contain the contact; they are enlarged until they do.
 
     Parameters
     ----------
     attempt : callable
-        ``(share, nearest) -> found, share, nearest``: what is found in these windows, and the windows to
-        try next; the same ones where they contain the contact.
+        ``(share, nearest) -> found, share, nearest``: what is found in these windows, or None, and the
+        windows to try next; the same ones where they contain the contact.
     share, nearest : float
         Of the first windows, as `mesh_windows` takes them [N], [m].
 
@@ -273,13 +273,13 @@ def in_windows(
     ContactError
         E-CONTACT: no windows contain the contact.
     """
-    for _ in range(8):
+    for _ in range(12):
         found, *wider = attempt(share, nearest)
-        if wider == [share, nearest]:
+        if found is not None and wider == [share, nearest]:
             return found
         share, nearest = wider
     raise ContactError(
-        "the contact windows do not contain the contact after seven enlargements",
+        "the contact windows do not contain the contact after eleven enlargements",
         code="E-CONTACT",
         remedy="reduce operation.torque or the errors",
     )

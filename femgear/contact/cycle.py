@@ -349,8 +349,8 @@ class _Walk:
         share = self.sun_torque / (s.sun.base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
         return share, 3.0 * share / (ROUGH_STIFFNESS * width)
 
-    def attempt(self, share: float, nearest: float) -> tuple[MeshCycle, float, float]:
-        """Solve all positions in windows of one size, see `in_windows`."""
+    def attempt(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
+        """Solve all positions in windows of one size, or up to one that needs more, see `in_windows`."""
         options, empty, N = self.options, self.empty, self.planetary_set.n_planets
         setup = mesh_windows(
             self.planetary_set,
@@ -367,7 +367,7 @@ class _Walk:
             setup = setup.with_planet_gaps(options.planet_gaps)
         load = np.zeros(N + 1 + int(self.members.free.sum()))
         load[N] = self.sun_torque / self.planetary_set.sun.base_radius
-        found, previous, overflow, missed, unknowns = [], None, False, 0.0, 0
+        found, previous, overflow, unknowns = [], None, False, 0
         for p in range(len(empty.position)):
             problem = assemble_contact(setup, self.bodies, p, self.members)
             start = None if previous is None else problem.warm_start(*previous)
@@ -375,19 +375,19 @@ class _Walk:
             state, active = solve_position(H, gap, G, load, self.springs, start=start)
             previous = problem, active
             found.append(_at_position(problem, state, setup, self.members, options.pressures))
+            missed = setup.missed(p, found[-1]["deflection"]) if empty.contact == "profile" else 0.0
+            if missed > nearest:
+                return None, share, 1.2 * missed
             if options.held_bodies is not None:
                 held = assemble_contact(setup, options.held_bodies, p)
                 found[-1] |= _with_held_bodies(held, state, setup, found[-1]["force"])
             unknowns = max(unknowns, len(problem.gap))
             overflow |= problem.touches_window_end(state.active, setup)
-            if empty.contact == "profile":
-                missed = max(missed, setup.missed(p, found[-1]["deflection"]))
             if options.progress is not None:
                 options.progress(p + 1, len(empty.position))
         record = self._record(found, setup, unknowns)
         if overflow:
             share = enlarged(share, max(record.force.max(), record.back_force.max()))
-        nearest = max(nearest, 1.2 * missed) if missed > nearest or overflow else nearest
         return record, share, nearest
 
     def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
