@@ -219,8 +219,9 @@ def straight(p, q, k=4):
     return (1 - t) * np.array(p) + t * np.array(q)
 
 
-def test_interface_divides_the_body():
-    grid = mesh_outline(split_square(straight((0, 0.5), (1, 0.5))))
+@pytest.mark.parametrize("ends", [((0, 0.5), (1, 0.5)), ((1, 0.5), (0, 0.5))])
+def test_interface_divides_the_body(ends):
+    grid = mesh_outline(split_square(straight(*ends)))
     centre = grid.points[grid.triangles[:, :3]].mean(axis=1)
     assert (centre[grid.regions["lower"], 1] < 0.5).all() and (centre[grid.regions["upper"], 1] > 0.5).all()
     assert len(grid.boundaries["interface"]) == 4
