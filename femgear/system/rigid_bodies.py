@@ -32,7 +32,7 @@ class PlanarBody:
     mass : float
         [kg]
     inertia : float
-        Polar inertia I about its axis [kg m^2]; `inertia_of_reduced` for data given as I / r^2.
+        Polar inertia I about its axis [kg m^2], r^2 times what data give as I / r^2.
     support : float
         Isotropic radial stiffness to the housing [N/m]; infinite holds the axis.
     torsional_support : float
@@ -417,11 +417,6 @@ def body_masses(data: RigidSet) -> np.ndarray:
     """Masses and reduced inertias (N + 3, axes) [kg] of carrier, ring, sun and planets."""
     bodies = [getattr(data, name) for name in CENTRAL] + [data.planet] * data.n_planets
     return np.array([body.masses(radius) for body, radius in zip(bodies, data.radii.tolist())])
-
-
-def inertia_of_reduced(reduced: float, radius: float) -> float:
-    """Polar inertia [kg m^2] of ``I / r^2`` [kg] at the radius [m] of ``u = r theta``."""
-    return reduced * radius**2
 
 
 def check_set(data: RigidSet) -> None:

@@ -14,7 +14,6 @@ from femgear.system.rigid_bodies import (
     HelicalSupport,
     PlanarBody,
     PlanarSet,
-    inertia_of_reduced,
 )
 from femgear.trains.helical.model import HelicalSet
 
@@ -135,7 +134,7 @@ def lin_parker_set(planets: int = 3, *, planet_bearing: float = 1e8, sun_support
     ring, distance = sun + 2.0 * planet, (sun + planet) / math.cos(alpha)
 
     def body(mass, reduced, radius, **supports):
-        return PlanarBody(mass, inertia_of_reduced(reduced, radius), **supports)
+        return PlanarBody(mass, reduced * radius**2, **supports)
 
     # k_u acts on u = r theta
     return PlanarSet(

@@ -17,7 +17,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.system.assembler import mesh_elements
-from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque, inertia_of_reduced
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque
 from femgear.system.system import NonlinearSystem
 from femgear.trains.planar.model import (
     Gravity,
@@ -207,7 +207,7 @@ def _set(
     if not 0.0 < angle < 0.5 * math.pi:
         raise CaseError(f"a pressure angle of {angle} rad", code="E-RANGE", limit="between 0 and pi/2")
     sun, planet, ring = (float(r) * math.cos(angle) for r in radii)
-    inertias = [inertia_of_reduced(i, r) for i, r in zip(reduced, (sun, ring, distance, planet))]
+    inertias = [i * r**2 for i, r in zip(reduced, (sun, ring, distance, planet))]
     return PlanarSet(
         sun=PlanarBody(masses[0], inertias[0], supports[0], torsional[0]),
         ring=PlanarBody(masses[1], inertias[1], supports[1], torsional[1]),

@@ -188,7 +188,13 @@ class CurvePoint:
 def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=None) -> CurvePoint:
     """Find the point of the curve in the plane ``normal . (z - guess) = 0`` by Newton's method.
 
-    The tangent is given the sense of the vector ``along`` (n + 1,), of ``normal`` when there is none.
+    Parameters
+    ----------
+    curve : ScaledCurve
+    guess, normal : (n + 1,) arrays
+        In the scaled unknowns.
+    along : (n + 1,) array, optional
+        Sense of the tangent, that of ``normal`` when there is none.
 
     Raises
     ------
@@ -207,7 +213,7 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
             # what the next step would be with the first derivative
             again = linalg.lu_solve(factors, right, check_finite=False)
             contraction = np.linalg.norm(again) / (1.0 + np.linalg.norm(z)) / lengths[0]
-        factors, sign = factored(np.vstack([derivative, normal]))
+        factors, sign = _factored(np.vstack([derivative, normal]))
         step = linalg.lu_solve(factors, right, check_finite=False)
         z = z - step
         lengths.append(float(np.linalg.norm(step) / (1.0 + np.linalg.norm(z))))
@@ -230,7 +236,7 @@ def correct(curve: ScaledCurve, guess: np.ndarray, normal: np.ndarray, along=Non
     return CurvePoint(z, tangent, derivative, sign, len(lengths), float(contraction), lengths[-1])
 
 
-def factored(matrix: np.ndarray):
+def _factored(matrix: np.ndarray):
     """LU factors of a bordered matrix and the sign of its determinant."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", linalg.LinAlgWarning)
@@ -339,7 +345,7 @@ def _check_middle(curve: ScaledCurve, point: CurvePoint, new: CurvePoint) -> Non
 def _newton_step(curve: ScaledCurve, z: np.ndarray, normal: np.ndarray):
     """Newton step to subtract in the plane normal to a vector, tangent over that vector, sign."""
     residual, derivative = curve.equations(z)
-    factors, sign = factored(np.vstack([derivative, normal]))
+    factors, sign = _factored(np.vstack([derivative, normal]))
     right = np.zeros((len(z), 2))
     right[:-1, 0], right[-1, 1] = residual, 1.0
     step, tangent = linalg.lu_solve(factors, right, check_finite=False).T

@@ -147,11 +147,12 @@ def modal_response(
     omega, inputs, outputs = _checked(frequency, inputs, outputs, len(system.M))
     natural = 2.0 * np.pi * modes.frequency
     w = omega[:, None]
-    gain = _gain(
-        natural**2 - w**2 + 2j * modes.damping_ratio * natural * w, np.maximum(natural**2, w**2), modes
-    )
+    below = natural**2 - w**2 + 2j * modes.damping_ratio * natural * w
+    if np.any(bad := np.abs(below) <= _RESONANT * np.maximum(natural**2, w**2)):
+        mode = int(np.argwhere(bad)[0, 1]) % len(natural)
+        raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")
     left, right = outputs @ modes.shape, modes.shape.T @ inputs
-    result = _superposed(gain, left, right)
+    result = (1.0 / below @ _pairs(left, right)).reshape(len(below), len(left), -1)
     if residual and len(natural) < len(system.M):
         elastic = natural > 0.0
         static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
@@ -346,6 +347,7 @@ def _residual(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
 
 
 def _pairs(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Products ``left_ok right_ki`` of every mode k, (m, n_left n_right)."""
     return (left.T[:, :, None] * right[:, None, :]).reshape(len(right), -1)
 
 
@@ -433,20 +435,6 @@ def _checked(frequency, inputs, outputs, n: int):
             remedy="list the frequencies of the response",
         )  # fmt: skip
     return 2.0 * np.pi * frequency, inputs, outputs
-
-
-def _gain(below: np.ndarray, size: np.ndarray, modes) -> np.ndarray:
-    bad = np.abs(below) <= _RESONANT * size
-    if np.any(bad):
-        mode = int(np.argwhere(bad)[0, 1]) % len(modes.frequency)
-        raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")
-    return 1.0 / below
-
-
-def _superposed(gain: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """``sum_k left_ok gain_fk right_ki`` as one matrix product."""
-    pairs = left.T[:, :, None] * right[:, None, :]
-    return (gain @ pairs.reshape(len(right), -1)).reshape(len(gain), len(left), right.shape[1])
 
 
 def _resonance(where: str, remedy="give the motion some damping or move the frequency") -> ConvergenceError:

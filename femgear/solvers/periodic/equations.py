@@ -284,7 +284,8 @@ def harmonic_balance(
     grid = phase_grid(orders, samples or sample_counts(problem, orders))
     elements = tuple(on_grid(element, grid.theta) for element in problem.elements)
     longest = _longest(problem)
-    scale = _typical_deflection(reduction, source) or longest or 1.0
+    static = float(np.abs(reduction.static[:, columns:] @ source).max(initial=0.0))
+    scale = static or longest or 1.0
     pairs = coupled_pairs(elements)
     return HarmonicBalance(problem, orders, reduction, grid, elements, pairs, source, scale, longest)
 
@@ -495,12 +496,6 @@ def _check_harmonics(problem: NonlinearSystem, harmonics: int) -> None:
                 code="E-HARMONICS", key="harmonics", value=harmonics, limit=f"{wanted} or more",
                 remedy="raise the number of harmonics",
             )  # fmt: skip
-
-
-def _typical_deflection(reduction, source) -> float:
-    """Largest static deflection [m] under the loads; zero without them."""
-    loads = reduction.static[:, len(reduction.reference) :]
-    return float(np.abs(loads @ source).max(initial=0.0))
 
 
 def _longest(problem) -> float:

@@ -22,7 +22,7 @@ from femgear.solvers.periodic.equations import (
     reduced,
     relative_residual,
 )
-from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
+from femgear.solvers.periodic.solution import PeriodicSolution, of_solution
 from femgear.solvers.stability.floquet import judged, require_period
 from femgear.system.fourier import coincidence_note
 from femgear.system.system import NonlinearSystem
@@ -192,25 +192,10 @@ class PeriodicResponse:
 
     solution: PeriodicSolution
 
-    @property
-    def verdict(self) -> FloquetVerdict:
-        """Its ``stable`` is None where there are several base frequencies or too long a period."""
-        return self.solution.verdict
-
-    @property
-    def tail(self) -> float:
-        """Share of the amplitude in the upper half of the lines."""
-        return self.solution.tail
-
-    @property
-    def spectral_radius(self) -> float:
-        """Spectral radius of the fixed point; it says nothing on stability."""
-        return self.solution.spectral_radius
-
-    @property
-    def stable(self) -> bool | None:
-        """Whether all Floquet multipliers lie within the unit circle; None where the verdict is open."""
-        return self.verdict.stable
+    verdict = of_solution("verdict", "Open where there are several base frequencies or too long a period.")
+    stable = of_solution("stable", "Whether no disturbance grows; None where the verdict is open.")
+    tail = of_solution("tail", "Share of the amplitude in the upper half of the lines.")
+    spectral_radius = of_solution("spectral_radius", "Of the fixed point; it says nothing on stability.")
 
 
 def periodic_response(

@@ -18,7 +18,13 @@ from scipy import linalg
 
 from femgear.errors import CaseError, FemgearError, checked_count, checked_tolerance
 from femgear.solvers.periodic.equations import harmonic_balance
-from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution, open_verdict, verdict_of
+from femgear.solvers.periodic.solution import (
+    FloquetVerdict,
+    PeriodicSolution,
+    of_solution,
+    open_verdict,
+    verdict_of,
+)
 from femgear.solvers.time.adaptive import (
     Flow,
     checked_start,
@@ -76,15 +82,8 @@ class ShootingSolution:
     time: np.ndarray
     motion: np.ndarray
 
-    @property
-    def verdict(self) -> FloquetVerdict:
-        """That of the solution, from the monodromy matrix here."""
-        return self.solution.verdict
-
-    @property
-    def stable(self) -> bool | None:
-        """No multiplier lies outside the unit circle by more than 1e-6; None for a motion not converged."""
-        return self.solution.stable
+    verdict = of_solution("verdict", "From the monodromy matrix here.")
+    stable = of_solution("stable", "No multiplier lies outside the unit circle; None where not converged.")
 
 
 @dataclass(frozen=True)

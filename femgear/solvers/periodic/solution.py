@@ -128,6 +128,11 @@ class FloquetVerdict:
     error: float = 0.0
 
 
+def of_solution(name: str, text: str) -> property:
+    """Property of a result that its ``solution`` has, with its text."""
+    return property(lambda result: getattr(result.solution, name), doc=text)
+
+
 def open_verdict(reason: str) -> FloquetVerdict:
     """No verdict, for the reason given."""
     return FloquetVerdict(np.zeros(0, complex), np.zeros(0, complex), None, "", "", reason, np.nan)
