@@ -26,9 +26,9 @@ from femgear.trains.planar.figures import (
     response_mesh_forces,
     weight_response,
 )
-from femgear.trains.planar.model import TAIL_LIMIT, judged_branch, merged_folds, motion_lines
+from femgear.trains.planar.model import TAIL_LIMIT, judged_branch, merged_folds, motion_lines, planar_model
 from femgear.trains.planar.results import comparisons, describe_branch, doubts, planar_verdicts, tail_warnings
-from femgear.trains.planar.stages import planar_model, solve_branch, solve_planar_modes, solve_planar_response
+from femgear.trains.planar.stages import solve_branch, solve_planar_modes, solve_planar_response
 from femgear.trains.reading import open_results, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
 from femgear.trains.static.stages import solve_static

@@ -181,7 +181,7 @@ def mesh_names(n_planets: int) -> list[str]:
 def column_groups(
     data: RigidSet, *, back_flanks: bool = False, bearings: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
-    """Places of the columns of W: ``meshes`` (2N,), ``back flanks`` (2N,), and (g, 2) of every bearing.
+    """Places of the columns of W: ``meshes`` (n,), ``back flanks`` (n,), and (g, 2) of every bearing.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def column_groups(
     bearings : sequence of {"carrier", "ring", "sun", "planets"}
         In the order in which their columns follow.
     """
-    n = 2 * data.n_planets
+    n = len(data.column_stiffness)
     groups: dict[str, np.ndarray] = {"meshes": np.arange(n)}
     if back_flanks:
         groups["back flanks"] = np.arange(n, 2 * n)

@@ -187,7 +187,7 @@ def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
     sun_planet, planet_ring : (H,) complex arrays
         Harmonics 1 to H at phase zero [m].
     phases : (2N,) array
-        Fractions of the mesh period, see `femgear.trains.planar.model.phased_series`.
+        phi_j as fractions of the mesh period, ``e_j(tau) = e(tau + phi_j)``: `PlanetarySet.mesh_phases`.
 
     Raises
     ------
@@ -212,7 +212,7 @@ def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
 def with_errors(
     problem: NonlinearSystem, errors: TransmissionErrors, *, dampers=None, mesh_frequency: float | None = None
 ) -> NonlinearSystem:
-    """A problem of `planar_problem` with the errors added to the deflections of its drive flanks.
+    """A planar problem with the errors added to the deflections of its drive flanks.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def with_errors(
     ):
         raise CaseError(
             "errors need one element of all meshes with Fourier series", code="E-RANGE",
-            remedy="build the problem with planar_problem, without back flanks on their own lines",
+            remedy="build the problem with gear_set_problem, without back flanks on their own lines",
         )  # fmt: skip
     series = errors.series
     parts = known.parts if isinstance(known, SummedSeries) else (known,)
@@ -350,7 +350,7 @@ def planar_mesh_dampers(data: PlanarSet, ratio) -> np.ndarray:
 
 
 def equivalent_damping(data: PlanarSet, *, mesh_ratio, support_ratio, flank: int = 1) -> np.ndarray:
-    """Damping matrix of a set in the coordinates of `gear_set_system`, for ``planar_problem(damping=)``.
+    """Damping matrix of a set in the coordinates of `gear_set_system`, for ``gear_set_problem(damping=)``.
 
     Parameters
     ----------

@@ -15,8 +15,16 @@ from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
 from femgear.errors import CaseError
 from femgear.report.tables import describe_modes, describe_response, response_warnings
+from femgear.solvers.linear.modal import output_load, output_response, residual_output
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.stability.parametric import stability as floquet_verdict
+from femgear.system.assembler import free_motions, gear_set_system, mesh_directions, pin_directions
+from femgear.system.mode_kinds import gear_set_motions, phasing
+from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
+from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.helical.model import helical_excitation
 from femgear.trains.helical.results import (
     HelicalDynamicsResult,
     HelicalModesResult,
@@ -93,11 +101,6 @@ def solve_helical_modes(
     CaseError
         What `check_helical_case` refuses.
     """
-    from femgear.system.assembler import gear_set_system
-    from femgear.system.mode_kinds import gear_set_motions, phasing
-    from femgear.system.rigid_bodies import flank_sign
-    from femgear.trains.helical.model import helical_excitation, helical_modes
-
     gears = planetary_set(case)
     check_helical_case(case, gears)
     excitation, whole = None, None
@@ -120,7 +123,7 @@ def solve_helical_modes(
     torque = driving_torque(case)
     system, flank = gear_set_system(data, torque=torque), flank_sign(data, torque)
     stiffness = data.column_stiffness if excitation is None else excitation.stiffness.mean(axis=1)
-    modes = helical_modes(
+    modes = gear_set_modes(
         data, system=system, mesh_stiffness=stiffness, damping_ratio=case.dynamics.damping_ratio
     )
     phases = phasing(gear_set_motions(data, modes.shape))
@@ -137,9 +140,6 @@ def solve_helical_dynamics(
     ------
     ConvergenceError
     """
-    from femgear.solvers.periodic.spectral import solve_spectral
-    from femgear.solvers.stability.parametric import stability as floquet_verdict
-
     if modes.excitation is None:
         raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness")
     operation, dynamics = case.operation, case.dynamics
@@ -167,15 +167,10 @@ def solve_helical_dynamics(
 
 def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:
     """Loads of pins on planets and of supports on central members, harmonics (speeds, ..., 6, H + 1)."""
-    from femgear.solvers.linear.modal import output_load, output_response, residual_output
-    from femgear.system.assembler import free_motions, mesh_directions, pin_directions
-    from femgear.system.rigid_bodies import CENTRAL, member_radius
-
     data, system, basis = result.data, result.system, result.modes
     T, pins, N = free_motions(data), pin_directions(data), data.n_planets
-    radii = np.array([member_radius(data, name) for name in CENTRAL])
-    scale = np.hstack([np.ones((3, 3)), np.repeat(radii[:, None], 3, axis=1)])
-    springs = np.stack([getattr(data, name).support.stiffness for name in CENTRAL])
+    scale = np.hstack([np.ones((3, 3)), np.repeat(data.radii[:3, None], 3, axis=1)])
+    springs = data.support_stiffness
     stiffness = np.where(np.isinf(springs), 0.0, springs)
     rows = np.concatenate(
         [

@@ -321,7 +321,7 @@ def _stage_response(system, modes, mesh_frequency, columns, error, k) -> MeshErr
     deflection = np.einsum("fhoj,jh->fho", transfer, error)
     force = k * deflection
     force[..., columns] -= k[columns] * error.T
-    return MeshErrorResponse(mesh_frequency, harmonics, deflection, force, np.empty((*force.shape[:2], 0)))
+    return MeshErrorResponse(mesh_frequency, harmonics, deflection, force)
 
 
 def _mesh_frequencies(data: MultistageSet, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

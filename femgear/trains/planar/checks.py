@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.linear.modal import solve_modes
 from femgear.storage.dataset import RPM
+from femgear.trains.gear_set import mode_ratios
+from femgear.trains.planar.model import planar_ratios
 from femgear.trains.planar.section import PlanarCase
 from femgear.trains.rigid import check_one_period, needed
 
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
 _MODULES = {"motion": 2.0, "approach": 0.5}
 # distance of a line from an undamped natural frequency, relative to it, at which the response has no bound
 _ON_RESONANCE = 1e-3
+# what a curve holds of every point
+_ALONG = ("points", "parameter", "tangent", "iterations", "error")
 
 
 def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
@@ -138,10 +143,7 @@ def check_response_damping(
 
 def _undamped(case: PlanarCase, model: PlanarModel) -> np.ndarray:
     """Natural frequencies [Hz] above zero of the modes without damping."""
-    from femgear.solvers.linear.modal import solve_modes
-    from femgear.trains.planar.model import mode_ratios
-
-    ratios = case.planar.damping_ratios or case.dynamics.damping_ratio
+    ratios = planar_ratios(case)
     if np.min(ratios) > 0.0:
         return np.zeros(0)
     system = model.problem.system
@@ -180,8 +182,6 @@ def bounded_branch(
     ConvergenceError
         Not even the first two points are good (E-MOTION, E-CONVERGENCE).
     """
-    from femgear.trains.planar.model import cut_branch
-
     good: list[MotionLines] = []
     for solution, one in zip(branch.solutions, lines):
         hertz = f"{solution.frequency[0] / (2.0 * np.pi):.6g} Hz"
@@ -190,9 +190,25 @@ def bounded_branch(
             if len(good) < 2:
                 raise _moved_too_far(f"at {hertz} of the weight", words, solution.converged)
             ending = f"stopped before {hertz}, where {words}" if solution.converged else f"{words} at {hertz}"
-            return cut_branch(branch, len(good), ending), tuple(good)
+            return _cut(branch, len(good), ending), tuple(good)
         good.append(one)
     return branch, tuple(good)
+
+
+def _cut(branch: Branch, count: int, message: str) -> Branch:
+    """The first points of a branch, which then did not reach an end of its range."""
+    known = branch.curve
+    curve = replace(
+        known,
+        **{name: getattr(known, name)[:count] for name in _ALONG},
+        **{name: getattr(known, name)[getattr(known, name) < count] for name in ("folds", "branch_points")},
+        closed=False,
+        complete=False,
+        message=message,
+    )
+    return replace(
+        branch, parameter=branch.parameter[:count], solutions=branch.solutions[:count], curve=curve
+    )
 
 
 def check_response_motions(
