@@ -187,13 +187,13 @@ def eccentric_set(eccentricity: float, floating: bool):
     from published.planetary_sets import lin_parker_set
 
     from femgear.system.assembler import mesh_elements
+    from femgear.system.fourier import tooth_lines
     from femgear.system.rigid_bodies import PlanarTorque
     from femgear.system.transmission_errors import (
         Eccentricity,
         TransmissionErrors,
         equivalent_damping,
         planar_mesh_dampers,
-        tooth_lines,
         with_errors,
     )
     from femgear.trains.gear_set import gear_set_problem, phased_series

@@ -13,6 +13,7 @@ from femgear import cli
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError, ConvergenceError
 from femgear.run import run_case
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.solution import open_verdict
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.solvers.time.transient import solve_transient
@@ -359,14 +360,11 @@ def test_a_branch_ends_before_motions_that_are_not_small(pgb):
 
 
 def test_a_response_that_does_not_converge_is_a_numerical_failure(pgb, monkeypatch, tmp_path, capsys):
-    from femgear.solvers.periodic import harmonic_balance
-
-    honest = harmonic_balance.solve_harmonic_balance
-
     def lost(*arguments, **options):
-        return replace(honest(*arguments, **options), converged=False, message="it wandered off.")
+        found = solve_harmonic_balance(*arguments, **options)
+        return replace(found, converged=False, message="it wandered off.")
 
-    monkeypatch.setattr(harmonic_balance, "solve_harmonic_balance", lost)
+    monkeypatch.setattr("femgear.trains.planar.stages.solve_harmonic_balance", lost)
     path = tmp_path / "case.toml"
     path.write_text(to_toml(pgb), encoding="utf-8")
     out = tmp_path / "out"

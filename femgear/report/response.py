@@ -41,6 +41,28 @@ _DECADES, _MOST_BARS = 1e-5, 60
 """Spectra end so far below their largest line, and have bars up to so many."""
 _CIRCLE = np.linspace(0.0, 2 * np.pi, 241)
 """Angles of the outlines of bodies [rad]."""
+MODE_CAPTIONS = {
+    "mode_shapes": (
+        "Mode shapes with mean mesh stiffness: bodies with a mark of their rotation, and the outer "
+        "surface of the ring; at rest in grey."
+    ),
+}
+"""Of `mode_shapes`."""
+RESPONSE_CAPTIONS = {
+    "dynamic_transmission_error": (
+        "Dynamic transmission error over one mesh period (thick) beside the static one of the set on its "
+        "supports, both without their mean. The thin static curve has the harmonics of the excitation "
+        "alone: what rings in both curves is the cut series, not vibration. Pale: the whole static curve."
+    ),
+    "dynamic_spectrum": (
+        "Harmonics of the dynamic transmission error, down to five decades below the largest."
+    ),
+    "speed_sweep": (
+        "Fluctuation of the transmission error over the speed, and the verdicts on the solution: the fixed "
+        "point contracts below 1, the motion is stable up to 1."
+    ),
+}
+"""Of `response_figures`."""
 
 
 def mode_shapes(
@@ -276,6 +298,14 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     for ax, place in zip((top, bottom), places):
         figure.legend(*ax.get_legend_handles_labels(), loc=place, ncols=3, fontsize=SIZE - 1, frameon=False)
     return figure
+
+
+def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure]:
+    """Spectrum of the transmission error and, over many speeds, its sweep, with others between them."""
+    figures = {"dynamic_spectrum": transmission_error_spectrum(dynamics), **others}
+    if dynamics.sizes["speed"] > MANY_SPEEDS:
+        figures["speed_sweep"] = speed_sweep(dynamics)
+    return figures
 
 
 def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:

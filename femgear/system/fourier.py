@@ -226,6 +226,36 @@ def series_of(samples, count: int, *, orders: tuple[int, ...] = (1,)) -> Fourier
     return FourierSeries(harmonics_of(np.atleast_2d(samples), count), orders)
 
 
+def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
+    """Tooth errors (2N, H) of one wave of each kind, shifted by the mesh phases.
+
+    Parameters
+    ----------
+    sun_planet, planet_ring : (H,) complex arrays
+        Harmonics 1 to H at phase zero [m].
+    phases : (2N,) array
+        Fractions of the mesh period, see `femgear.trains.planar.model.phased_series`.
+
+    Raises
+    ------
+    CaseError
+        An odd number of phases, values that are not finite numbers (E-SHAPE).
+    """
+    waves = [
+        np.atleast_1d(checked_numbers(wave, name, code="E-SHAPE", unit="m", kind=complex))
+        for name, wave in (("sun_planet", sun_planet), ("planet_ring", planet_ring))
+    ]
+    phases, count = checked_numbers(phases, "phases", code="E-SHAPE", unit=""), max(map(len, waves))
+    finite = all(np.all(np.isfinite(values)) for values in (*waves, phases))
+    if phases.ndim != 1 or not len(phases) or len(phases) % 2 or max(w.ndim for w in waves) > 1 or not finite:
+        raise CaseError(
+            f"mesh phases of shape {phases.shape}", code="E-SHAPE", key="phases",
+            limit="two a planet, finite: sun-planet meshes, then planet-ring meshes",
+        )  # fmt: skip
+    table = np.repeat([np.pad(wave, (0, count - len(wave))) for wave in waves], len(phases) // 2, axis=0)
+    return table * np.exp(2j * np.pi * phases[:, None] * np.arange(1, count + 1))
+
+
 @dataclass(frozen=True)
 class SummedSeries:
     """``sum_p parts[p]``, each with its own orders; elements take it where they take a `FourierSeries`.

@@ -26,11 +26,10 @@ from femgear.system.assembler import (
     mesh_elements,
 )
 from femgear.system.elements import GearMeshes, RadialBearings
-from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, series_of
+from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, series_of, tooth_lines
 from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis
 from femgear.system.rigid_bodies import CENTRAL, PlanarTorque, RigidSet, flank_sign
 from femgear.system.system import HarmonicForce, MechanicalSystem, Modes, NonlinearSystem
-from femgear.system.transmission_errors import tooth_lines
 
 if TYPE_CHECKING:
     import xarray as xr

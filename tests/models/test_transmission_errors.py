@@ -10,7 +10,7 @@ from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import gear_set_system, mesh_elements
-from femgear.system.fourier import series_spectrum
+from femgear.system.fourier import series_spectrum, tooth_lines
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.system.transmission_errors import (
     Eccentricity,
@@ -18,7 +18,6 @@ from femgear.system.transmission_errors import (
     carrier_pins,
     equivalent_damping,
     planar_mesh_dampers,
-    tooth_lines,
     with_errors,
 )
 from femgear.trains.gear_set import gear_set_problem

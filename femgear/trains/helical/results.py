@@ -88,7 +88,7 @@ class HelicalModesResult:
             ),
         }  # fmt: skip
         coords = {"position": (("position",), position, "1", "position in mesh periods")}
-        return found.update(dataset(curves, coords=coords, attrs={}))
+        return found.merge(dataset(curves, coords=coords, attrs={}))
 
 
 @dataclass(frozen=True)
