@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
@@ -28,16 +28,14 @@ from femgear.system.rigid_bodies import (
     HelicalSupport,
     RigidSet,
     check_support,
-    gear_geometry,
 )
 from femgear.system.system import MeshExcitation
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
-CONTACT_POINTS = ("pitch_point", "base_circles")
 # Rounded numbers miss each other by less than 1 %, other distances or angles than those of the gears by more.
-LARGEST_CLOSURE = 0.1
+_CLOSURE = 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,9 +65,8 @@ class HelicalSet(RigidSet):
     Raises
     ------
     CaseError
-        Numbers that no set can have, planet angles that are none, unordered or span more than a turn, or
-        radii, centre distance and pressure angles that miss each other by more than 10 % (E-RANGE).
-        `closure` tells by how much they do.
+        As `RigidSet`, and radii, centre distance and pressure angles that miss each other by more than 10 %
+        (E-RANGE). `closure` tells by how much they do.
     """
 
     directions: ClassVar[dict[str, tuple[int, ...]]] = {
@@ -81,26 +78,26 @@ class HelicalSet(RigidSet):
 
     base_helix_angle: float
     planet_bearing: HelicalSupport
-    contact_points: str = "pitch_point"
+    contact_points: Literal["pitch_point", "base_circles"] = "pitch_point"
     slices: int = 1
     face_width: float = 0.0
 
     def __post_init__(self):
         super().__post_init__()
-        if self.ring_radius <= self.planet_radius:
-            allowed = f"above the {self.planet_radius} m of the planets"
-            self.refuse("ring_radius", self.ring_radius, "m", allowed)
-        if not abs(self._numbers("base_helix_angle", 0)) < 0.5 * math.pi:
-            allowed = "between -pi/2 and pi/2"
-            self.refuse("base_helix_angle", self.base_helix_angle, "rad", allowed, remedy="give radians")
         check_support("planet_bearing", self.planet_bearing, count=self.n_planets)
-        _check_contact(self)
-        _check_closure(self)
+        worst = max(self.closure, key=abs)
+        if abs(worst) > _CLOSURE:
+            raise CaseError(
+                f"centre distance of {self.centre_distance} m", code="E-RANGE", key="centre_distance",
+                value=self.centre_distance,
+                limit=f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {_CLOSURE:.0%}",
+                remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
+            )  # fmt: skip
 
     @property
     def column_stiffness(self) -> np.ndarray:
         """Mean stiffness of the 2N S columns of ``W`` [N/m], the slices of a mesh side by side."""
-        return self.per_column(self.mesh_stiffness) / self.slices
+        return np.repeat(self.mesh_stiffness, self.slices) / self.slices
 
     @property
     def slice_heights(self) -> np.ndarray:
@@ -118,30 +115,9 @@ class HelicalSet(RigidSet):
         heights = tuple(self.slice_heights.tolist())
         return ContactLines(self.base_helix_angle, heights, self.contact_points == "base_circles")
 
-    def per_column(self, values) -> np.ndarray:
-        """Values (2N, ...) of the meshes repeated for their slices, (2N S, ...)."""
-        return np.repeat(np.asarray(values), self.slices, axis=0)
-
-
-def helical_from_set(planetary_set: PlanetarySet, *, helix_angle: float, **data: Any) -> HelicalSet:
-    """Make a helical set with the radii and angles of a geared one.
-
-    Parameters
-    ----------
-    planetary_set : PlanetarySet
-        Its gears in the transverse section: transverse module and pressure angle.
-    helix_angle : float
-        beta at the reference circle [rad], positive for a right-handed sun; ``tan beta_b = tan beta cos
-        alpha_t`` (ISO 21771, section 4.2.6).
-    **data
-        Bodies, stiffnesses, bearing, contact points and slices of `HelicalSet`.
-    """
-    base = math.atan(math.tan(helix_angle) * math.cos(planetary_set.sun.pressure_angle))
-    return HelicalSet(base_helix_angle=base, **data, **gear_geometry(planetary_set))
-
 
 def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_width: float) -> np.ndarray:
-    """Transverse and overlap contact ratio (2, 2) of the sun-planet and the planet-ring mesh.
+    """Compute the transverse and overlap contact ratio (2, 2) of the sun-planet and the planet-ring mesh.
 
     ``eps_gamma = eps_alpha + eps_beta``, ``eps_beta = b sin|beta| / (pi m_n)`` (ISO 21771, sections 5.4.2.3
     and 5.4.4); a row is one mesh.
@@ -161,31 +137,10 @@ def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_widt
     return np.array([[s.contact_ratio_sun_planet, overlap], [s.contact_ratio_planet_ring, overlap]])
 
 
-def _check_contact(data: HelicalSet) -> None:
-    if data.contact_points not in CONTACT_POINTS:
-        data.refuse("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
-    if isinstance(data.slices, bool) or int(data.slices) != data.slices or data.slices < 1:
-        data.refuse("slices", data.slices, "", "a whole number of 1 or more")
-    if not (math.isfinite(data.face_width) and data.face_width >= 0.0):
-        data.refuse("face_width", data.face_width, "m", "finite, 0 or more")
-    if data.slices > 1 and not data.face_width:
-        data.refuse("face_width", data.face_width, "m", "above 0 for several slices")
-
-
-def _check_closure(data: HelicalSet) -> None:
-    worst = max(data.closure, key=abs)
-    if abs(worst) > LARGEST_CLOSURE:
-        data.refuse(
-            "centre_distance", data.centre_distance, "m",
-            f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {LARGEST_CLOSURE:.0%}",
-            remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
-        )  # fmt: skip
-
-
 def helical_excitation(
     record: MeshExcitation, overlap_ratio, *, slices: int = 1, hand: int = 1
 ) -> MeshExcitation:
-    """Record of helical meshes, or of their slices, from that of spur meshes with the same mesh period.
+    """Make the record of helical meshes, or of their slices, from that of spur meshes of the same period.
 
     Height z above mid-face runs ahead of it by ``eps_beta z / b`` mesh periods, so that
 
@@ -220,12 +175,11 @@ def helical_excitation(
     Raises
     ------
     CaseError
-        Overlap ratios, slices or a hand that cannot be (E-RANGE), a slice that loses its stiffness
-        (E-STIFFNESS).
+        A slice that loses its stiffness (E-STIFFNESS).
     """
     count = len(record.stiffness)
-    ahead = slice_phases(np.zeros(count), overlap_ratio, slices=slices, hand=hand).reshape(count, slices)
-    overlap = _overlap(overlap_ratio, count)
+    overlap = np.broadcast_to(np.asarray(overlap_ratio, float), count)
+    ahead = slice_phases(np.zeros(count), overlap, slices=slices, hand=hand).reshape(count, slices)
     backlash = np.broadcast_to(getattr(record, "backlash", 0.0), count)
     filtered = [
         _sliced(values, record.periods, ahead, overlap / slices) / slices
@@ -247,7 +201,7 @@ def helical_excitation(
 
 
 def slice_phases(phases, overlap_ratio, *, slices: int, hand: int = 1) -> np.ndarray:
-    """Phases (n_meshes S,) of the slices of meshes, as fractions of the mesh period.
+    """Compute phases (n_meshes S,) of the slices of meshes, as fractions of the mesh period.
 
     Parameters
     ----------
@@ -257,11 +211,7 @@ def slice_phases(phases, overlap_ratio, *, slices: int, hand: int = 1) -> np.nda
         See `helical_excitation`.
     """
     phases = np.asarray(phases, float)
-    overlap = _overlap(overlap_ratio, len(phases))
-    if isinstance(slices, bool) or int(slices) != slices or slices < 1:
-        raise CaseError(f"{slices} slices of the face width", code="E-RANGE", limit="1 or more")
-    if hand not in (1, -1):
-        raise CaseError(f"a hand of {hand}", code="E-RANGE", limit="1 or -1")
+    overlap = np.broadcast_to(np.asarray(overlap_ratio, float), len(phases))
     height = (np.arange(slices) + 0.5) / slices - 0.5
     return (phases[:, None] + hand * overlap[:, None] * height).ravel()
 
@@ -275,13 +225,3 @@ def _sliced(values: np.ndarray, periods: int, ahead: np.ndarray, width: np.ndarr
     order = np.fft.rfftfreq(count, 1.0 / count) / periods  # in cycles a mesh period
     shift = np.exp(2j * np.pi * order * ahead[..., None]) * np.sinc(order * width[:, None, None])
     return np.fft.irfft(np.fft.rfft(values)[:, None] * shift, n=count)
-
-
-def _overlap(overlap_ratio, meshes: int) -> np.ndarray:
-    overlap = np.asarray(overlap_ratio, float)
-    if overlap.shape not in ((), (meshes,)) or not np.all(np.isfinite(overlap)) or np.any(overlap < 0.0):
-        raise CaseError(
-            f"overlap ratios {overlap.tolist()}", code="E-RANGE", key="overlap_ratio",
-            limit=f"one number of 0 or more, or {meshes}", remedy="give b sin|beta| / (pi m_n)",
-        )  # fmt: skip
-    return np.broadcast_to(overlap, (meshes,))

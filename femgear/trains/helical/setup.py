@@ -14,21 +14,31 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError, ConvergenceError, GeometryError
+from femgear.gears import profile
+from femgear.gears.kinematics import torques
+from femgear.gears.planetary import virtual_set
+from femgear.solvers.linear.modal import solve_modes
+from femgear.system.assembler import gear_set_system
+from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, gear_geometry
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
+from femgear.trains.helical.model import HelicalSet
 from femgear.trains.helical.section import HelicalCase
 from femgear.trains.rigid import check_one_period, driving_torque, mesh_stiffnesses, needed, torsional_support
+from femgear.trains.static.stages import material_of
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
-    from femgear.trains.helical.model import HelicalSet
 
 # both sections are solved on the same grid, and only the ratio of their stiffnesses counts
 FLANK_ELEMENTS, POSITIONS = 8, 16
 # any stiffness shows whether something takes up the load [N/m, N m/rad]
 _TRIAL = 1e8
-_AXES = {"axial_stiffness": "axial", "tilt_stiffness": "tilt"}
+# entries of the supports that helical teeth ask for, their directions, and what they take up
+_AXES = {"axial_stiffness": ("axial", "thrust"), "tilt_stiffness": ("tilt", "tilting moments")}
 # c' of steel teeth [N/m^2] and Young's modulus of steel [Pa] (ISO 6336-1, method B); what teeth give way by
 # before nothing is left of their contact [modules]
 _TOOTH, _STEEL, _MOST = 14e9, 206e9, 0.25
@@ -45,9 +55,6 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
     mesh_stiffness : (2N,) array, optional
         Mean stiffnesses along the tooth normals [N/m] where the case gives none.
     """
-    from femgear.system.rigid_bodies import HelicalBody, HelicalSupport
-    from femgear.trains.helical.model import helical_from_set
-
     helical = case.helical
     bodies = {}
     for name, one in (("sun", case.sun), ("ring", helical.ring), ("carrier", case.carrier)):
@@ -57,9 +64,9 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
         support = HelicalSupport(radial, space.axial_stiffness, space.tilt_stiffness, torsional)
         bodies[name] = HelicalBody(one.mass, one.inertia, space.diametral_inertia, support)
     pin = helical.planet
-    return helical_from_set(
-        gears,
-        helix_angle=helical.signed_helix_angle,
+    return HelicalSet(
+        **gear_geometry(gears),
+        base_helix_angle=profile.base_helix_angle(case.sun.pressure_angle, helical.signed_helix_angle),
         **bodies,
         planet=HelicalBody(case.planet.mass, case.planet.inertia, pin.diametral_inertia),
         **mesh_stiffnesses(helical.mesh_stiffness, mesh_stiffness),
@@ -73,19 +80,6 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
         slices=helical.slices,
         face_width=case.set.face_width,
     )
-
-
-def base_helix_angle(case: HelicalCase, gears: PlanetarySet) -> float:
-    """beta_b [rad] without sign: ``tan beta_b = tan beta cos alpha_t`` (ISO 21771, section 4.2.6)."""
-    return math.atan(math.tan(case.helical.helix_angle) * math.cos(gears.sun.pressure_angle))
-
-
-def overlap_ratio(case: HelicalCase, gears: PlanetarySet) -> float:
-    """eps_beta of both meshes."""
-    from femgear.trains.helical.model import contact_ratios
-
-    found = contact_ratios(gears, helix_angle=case.helical.helix_angle, face_width=case.set.face_width)
-    return float(found[0, 1])
 
 
 @dataclass(frozen=True)
@@ -144,24 +138,17 @@ def section_stiffness(
         Virtual gears that cannot be made (E-GEOMETRY).
     GridError, ContactError
     """
-    virtual = virtual_gears(case, gears)
+    virtual = _virtual_gears(case, gears)
     single = replace(gears, planet_angles=gears.planet_angles[:1])
-    load = line_load(case, gears)
+    load = _line_load(case, gears)
     transverse, normal = (_pair_stiffness(case, one, load, cache) for one in (single, virtual))
     teeth = (virtual.sun.teeth, virtual.planet.teeth, virtual.ring.teeth)
-    return SectionStiffness(teeth, transverse, normal, base_helix_angle(case, gears))
+    base = profile.base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
+    return SectionStiffness(teeth, transverse, normal, base)
 
 
-def virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
-    """`femgear.gears.planetary.virtual_set` of a case.
-
-    Raises
-    ------
-    CaseError
-        E-GEOMETRY: they cannot be made.
-    """
-    from femgear.gears.planetary import virtual_set
-
+def _virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
+    """Virtual gears of the normal section of a case; refused where they cannot be made (E-GEOMETRY)."""
     try:
         return virtual_set(gears, case.helical.helix_angle)
     except GeometryError as error:
@@ -234,24 +221,18 @@ def shared_load(record: MeshExcitation) -> MeshExcitation:
     )
 
 
-def line_load(case: HelicalCase, gears: PlanetarySet) -> float:
+def _line_load(case: HelicalCase, gears: PlanetarySet) -> float:
     """Load a width of each sun mesh in the transverse section, which is that a length of contact line [N/m].
 
     ``F_n / (b / cos beta_b)`` with ``F_n = F_t / cos beta_b``.
     """
-    from femgear.gears.kinematics import torques
-
     sun = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
     return abs(sun) / (gears.n_planets * gears.sun.base_radius * gears.sun.face_width)
 
 
 def _pair_stiffness(case: HelicalCase, gears: PlanetarySet, load: float, cache: Path | None) -> np.ndarray:
     """Mean stiffness of a tooth pair per width (2,) of the meshes of one planet [N/m^2]."""
-    from femgear.contact.bodies import make_bodies, make_sectors
-    from femgear.contact.cycle import walk_mesh_cycle
-    from femgear.fe.elasticity import Material
-
-    material = Material(case.material.youngs_modulus, case.material.poisson_ratio, case.material.density)
+    material = material_of(case)
     sectors = make_sectors(gears, material, flank_elements=FLANK_ELEMENTS, cache=cache)
     width = gears.sun.face_width
     cycle = walk_mesh_cycle(
@@ -281,13 +262,13 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
     _check_torque(case, gears)
     check_one_period(case, gears, "helical")
     if case.helical.section == "normal":
-        virtual_gears(case, gears)
+        _virtual_gears(case, gears)
 
 
 def _check_torque(case: HelicalCase, gears: PlanetarySet) -> None:
     """A load under which teeth would give way by a large part of their height has no static solution."""
     stiffness = _TOOTH * case.material.youngs_modulus / _STEEL
-    share = line_load(case, gears) / (stiffness * gears.sun.module)
+    share = _line_load(case, gears) / (stiffness * gears.sun.module)
     if share > _MOST:
         raise CaseError(
             f"a tooth pair would give way by {share:.3g} modules under this torque",
@@ -322,9 +303,6 @@ def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
 
 def _balanced(case: HelicalCase, data: HelicalSet) -> bool:
     """Whether supports take up what the torque asks of them."""
-    from femgear.solvers.linear.modal import solve_modes
-    from femgear.system.assembler import gear_set_system
-
     try:
         solve_modes(gear_set_system(data, torque=driving_torque(case)), data.column_stiffness)
     except CaseError as error:
@@ -344,8 +322,7 @@ def _refuse_loose(case: HelicalCase, data: HelicalSet) -> None:
     ]
     cures = [one for one in free if _balanced(case, _supported(data, *one))] or free
     names = [f"helical.{body}.{entry}" for body, entry in cures]
-    what = {"axial_stiffness": "thrust", "tilt_stiffness": "tilting moments"}
-    lost = " or the ".join(dict.fromkeys(what[entry] for _, entry in cures)) or "torque"
+    lost = " or the ".join(dict.fromkeys(_AXES[entry][1] for _, entry in cures)) or "torque"
     raise CaseError(
         f"nothing takes up the {lost} of the helical teeth",
         code="E-MECHANISM",
@@ -359,7 +336,7 @@ def _refuse_loose(case: HelicalCase, data: HelicalSet) -> None:
 
 def _supported(data: HelicalSet, body: str, entry: str) -> HelicalSet:
     """The same set with one support that was missing."""
-    change = {_AXES[entry]: _TRIAL}
+    change = {_AXES[entry][0]: _TRIAL}
     if body == "planet":
         return replace(data, planet_bearing=replace(data.planet_bearing, **change))
     one = getattr(data, body)

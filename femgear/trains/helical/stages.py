@@ -14,6 +14,7 @@ import numpy as np
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
 from femgear.errors import CaseError
+from femgear.gears import profile
 from femgear.report.tables import describe_modes, describe_response, response_warnings
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.periodic.spectral import solve_spectral
@@ -24,7 +25,7 @@ from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
 from femgear.trains.gear_set import gear_set_modes
-from femgear.trains.helical.model import helical_excitation
+from femgear.trains.helical.model import contact_ratios, helical_excitation
 from femgear.trains.helical.results import (
     HelicalDynamicsResult,
     HelicalModesResult,
@@ -34,11 +35,9 @@ from femgear.trains.helical.results import (
 from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
 from femgear.trains.helical.setup import (
     SectionStiffness,
-    base_helix_angle,
     check_helical_case,
     helical_data,
     normal_record,
-    overlap_ratio,
     section_stiffness,
     shared_load,
 )
@@ -111,11 +110,12 @@ def solve_helical_modes(
         if case.helical.section == "normal":
             section = section or section_stiffness(case, gears, cache=cache)
             factor = section.factor
-        sense, overlap = rotation_sense(case, gears), overlap_ratio(case, gears)
-        cycle = static.cycle
+        sense, cycle, beta = rotation_sense(case, gears), static.cycle, case.helical.helix_angle
+        overlap = contact_ratios(gears, helix_angle=beta, face_width=case.set.face_width)[0, 1]
+        base = profile.base_helix_angle(case.sun.pressure_angle, beta)
         backlash = np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], gears.n_planets)
         spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, backlash)
-        record = normal_record(spur, factor, base_helix_angle(case, gears), reversed_time=sense < 0)
+        record = normal_record(spur, factor, base, reversed_time=sense < 0)
         hand = sense * (1 if case.helical.hand == "right" else -1)
         whole = shared_load(helical_excitation(record, overlap))
         excitation = helical_excitation(record, overlap, slices=case.helical.slices, hand=hand)
