@@ -19,7 +19,6 @@ from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_dam
 from femgear.storage.dataset import dataset, in_space
 from femgear.system.assembler import (
     check_mesh_columns,
-    column_groups,
     free_motions,
     gear_set_system,
     mesh_directions,
@@ -99,10 +98,16 @@ class Bearings:
     members: tuple[MemberBearing, ...] = ()
 
     def columns(self, data: RigidSet, *, back_flanks: bool) -> dict[str, np.ndarray]:
-        """Places of the columns of ``W``: those of `column_groups`, and ``members`` (g, 2)."""
-        groups = column_groups(data, back_flanks=back_flanks, bearings=self.of_set)
-        first = sum(place.size for place in groups.values())
-        return groups | {"members": first + np.arange(2 * len(self.members)).reshape(-1, 2)}
+        """Places of the columns of ``W``, of meshes and back flanks (n,), of planets and members (g, 2)."""
+        meshes, planets = len(data.column_stiffness), self.planet_clearance is not None
+        counts = [meshes, meshes * back_flanks, 2 * data.n_planets * planets, 2 * len(self.members)]
+        drive, back, pins, members = np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
+        return {
+            "meshes": drive,
+            "back flanks": back,
+            "planets": pins.reshape(-1, 2),
+            "members": members.reshape(-1, 2),
+        }
 
     def join(self, data: RigidSet, system: MechanicalSystem) -> MechanicalSystem:
         """The system of a set with the columns of the members."""
@@ -125,11 +130,6 @@ class Bearings:
             if one.clearance is not None:
                 found.append(RadialBearings(place[None], one.stiffness, one.clearance))
         return tuple(found)
-
-    @property
-    def of_set(self) -> tuple[str, ...]:
-        """Bearings of the set itself that are elements, as `gear_set_system` names them."""
-        return () if self.planet_clearance is None else ("planets",)
 
 
 def gear_set_modes(
@@ -221,7 +221,11 @@ def gear_set_problem(
     check_mesh_columns(data, meshes)
     elements = _mesh_elements(data, meshes, pins, flank_sign(data, torque), groups)
     elements += bearings.elements(data, groups)
-    options = {"torque": torque, "back_flanks": back_flanks, "bearings": bearings.of_set}
+    options = {
+        "torque": torque,
+        "back_flanks": back_flanks,
+        "planet_bearings": bearings.planet_clearance is not None,
+    }
     still = bearings.join(data, gear_set_system(data, **options))
     springs = working_springs(NonlinearSystem(still, elements), bearings.members)
     # refuses a load that nothing takes up before a solver drifts away with it
@@ -319,7 +323,7 @@ def phased_series(sun_planet, planet_ring, phases, *, mean, orders: tuple[int, .
 def _mesh_elements(data: RigidSet, meshes: GearMeshes, pins, flank: int, groups) -> tuple:
     """The meshes with the approach by the pins, and the back flanks on their own lines."""
     drive = replace(meshes, deflection=_raised(meshes.state[0], -pin_deflections(data, pins, flank=flank)))
-    if "back flanks" not in groups:
+    if not len(groups["back flanks"]):
         return (drive,)
     if not np.all(np.isfinite(meshes.backlash)) or not meshes.separates:
         raise CaseError(

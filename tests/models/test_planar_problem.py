@@ -309,6 +309,8 @@ def test_impossible_requests_are_refused():
         ("E-BACKLASH", lambda: gear_set_problem(
             data, back_flanks=True,
             meshes=replace(mesh_elements(data, stiffness=steps, backlash=1e-5), force=constant(np.ones(6))))),
+        ("E-BEARING", lambda: gear_set_problem(
+            replace(data, planet_bearing=np.inf), bearings=Bearings(1e-5))),
         ("E-SHAPE", lambda: gear_set_problem(data, pin_errors=np.zeros((3, 3)))),
         ("E-SHAPE", lambda: gear_set_problem(data, damping=np.zeros((4, 4)))),
         ("E-SHAPE", lambda: gear_set_problem(

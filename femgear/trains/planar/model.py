@@ -324,7 +324,7 @@ def motion_lines(model: PlanarModel, solution: PeriodicSolution) -> MotionLines:
     members = [3 * row + axis for row in range(len(CENTRAL)) for axis in range(2)]
     rows = np.vstack([free_motions(data)[members], pins])
     x = displacements(model.problem, solution, rows, reduction=model.reduction)
-    if "planets" in groups:
+    if len(groups["planets"]):
         pin_force = -solution.force[groups["planets"]]
     else:
         pin_force = -data.pin_stiffness[..., None] * x[6:].reshape(N, 2, -1)
