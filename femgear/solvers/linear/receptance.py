@@ -516,7 +516,9 @@ def _angular(frequency) -> np.ndarray:
     return 2.0 * np.pi * frequency
 
 
-def _gain(below: np.ndarray, size: np.ndarray, modes: Modes, kept=slice(None)) -> np.ndarray:
+def _gain(
+    below: np.ndarray, size: np.ndarray, modes: Modes, kept: np.ndarray | slice = slice(None)
+) -> np.ndarray:
     """``1 / below`` (F, m) of all modes, or of those that are kept."""
     bad = np.abs(below) <= _RESONANT * size
     if np.any(bad):
