@@ -10,19 +10,17 @@ from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
 from femgear.report.style import png_bytes
-from femgear.storage.dataset import in_space
 from femgear.system.assembler import free_motions, gear_set_system
 from femgear.system.mode_kinds import gear_set_motions, phasing
-from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.gear_set import gear_set_modes, in_space
 from femgear.trains.helical.figures import spatial_mode_shapes
 
-AXES = ("x", "y", "z", "tilt x", "tilt y", "rotation")
 GEARS = ("sun", "planet", "ring")
 
 
 def modes_file(data, modes):
     """What a figure reads of modes.nc."""
-    shape, dofs = in_space(data, free_motions(data) @ modes.shape, AXES)
+    shape, dofs = in_space(data, modes.shape)
     names = phasing(gear_set_motions(data, modes.shape))
     variables = {
         "frequency": ("mode", modes.frequency),

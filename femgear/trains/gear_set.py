@@ -16,7 +16,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
-from femgear.storage.dataset import dataset, in_space
+from femgear.storage.dataset import dataset
 from femgear.system.assembler import (
     check_mesh_columns,
     free_motions,
@@ -111,14 +111,15 @@ class Bearings:
 
     def join(self, data: RigidSet, system: MechanicalSystem) -> MechanicalSystem:
         """The system of a set with the columns of the members."""
-        axes = len(data.axes)
-        columns = np.zeros((axes * (data.n_planets + 3), 2 * len(self.members)))
-        for number, one in enumerate(self.members):
-            for name, sign in ((one.inner, 1.0), (one.outer, -1.0)):
-                if name in CENTRAL:
-                    first = axes * CENTRAL.index(name)
-                    columns[[first, first + 1], [2 * number, 2 * number + 1]] = sign
-        return replace(system, W=np.hstack([system.W, free_motions(data).T @ columns]))
+        T, columns = free_motions(data), [system.W]
+        for one in self.members:
+            first, *other = (
+                T[len(data.axes) * CENTRAL.index(name) :][:2].T
+                for name in (one.inner, one.outer)
+                if name in CENTRAL
+            )
+            columns.append(first - sum(other))
+        return replace(system, W=np.hstack(columns))
 
     def elements(self, data: RigidSet, groups: dict[str, np.ndarray]) -> tuple[RadialBearings, ...]:
         """The bearings on their `columns`."""
@@ -428,8 +429,7 @@ def modes_dataset(
     along : str
         What is added to the descriptions of stiffness and deflection of the meshes.
     """
-    axes = tuple(_AXES[axis] for axis in data.axes)
-    shape, dofs = in_space(data, free_motions(data) @ modes.shape, axes)
+    shape, dofs = in_space(data, modes.shape)
     count, slices, mode = 2 * data.n_planets, len(data.contact_lines.heights), ("mode",)
     stiffness = modes.mesh_stiffness[: count * slices].reshape(count, slices).sum(axis=1)
     deflection = modes.mesh_deflection[: count * slices].reshape(count, slices, -1).mean(axis=1)
@@ -455,3 +455,32 @@ def modes_dataset(
     }
     named = {"title": attrs["title"], "unknowns": len(modes.shape)}
     return dataset(variables, coords=coords, attrs=named | attrs)
+
+
+def in_space(data: RigidSet, shape: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Compute motions of all bodies along and about the axes of the set, held ones included.
+
+    Parameters
+    ----------
+    data : RigidSet
+    shape : (n, m) array
+        In the coordinates of `gear_set_system`.
+
+    Returns
+    -------
+    motions : (n_all, m) array
+        [m] and [rad] per unit of the shapes.
+    names : list of str
+        Body and motion, as in "planet 2: tilt x".
+    """
+    N, axes = data.n_planets, len(data.axes)
+    full = (free_motions(data) @ shape).reshape(N + 3, axes, -1)
+    cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
+    for first in range(0, axes, 3):
+        radial, tangential = full[3:, first].copy(), full[3:, first + 1].copy()
+        full[3:, first] = radial * cosine - tangential * sine
+        full[3:, first + 1] = radial * sine + tangential * cosine
+    full[:, -(axes // 2) :] /= data.radii[:, None, None]
+    bodies = [*CENTRAL, *(f"planet {n + 1}" for n in range(N))]
+    names = [f"{body}: {_AXES[axis]}" for body in bodies for axis in data.axes]
+    return full.reshape(len(names), -1), names
