@@ -303,7 +303,7 @@ def test_clearance_of_the_planet_bearings_acts_in_the_response(pgb):
     model = planar_model(case, planetary_set(case), mesh_frequency=True)
     assert model.groups["planets"].shape == (3, 2)
     solution = solve_planar_response(case).solutions[0]
-    pins = motion_lines(model, solution).planet_bearing
+    pins = motion_lines(model, solution).planet_bearing_force
     # the force of the bearing needs more than its clearance
     apart = np.hypot(*solution.deflection[model.groups["planets"]][0, :, 0].real)
     assert 20e-6 < apart < 20e-6 + 3 * np.hypot(*pins[0, :, 0].real) / 5.3e9

@@ -207,7 +207,9 @@ def modal_error_response(modes: Modes, mesh_frequency, error, *, harmonics=None)
     left = modes.mesh_deflection[:, elastic]
     push = k[:, None] * error
     modal = np.einsum("jm,cjh->chm", left, push)
-    static = np.einsum("oj,cjh->cho", modes.residual, push)
+    # all modes leave nothing out but rounding
+    rest = modes.residual if modes.shape.shape[1] < len(modes.shape) else np.zeros_like(modes.residual)
+    static = np.einsum("oj,cjh->cho", rest, push)
     deflection = np.empty((len(error), len(frequency), len(harmonics), len(k)), complex)
     for place, harmonic in enumerate(harmonics):
         w = _angular(harmonic * frequency)[:, None]

@@ -205,41 +205,42 @@ def _pin_errors(case: PlanarCase, n_planets: int) -> np.ndarray:
     return pins
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MotionLines:
-    """Lines of a solution, sizes of its motions, and the share of the time in which flanks touch.
+    """Motions, forces and contact of a solution, under the names of branch.nc and response.nc.
 
     Parameters
     ----------
-    member : (3, 2, L) complex array
-        x and y of carrier, ring and sun in the carrier frame [m].
-    mesh_force, back_force : (2N, L) complex arrays
-        Along the line of action of the drive flanks, and of the back flanks [N].
-    planet_bearing : (N, 2, L) complex array
-        Force of the pin on the planet, radially outwards and tangentially [N].
-    carrier_bearing : (2, L) complex array
-        x and y of the force of the carrier bearing on the carrier [N]; zero without one.
-    drive_contact, back_contact : (2N,) arrays
-        Shares of the time in which drive and back flanks touch.
-    motion : float
-        Farthest that the centre of carrier, ring or sun moves from its place [m].
-    approach : float
-        Largest deflection of a mesh [m].
     force_tail : float
         Share of the fluctuating force in the upper half of the lines, of the kind of mesh, sun-planet or
         planet-ring with both flanks, that has more of it; see `femgear.system.fourier.line_tail`.
+    motion : float
+        Farthest that the centre of carrier, ring or sun moves from its place [m].
+    rms, displacement : (3, 2) array, (3, 2, L) complex array
+        x and y of carrier, ring and sun in the carrier frame, root mean square about the mean and lines [m].
+    mesh_force, back_force : (2N, L) complex arrays
+        Along the line of action of the drive flanks, and of the back flanks [N].
+    planet_bearing_force : (N, 2, L) complex array
+        Force of the pin on the planet, radially outwards and tangentially [N].
+    carrier_bearing_force : (2, L) complex array
+        x and y of the force of the carrier bearing on the carrier [N]; zero without one.
+    drive_contact, back_contact : (2N,) arrays
+        Shares of the time in which drive and back flanks touch.
+    approach : float
+        Largest deflection of a mesh [m].
     """
 
-    member: np.ndarray
+    force_tail: float
+    motion: float
+    rms: np.ndarray
+    displacement: np.ndarray
     mesh_force: np.ndarray
     back_force: np.ndarray
-    planet_bearing: np.ndarray
-    carrier_bearing: np.ndarray
+    planet_bearing_force: np.ndarray
+    carrier_bearing_force: np.ndarray
     drive_contact: np.ndarray
     back_contact: np.ndarray
-    motion: float
     approach: float
-    force_tail: float
 
 
 def weight_curve(
@@ -342,16 +343,17 @@ def motion_lines(model: PlanarModel, solution: PeriodicSolution) -> MotionLines:
     pressed, pulled = column_contact(model.problem, solution)
     behind = pressed[groups["back flanks"]] if model.back_flanks else pulled[groups["meshes"]]
     return MotionLines(
-        member,
-        mesh,
-        back,
-        pin_force,
-        bearing,
-        pressed[groups["meshes"]],
-        behind,
-        motion=float(np.hypot(path[:, 0], path[:, 1]).max()),
-        approach=float(deflection.max()),
         force_tail=max(line_tail(forces, solution.orders, rounding=_STILL) for forces in kinds),
+        motion=float(np.hypot(path[:, 0], path[:, 1]).max()),
+        rms=fluctuation(member),
+        displacement=member,
+        mesh_force=mesh,
+        back_force=back,
+        planet_bearing_force=pin_force,
+        carrier_bearing_force=bearing,
+        drive_contact=pressed[groups["meshes"]],
+        back_contact=behind,
+        approach=float(deflection.max()),
     )
 
 

@@ -66,13 +66,24 @@ _OF_SOLUTIONS = {
     "spectral_radius": "spectral radius of the fixed point",
 }
 
-# forces in the files, what `MotionLines` calls them, and their dimensions between solutions and lines
-_FORCES = (
-    ("mesh_force", "mesh_force", ("mesh",), "mesh force along the line of the drive flanks"),
-    ("back_force", "back_force", ("mesh",), "force of the back flanks on their own line"),
-    ("planet_bearing_force", "planet_bearing", ("planet", "direction"), "force of the pin on the planet"),
-    ("carrier_bearing_force", "carrier_bearing", ("axis",), "force of the carrier bearing on the carrier"),
-)
+# of `MotionLines`: dimensions behind that of the solutions, unit and description
+_MOTIONS = {
+    "force_tail": (
+        "", "1", "share of the fluctuating force in the upper half of the lines, of the kind of mesh with "
+        "more of it",
+    ),
+    "motion": ("", "m", "farthest that a member's centre moves from its place"),
+    "rms": ("member axis", "m", "displacement about its mean, r.m.s."),
+    "displacement": ("member axis line", "m", "displacement in the carrier frame"),
+    "mesh_force": ("mesh line", "N", "mesh force along the line of the drive flanks"),
+    "back_force": ("mesh line", "N", "force of the back flanks on their own line"),
+    "planet_bearing_force": ("planet direction line", "N", "force of the pin on the planet"),
+    "carrier_bearing_force": ("axis line", "N", "force of the carrier bearing on the carrier"),
+    "drive_contact": (
+        "mesh", "1", "share of the time in which the drive flanks touch: 1 in contact, 0 not",
+    ),
+    "back_contact": ("mesh", "1", "share of the time in which the back flanks touch: 1 in contact, 0 not"),
+}  # fmt: skip
 
 # pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces
 _BY_STABILITY = ("weight_response", "tooth_contact")
@@ -220,7 +231,7 @@ def _nearest(verdict: FloquetVerdict) -> float:
 
 def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
     """Forces in time at the points that are drawn, from the laws of the contacts."""
-    rms = np.array([fluctuation(one.member[0, 0]) for one in result.lines])
+    rms = np.array([one.rms[0, 0] for one in result.lines])
     back = np.array([one.back_contact.max() for one in result.lines])
     points = shown_points(rms, back, stable)
     theta = np.linspace(0.0, 2.0 * np.pi, PHASES)[:, None]
@@ -237,28 +248,13 @@ def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
 
 def _motions(lines: Sequence[MotionLines], along: str, line: str) -> dict[str, tuple]:
     """Displacements, forces and contact of all solutions, which stand along the first axis."""
-    found = {name: np.array([getattr(one, name) for one in lines]) for name in MotionLines.__annotations__}
-    axis = (along, "member", "axis")
-    lined = [("displacement", (*axis, line), found["member"], "m", "displacement in the carrier frame")]
-    lined += [(name, (along, *dims, line), found[own], "N", words) for name, own, dims, words in _FORCES]
-    contact = {
-        f"{side}_contact": (
-            (along, "mesh"), found[f"{side}_contact"], "1",
-            f"share of the time in which the {side} flanks touch: 1 in contact, 0 not",
-        )
-        for side in ("drive", "back")
-    }  # fmt: skip
-    return {
-        "force_tail": (
-            (along,), found["force_tail"], "1",
-            "share of the fluctuating force in the upper half of the lines, of the kind of mesh with more of "
-            "it",
-        ),
-        "motion": ((along,), found["motion"], "m", "farthest that a member's centre moves from its place"),
-        "rms": (axis, fluctuation(found["member"]), "m", "displacement about its mean, r.m.s."),
-        **complex_entries(lined),
-        **contact,
-    }  # fmt: skip
+    entries = {}
+    for name, (dims, unit, words) in _MOTIONS.items():
+        values = np.array([getattr(one, name) for one in lines])
+        axes = (along, *(line if axis == "line" else axis for axis in dims.split()))
+        entry = (axes, values, unit, words)
+        entries |= complex_entries([(name, *entry)]) if "line" in dims else {name: entry}
+    return entries
 
 
 def _coordinates(gears) -> dict[str, tuple]:
