@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from femgear.storage.dataset import RPM
 from femgear.trains.gear_set import mode_ratios
 from femgear.trains.planar.model import planar_ratios
 from femgear.trains.planar.section import PlanarCase
-from femgear.trains.rigid import check_one_period, needed
+from femgear.trains.rigid import check_one_period
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -98,71 +98,57 @@ def mean_compression(model: PlanarModel) -> float:
     return float(np.abs(system.W[:, :count].T @ moved).min())
 
 
-def check_branch_damping(case: PlanarCase, model: PlanarModel) -> None:
-    """Refuse a range of frequencies over a natural frequency without damping.
-
-    Raises
-    ------
-    CaseError
-        E-RESONANCE.
-    """
-    wanted = needed(case.planar.branch, "planar.branch")
-    bare = _undamped(case, model)
-    bare = bare[(bare >= wanted.start) & (bare <= wanted.to)]
-    if len(bare):
-        raise _resonance(case, bare[0], "planar.branch crosses it")
-
-
-def check_response_damping(
-    case: PlanarCase, model: PlanarModel, frequency: np.ndarray, orders: np.ndarray
-) -> None:
-    """Refuse a speed at which the weight or a mesh harmonic meets a natural frequency without damping.
+def check_damping(case: PlanarCase, model: PlanarModel, spans: Iterable[tuple[float, float, str]]) -> None:
+    """Refuse natural frequencies without damping where something excites them.
 
     Parameters
     ----------
     case : Case
     model : PlanarModel
-    frequency : (2,) array
-        Of carrier and mesh [rad/s].
-    orders : (L, 2) int array
+    spans : iterable of (lowest [Hz], highest [Hz], text)
+        Frequencies that are excited, and how, as in "planar.branch crosses it".
 
     Raises
     ------
     CaseError
         E-RESONANCE.
     """
-    bare = _undamped(case, model)
-    pure = (orders[:, 0] == 0) | ((np.abs(orders[:, 0]) == 1) & (orders[:, 1] == 0))
-    lines = np.abs(orders[pure] @ frequency) / (2.0 * np.pi)
-    met = np.abs(lines[:, None] - bare) < _ON_RESONANCE * bare
-    if met.any():
-        raise _resonance(
-            case, bare[met.any(axis=0)][0], f"the line at {lines[met.any(axis=1)][0]:.6g} Hz is on it"
-        )
-
-
-def _undamped(case: PlanarCase, model: PlanarModel) -> np.ndarray:
-    """Natural frequencies [Hz] above zero of the modes without damping."""
     ratios = planar_ratios(case)
     if np.min(ratios) > 0.0:
-        return np.zeros(0)
+        return
     system = model.problem.system
     plain = replace(system, C=np.zeros_like(system.C), gyroscopic=None)
     hertz = solve_modes(plain, model.springs).frequency
-    return hertz[(hertz > 0.0) & (mode_ratios(hertz, ratios) == 0.0)]
-
-
-def _resonance(case: PlanarCase, hertz: float, words: str) -> CaseError:
+    bare = hertz[(hertz > 0.0) & (mode_ratios(hertz, ratios) == 0.0)]
     key = "planar.damping_ratios" if case.planar.damping_ratios else "dynamics.damping_ratio"
-    return CaseError(
-        f"the natural frequency {hertz:.6g} Hz has no damping and {words}: the response has no bound there",
-        code="E-RESONANCE",
-        key=key,
-        value="0",
-        limit="above 0 at a resonance",
-        remedy="give the mode some damping, or move the range or the speed",
-        file=case.location(key),
-    )
+    for lowest, highest, words in spans:
+        met = bare[(bare >= lowest) & (bare <= highest)]
+        if len(met):
+            raise CaseError(
+                f"the natural frequency {met[0]:.6g} Hz has no damping and {words}: "
+                "the response has no bound there",
+                code="E-RESONANCE",
+                key=key,
+                value="0",
+                limit="above 0 at a resonance",
+                remedy="give the mode some damping, or move the range or the speed",
+                file=case.location(key),
+            )
+
+
+def excited_spans(frequency: np.ndarray, orders: np.ndarray) -> Iterator[tuple[float, float, str]]:
+    """Spans of `check_damping` around the lines of the weight and of the mesh harmonics.
+
+    Parameters
+    ----------
+    frequency : (2,) array
+        Of carrier and mesh [rad/s].
+    orders : (L, 2) int array
+    """
+    pure = (orders[:, 0] == 0) | ((np.abs(orders[:, 0]) == 1) & (orders[:, 1] == 0))
+    for line in np.abs(orders[pure] @ frequency) / (2.0 * np.pi):
+        words = f"the line at {line:.6g} Hz is on it"
+        yield line / (1.0 + _ON_RESONANCE), line / (1.0 - _ON_RESONANCE), words
 
 
 def bounded_branch(

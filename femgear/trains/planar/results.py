@@ -418,10 +418,10 @@ def planar_verdicts(branch: xr.Dataset | None, response: xr.Dataset | None) -> I
             yield f"the branch of the response to the weight: {branch.attrs['message']!s}"
         yield from tail_warnings(branch, "planar.branch.harmonics")
     if response is not None:
-        yield from tail_warnings(response, response_key(response))
+        yield from tail_warnings(response, _response_key(response))
 
 
-def response_key(data: xr.Dataset) -> str:
+def _response_key(data: xr.Dataset) -> str:
     """Entries of the case file that hold the lines of response.nc."""
     if not data.attrs["mesh_lines"]:
         return "planar.response.carrier_harmonics"
@@ -486,7 +486,7 @@ def describe_response(data: xr.Dataset) -> Block:
             "some lines have one frequency: planar.response.carrier_harmonics or side_bands reach from the "
             "weight to the mesh frequency; r.m.s. values count such lines apart"
         )
-    notes += tail_warnings(data, response_key(data))
+    notes += tail_warnings(data, _response_key(data))
     return Block("Weight and mesh frequency", header, tuple(rows), tuple(notes))
 
 

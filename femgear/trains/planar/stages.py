@@ -19,12 +19,12 @@ from femgear.threads import one_blas_thread
 from femgear.trains.gear_set import gear_set_modes, mode_ratios
 from femgear.trains.planar.checks import (
     bounded_branch,
-    check_branch_damping,
+    check_damping,
     check_planar_case,
-    check_response_damping,
     check_response_motions,
     check_smoothing,
     end_of_branch,
+    excited_spans,
 )
 from femgear.trains.planar.model import (
     carrier_sense,
@@ -103,7 +103,7 @@ def solve_branch(
     check_planar_case(case, gears)
     model = planar_model(case, gears, static)
     check_smoothing(case, gears, model)
-    check_branch_damping(case, model)
+    check_damping(case, model, [(wanted.start, wanted.to, "planar.branch crosses it")])
     branch = weight_curve(
         model.problem,
         (wanted.start, wanted.to),
@@ -146,7 +146,7 @@ def solve_planar_response(
             model = planar_model(case, gears, static, mesh_frequency=True, carrier_speed=carrier)
             check_smoothing(case, gears, model)
         frequency = np.array([abs(speed.carrier), 2.0 * np.pi * speed.mesh_frequency])
-        check_response_damping(case, model, frequency, orders)
+        check_damping(case, model, excited_spans(frequency, orders))
         found = None
         options = {"orders": orders, "reduction": model.reduction, "radius": len(orders) < 60}
         if solutions and solutions[-1].converged:
