@@ -242,7 +242,7 @@ def gear_set_problem(
 
 
 def working_springs(problem: NonlinearSystem, members: Sequence[MemberBearing] = ()) -> np.ndarray:
-    """Springs (n_columns,) [N/m] near which a set works: bearings closed, back flanks open.
+    """Choose springs (n_columns,) [N/m] near which a set works: bearings closed, back flanks open.
 
     The elements' own reference counts back flanks on their own lines as closed, far from where the set works.
 
@@ -263,7 +263,7 @@ def working_springs(problem: NonlinearSystem, members: Sequence[MemberBearing] =
 
 
 def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float] | np.ndarray) -> np.ndarray:
-    """Damping ratio (m,) of every mode from one a natural frequency.
+    """Assign a damping ratio (m,) to every mode from one a natural frequency.
 
     Parameters
     ----------
@@ -283,7 +283,7 @@ def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float] | np.ndar
 
 
 def pin_deflections(data: RigidSet, pin_errors, *, flank: int = 1) -> np.ndarray:
-    """Approach of the flanks (n_columns,) [m] by displaced pins, all bodies resting in their bearings.
+    """Compute the approach of the flanks (n_columns,) [m] by displaced pins, all bodies at rest in bearings.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def pin_deflections(data: RigidSet, pin_errors, *, flank: int = 1) -> np.ndarray
 
 
 def phased_series(sun_planet, planet_ring, phases, *, mean, orders: tuple[int, ...] = (1,)) -> FourierSeries:
-    """Stiffness of the 2N meshes from one wave of each kind, shifted by the mesh phases.
+    """Make the stiffness of the 2N meshes from one wave of each kind, shifted by the mesh phases.
 
     Parameters
     ----------
@@ -415,7 +415,7 @@ def modes_dataset(
     phasing: tuple[str, ...] = (),
     along: str = "",
 ) -> xr.Dataset:
-    """Contents of modes.nc: frequencies, kinds and shapes of all bodies, mesh deflections, no elastic ring.
+    """Collect modes.nc: frequencies, kinds and shapes of all bodies, mesh deflections, no elastic ring.
 
     Parameters
     ----------

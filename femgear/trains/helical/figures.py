@@ -140,7 +140,7 @@ def _xy(points):
 
 
 def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float = 0.16) -> Figure:
-    """The first twelve modes that are no rigid-body motions, each from the front and below it from the side.
+    """Draw the first twelve modes that are no rigid-body motions, from the front and, below, from the side.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def _mesh_stiffness(modes: xr.Dataset, static: xr.Dataset) -> Figure:
 
 
 def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
-    """Fluctuation of the dynamic transmission error over one mesh period beside the static one.
+    """Draw the fluctuation of the dynamic transmission error over one mesh period beside the static one.
 
     Parameters
     ----------

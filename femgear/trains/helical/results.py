@@ -177,7 +177,7 @@ def _attributes(result: HelicalModesResult) -> dict:
 
 
 def describe_helical(case: HelicalCase, planetary: PlanetarySet) -> tuple[Block, ...]:
-    """Helix, contact ratios, bodies and supports of a helical case.
+    """Tabulate helix, contact ratios, bodies and supports of a helical case.
 
     Parameters
     ----------

@@ -147,7 +147,7 @@ class HelicalCase(RigidCase):
 
 
 def check_helical(case: HelicalCase) -> Iterator[CaseError]:
-    """Refusals of what a helical section does not go with."""
+    """Refuse what a helical section does not go with."""
     helical = case.helical
     if helical.helix_angle == 0.0:
         yield CaseError(

@@ -45,7 +45,7 @@ _TOOTH, _STEEL, _MOST = 14e9, 206e9, 0.25
 
 
 def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) -> HelicalSet:
-    """Helical set of a case: bodies and supports of its entries, radii and angles of its gears.
+    """Make the helical set of a case: bodies and supports of its entries, radii and angles of its gears.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class SectionStiffness:
 def section_stiffness(
     case: HelicalCase, gears: PlanetarySet, *, cache: Path | None = None
 ) -> SectionStiffness:
-    """Stiffness of the teeth of both sections, from one planet each under the same load a length.
+    """Compute the stiffness of the teeth of both sections, from one planet each under equal load a length.
 
     The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse.
 
@@ -166,7 +166,7 @@ def _virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
 def normal_record(
     record: MeshExcitation, factor: np.ndarray, base_helix_angle: float, *, reversed_time: bool = False
 ) -> MeshExcitation:
-    """Record along tooth normals of helical teeth without overlap, from spur gears of the transverse section.
+    """Make the record along tooth normals, without overlap, from spur gears of the transverse section.
 
     ``k_n = factor k_t / cos^2 beta_b``, ``F_n = F_t / cos beta_b``; the tangent line of force over deflection
     keeps its intercept ``d_t - F_t / k_t``, which holds deviations of the flanks, and changes its slope:
@@ -197,7 +197,7 @@ def normal_record(
 
 
 def shared_load(record: MeshExcitation) -> MeshExcitation:
-    """The same tangent lines at the static state of a set with fixed centres.
+    """Move tangent lines to the static state of a set with fixed centres.
 
     Each planet passes the force on that it takes, ``F = k_s (d_s - e_s) = k_r (d_r - e_r)``, and one rotation
     of the sun closes the meshes of all planets, ``d_s + d_r = X``; the forces on the sun add up to those of

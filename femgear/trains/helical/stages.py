@@ -64,7 +64,7 @@ _SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "t
 def solve_helical_static(
     case: HelicalCase, *, cache: Path | None = None, progress: Progress | None = None
 ) -> StaticResult:
-    """Static solution of the spur gears of the transverse section, the whole face width loaded at once."""
+    """Solve the spur gears of the transverse section, the whole face width loaded at once."""
     return static_stages.solve_static(_drive_flanks(case), cache=cache, progress=progress)
 
 
@@ -82,7 +82,7 @@ def solve_helical_modes(
     section: SectionStiffness | None = None,
     cache: Path | None = None,
 ) -> HelicalModesResult:
-    """Natural frequencies, modes, their kinds and phasing.
+    """Solve for natural frequencies, modes, their kinds and phasing.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def solve_helical_modes(
 def solve_helical_dynamics(
     case: HelicalCase, modes: HelicalModesResult, *, progress: Progress | None = None
 ) -> HelicalDynamicsResult:
-    """Periodic response at the case's speeds by the spectral method, with a Floquet verdict at each.
+    """Solve for the periodic response at all speeds by the spectral method, with a Floquet verdict at each.
 
     Raises
     ------

@@ -90,7 +90,7 @@ def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -
 
 
 def mean_compression(model: PlanarModel) -> float:
-    """Least compression [m] under the mean load of all meshes: force over stiffness with closed flanks."""
+    """Compute the least compression [m] of a mesh under the mean load, force / stiffness, flanks closed."""
     system, count = model.problem.system, 2 * model.data.n_planets
     K = system.K + (system.W * model.springs) @ system.W.T
     # free turning of the whole set has no stiffness, and the load none of it
@@ -137,7 +137,7 @@ def check_damping(case: PlanarCase, model: PlanarModel, spans: Iterable[tuple[fl
 
 
 def excited_spans(frequency: np.ndarray, orders: np.ndarray) -> Iterator[tuple[float, float, str]]:
-    """Spans of `check_damping` around the lines of the weight and of the mesh harmonics.
+    """Make the spans of `check_damping` around the lines of the weight and of the mesh harmonics.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def excited_spans(frequency: np.ndarray, orders: np.ndarray) -> Iterator[tuple[f
 def bounded_branch(
     branch: Branch, lines: Iterable[MotionLines], gears: PlanetarySet
 ) -> tuple[Branch, tuple[MotionLines, ...]]:
-    """A branch up to the last point that converged and whose displacements are small, and its motions.
+    """Cut a branch at the last point that converged with small displacements, and compute its motions.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def _moved_too_far(where: str, words: str, converged: bool) -> ConvergenceError:
 
 
 def end_of_branch(branch: Branch, wanted: BranchSection) -> str:
-    """How a branch ended, in frequencies and entries of the case file."""
+    """Tell how a branch ended, in frequencies [Hz] and entries of the case file."""
     hertz, count = branch.parameter[-1] / (2.0 * np.pi), len(branch.parameter)
     if branch.complete:
         side = "start" if abs(hertz - wanted.start) < abs(hertz - wanted.to) else "end"

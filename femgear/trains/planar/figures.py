@@ -39,7 +39,7 @@ _INSTANTS = 20_000
 
 
 def pieces(stable, wanted: int) -> list[slice]:
-    """Runs of segments of a curve of one kind: 1 stable, 0 not stable, -1 not known.
+    """Find runs of segments of a curve of one kind: 1 stable, 0 not stable, -1 not known.
 
     A segment is drawn once: unknown where one of its ends is, otherwise unstable where one is.
     """
@@ -107,7 +107,7 @@ def branch_figures(branch: xr.Dataset) -> dict[str, Figure]:
 
 
 def weight_response(branch: xr.Dataset) -> Figure:
-    """Amplitudes of carrier, ring and sun: drawn by what is known of their stability, folds marked."""
+    """Draw amplitudes of carrier, ring and sun by what is known of their stability, folds marked."""
     figure, axes = new_figure(rows=3, width=8.5, height=8.0, sharex=True)
     hertz, folds = branch["weight_frequency"].values, merged_folds(
         branch["weight_frequency"].values, branch["fold"].values
@@ -208,7 +208,7 @@ def _flank_forces(branch: xr.Dataset) -> Figure:
 
 
 def contact_over_branch(branch: xr.Dataset) -> Figure:
-    """Share of the cycle in which flanks touch over the frequency, drawn by stability."""
+    """Draw the share of the cycle in which flanks touch over the frequency, by stability."""
     return _contact(branch, branch["weight_frequency"].values, _AXIS, _parts(branch))
 
 
@@ -244,7 +244,7 @@ def _response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
 
 
 def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
-    """Mesh forces of the first planet over one carrier turn, and over the first mesh periods if they vary."""
+    """Draw mesh forces of planet 1 over one carrier turn, and over the first mesh periods if they vary."""
     lines = harmonics_of(response, "mesh_force")[speed]
     names = [str(name) for name in response["mesh"].values]
     turn, wave = _carrier_turn(response, speed)

@@ -158,12 +158,12 @@ def planar_model(
 
 
 def carrier_sense(case: PlanarCase, gears: PlanetarySet) -> int:
-    """1 where the carrier turns counter-clockwise, -1 where clockwise, 0 where it stands."""
+    """Tell the sense of the carrier: 1 where it turns counter-clockwise, -1 clockwise, 0 where it stands."""
     return int(np.sign(member_speeds(case, gears).carrier))
 
 
 def planar_ratios(case: PlanarCase) -> float | tuple[float, ...]:
-    """Damping ratios of a case: of all modes, or one a natural frequency as of `mode_ratios`."""
+    """Read the damping ratios of a case: of all modes, or one a natural frequency as of `mode_ratios`."""
     return case.planar.damping_ratios or case.dynamics.damping_ratio
 
 
@@ -254,7 +254,7 @@ def weight_curve(
     largest: float = 0.1,
     max_points: int = 600,
 ) -> Branch:
-    """Periodic responses over the frequency of the weight in the carrier frame.
+    """Follow periodic responses over the frequency of the weight in the carrier frame.
 
     Parameters
     ----------
@@ -287,7 +287,7 @@ def weight_curve(
 def judged_branch(
     problem: NonlinearSystem, branch: Branch, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Branch:
-    """A branch with Floquet verdicts: coarse first, fine where that is open or near the unit circle.
+    """Judge a branch by Floquet multipliers: coarse first, fine where open or near the unit circle.
 
     Parameters
     ----------
@@ -377,7 +377,7 @@ def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple
 
 
 def column_contact(problem: NonlinearSystem, solution: PeriodicSolution) -> np.ndarray:
-    """Share of the time (2, n_columns) in which the flanks of every column press, and pull.
+    """Compute the share of the time (2, n_columns) in which the flanks of every column press, and pull.
 
     Columns without a mesh are nan. A mesh with play on one line of action pulls where its back flanks touch.
     A smoothed contact counts as closed beyond half its force scale, the force at the corner itself.
@@ -404,7 +404,7 @@ def _phases(orders: np.ndarray) -> np.ndarray:
 
 
 def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[tuple[int, str]]:
-    """Points of a branch that are drawn over the phase, in order, and what they are; the last one is the top.
+    """Choose points of a branch to draw over the phase, in order, with what they are; the last is the top.
 
     Parameters
     ----------
@@ -427,12 +427,12 @@ def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[
 
 
 def fluctuation(lines: np.ndarray) -> np.ndarray:
-    """Root mean square about the mean of lines (..., L), mean first."""
+    """Compute the root mean square (...) about the mean of lines (..., L), mean first."""
     return np.sqrt(0.5 * (np.abs(lines[..., 1:]) ** 2).sum(axis=-1))
 
 
 def merged_folds(frequency: np.ndarray, fold: np.ndarray) -> np.ndarray:
-    """Points of the limit points of a branch, neighbours at one frequency as one: the outermost of them.
+    """Find the limit points of a branch, neighbours at one frequency as one: the outermost of them.
 
     Parameters
     ----------

@@ -269,7 +269,7 @@ def _coordinates(gears) -> dict[str, tuple]:
 
 
 def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
-    """Mesh stiffness, supports, weight and ranges of a planar case."""
+    """Tabulate bodies and supports of a planar case, with mesh stiffness, play and weight as notes."""
     planar = case.planar
     notes = [_stiffness(case), _play(case, planetary)]
     if planar.carrier_bearing is not None:
@@ -335,7 +335,7 @@ def _sense(case: PlanarCase) -> str:
 
 
 def describe_branch(data: xr.Dataset) -> Block:
-    """Table of branch.nc: ends, folds and the largest responses."""
+    """Tabulate branch.nc: ends, folds and the largest responses."""
     hertz, rms = data["weight_frequency"].values, data["rms"].values
     known = data.attrs["stability"] != "not computed"
     stable = data["stable"].values
@@ -453,7 +453,7 @@ def _verdicts(data: xr.Dataset) -> Iterator[str]:
 
 
 def describe_response(data: xr.Dataset) -> Block:
-    """Table of response.nc."""
+    """Tabulate response.nc, a row a speed."""
     rows = []
     force = np.hypot(data["mesh_force_real"].values, data["mesh_force_imag"].values)
     varying = fluctuation(force).max(axis=1)
@@ -497,7 +497,7 @@ def _kind_of_lines(data: xr.Dataset) -> str:
 
 
 def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
-    """Natural frequencies that the case calls published, beside the nearest mode of the kind."""
+    """Tabulate natural frequencies [Hz] that the case calls published beside the nearest of the kind."""
     entries = [(one, one.frequency) for one in case.planar.published if one.frequency is not None]
     if not entries:
         return None
@@ -515,13 +515,13 @@ def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
 
 
 def remarks(results: Results, stem: str) -> Iterator[str]:
-    """What a case and its results add to the caption of a picture."""
+    """Tell what a case and its results add to the caption of a picture."""
     yield from comparisons(results.case, stem)
     yield from doubts(results, stem)
 
 
 def comparisons(case: PlanarCase, stem: str) -> Iterator[str]:
-    """How to read a picture of this case, and published ones beside it."""
+    """Tell how to read a picture of this case, and published ones beside it."""
     planar = case.planar
     if stem in _BY_STABILITY and planar.branch is not None:
         yield (
@@ -537,7 +537,7 @@ def comparisons(case: PlanarCase, stem: str) -> Iterator[str]:
 
 
 def doubts(results: Results, stem: str) -> Iterator[str]:
-    """What the results say against a picture."""
+    """Tell what the results say against a picture."""
     stage = "branch" if stem in _OF_BRANCH else "response" if stem.startswith(_OF_RESPONSE) else None
     if stage is None or stage not in results.stages:
         return

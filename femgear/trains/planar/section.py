@@ -209,7 +209,7 @@ class PlanarCase(RigidCase):
 
 
 def check_planar(case: PlanarCase) -> Iterator[CaseError]:
-    """Refusals of what a planar section does not go with."""
+    """Refuse what a planar section does not go with."""
     planar = case.planar
     yield from rigid_refusals(case, "planar", without_torque=": the planar set would rattle in its play")
     if planar.back_flanks and planar.line_backlash == 0.0:

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 
 @one_blas_thread()
 def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> PlanarModesResult:
-    """Natural frequencies, modes and their kinds.
+    """Solve for natural frequencies, modes and their kinds.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> 
 def solve_branch(
     case: PlanarCase, static: StaticResult | None = None, *, progress: Progress | None = None
 ) -> BranchResult:
-    """Periodic responses to the weight, past limit points, with a Floquet verdict at each.
+    """Follow periodic responses to the weight past limit points, with a Floquet verdict at each.
 
     Mesh stiffnesses are constant: the given ones, or the mean of the static solution's. The branch ends
     before motions that the model of small displacements does not hold for.
@@ -126,7 +126,7 @@ def solve_branch(
 def solve_planar_response(
     case: PlanarCase, static: StaticResult | None = None, *, progress: Progress | None = None
 ) -> PlanarResponseResult:
-    """Responses to weight and mesh frequency together at the speeds of the operation.
+    """Solve for responses to weight and mesh frequency together at the speeds of the operation.
 
     Raises
     ------
