@@ -118,8 +118,7 @@ def gear_set_system(
         Adds the columns of the other flanks, positive in their compression, on their own lines of action
         (Y. Guo and R. G. Parker, Eur. J. Mech. A 29, 2010, 1022-1033: tooth wedging).
     planet_bearings : bool
-        The planet bearings become columns of ``W``, radial and tangential, planet less pin; their stiffness
-        is then not in ``K``.
+        They become columns of ``W``, radial and tangential, planet less pin; their stiffness is not in ``K``.
 
     Returns
     -------
@@ -146,12 +145,10 @@ def gear_set_system(
     columns = [mesh_directions(data, flank)]
     if back_flanks:
         columns.append(mesh_directions(data, -flank))
-    stiffness, pins = np.diag(support_diagonal(data).ravel()), pin_directions(data)
     if planet_bearings:
-        columns.append(pins[..., :2].reshape(len(pins), -1))
-    else:
-        stiffness += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())
-    load, gyroscopic = torque_load(data, torque, kept), None
+        columns.append(pin_directions(data)[..., :2].reshape(kept.size, -1))
+    stiffness, load = _linear_stiffness(data, planet_bearings), torque_load(data, torque, kept)
+    gyroscopic = None
     if carrier_speed:
         # the translational part is the K_Omega of Lin and Parker
         along = (masses * ~_turning(data)).ravel()
@@ -413,3 +410,12 @@ def _gyroscopic(along: np.ndarray) -> np.ndarray:
     first = np.arange(0, len(along), 3)
     G[first, first + 1], G[first + 1, first] = -2.0 * along[first], 2.0 * along[first]
     return G
+
+
+def _linear_stiffness(data: RigidSet, planet_bearings: bool) -> np.ndarray:
+    """Supports, and planet bearings that are not columns, as far as they are finite."""
+    K = np.diag(support_diagonal(data).ravel())
+    if not planet_bearings:
+        pins = pin_directions(data)
+        K += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())
+    return K
