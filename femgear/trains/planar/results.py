@@ -87,10 +87,7 @@ _MOTIONS = {
 
 # pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces
 _BY_STABILITY = ("weight_response", "tooth_contact")
-_OF_RESPONSE = (
-    "response_orbit", "response_bearing_forces", "response_mesh_forces", "response_spectrum",
-    "contact_over_speed",
-)  # fmt: skip
+_OF_RESPONSE = ("response_", "contact_over_speed")
 _OF_BRANCH = ("weight_response", "carrier_orbit", "planet_bearing_forces", "wedged_teeth", "tooth_contact")
 _OF_MOTION = ("weight_response", "carrier_orbit", "response_orbit")
 
@@ -496,11 +493,11 @@ def _kind_of_lines(data: xr.Dataset) -> str:
     return "lines of the weight alone: a constant mesh stiffness leaves none of the mesh frequency"
 
 
-def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
+def published_modes(case: PlanarCase, data: xr.Dataset) -> tuple[Block, ...]:
     """Tabulate natural frequencies [Hz] that the case calls published beside the nearest of the kind."""
     entries = [(one, one.frequency) for one in case.planar.published if one.frequency is not None]
     if not entries:
-        return None
+        return ()
     kinds, found = np.array([str(kind) for kind in data["kind"].values]), data["frequency"].values
     rows = []
     for one, hertz in entries:
@@ -511,13 +508,7 @@ def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
             near, difference = f"{nearest:.6g}", f"{100 * (nearest / hertz - 1):+.2f}"
         rows.append((one.kind, f"{hertz:.6g}", near, difference, one.source))
     header = ("kind", "published [Hz]", "nearest here [Hz]", "difference [%]", "source")
-    return Block("Published natural frequencies", header, tuple(rows))
-
-
-def remarks(results: Results, stem: str) -> Iterator[str]:
-    """Tell what a case and its results add to the caption of a picture."""
-    yield from comparisons(results.case, stem)
-    yield from doubts(results, stem)
+    return (Block("Published natural frequencies", header, tuple(rows)),)
 
 
 def comparisons(case: PlanarCase, stem: str) -> Iterator[str]:

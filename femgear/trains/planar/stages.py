@@ -38,12 +38,13 @@ from femgear.trains.planar.results import (
     BranchResult,
     PlanarModesResult,
     PlanarResponseResult,
+    comparisons,
     describe_branch,
     describe_planar,
     describe_response,
+    doubts,
     planar_verdicts,
     published_modes,
-    remarks,
 )
 from femgear.trains.planar.section import PlanarCase, check_planar, planar_notices
 from femgear.trains.protocol import Figures, Progress, Stage, Train
@@ -54,7 +55,6 @@ from femgear.trains.static.stages import STATIC, STRESS
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
-    from femgear.report.tables import Block
     from femgear.storage.results import Results
 
 
@@ -221,11 +221,6 @@ def _result_warnings(results: Results) -> Iterator[str]:
     return planar_verdicts(branch, response)
 
 
-def _published(results: Results) -> tuple[Block, ...]:
-    block = published_modes(results.case, results.modes)
-    return () if block is None else (block,)
-
-
 PLANAR = Train(
     name="planar",
     words="a planar case",
@@ -242,7 +237,7 @@ PLANAR = Train(
             describe=lambda results: describe_modes(results.modes),
             needs=_needs_static,
             check=lambda case: check_planar_case(case, planetary_set(case)),
-            tables=_published,
+            tables=lambda results: published_modes(results.case, results.modes),
         ),
         Stage(
             name="branch",
@@ -273,7 +268,7 @@ PLANAR = Train(
     warnings=set_warnings,
     result_warnings=_result_warnings,
     figures=_figures,
-    remarks=remarks,
+    remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
     cross_check=check_planar,
     notices=planar_notices,
 )  # fmt: skip
