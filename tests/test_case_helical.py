@@ -11,8 +11,7 @@ from published.planetary_sets import kahraman_set
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.checks import check_set
-from femgear.trains.helical.model import HelicalSet, contact_ratios
-from femgear.trains.helical.setup import check_helical_case, helical_data
+from femgear.trains.helical.model import HelicalSet, check_helical_case, contact_ratios, helical_data
 from femgear.trains.helical.stages import HELICAL
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 from femgear.trains.rigid import rotation_sense

@@ -17,8 +17,8 @@ from femgear.run import grid_cache, run_case
 from femgear.storage.results import run_folder
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.figures import transmission_errors
+from femgear.trains.helical.model import normal_record, section_stiffness, shared_load
 from femgear.trains.helical.results import describe_helical_static
-from femgear.trains.helical.setup import normal_record, section_stiffness, shared_load
 from femgear.trains.helical.stages import solve_helical_dynamics, solve_helical_modes, solve_helical_static
 from femgear.trains.planar.stages import solve_planar_modes
 from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value

@@ -26,8 +26,7 @@ from femgear.storage.dataset import (
 )
 from femgear.system.system import MeshExcitation
 from femgear.trains.gear_set import modes_dataset
-from femgear.trains.helical.model import contact_ratios
-from femgear.trains.helical.setup import SectionStiffness
+from femgear.trains.helical.model import HelicalSet, SectionStiffness, contact_ratios
 from femgear.trains.rigid import stiffness_text, torsion_text
 
 if TYPE_CHECKING:
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
     from femgear.solvers.stability.parametric import Stability
     from femgear.system.system import MechanicalSystem, Modes, Response
-    from femgear.trains.helical.model import HelicalSet
     from femgear.trains.helical.section import HelicalCase
 
 _BODIES = (

@@ -25,7 +25,16 @@ from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation
 from femgear.threads import one_blas_thread
 from femgear.trains.gear_set import gear_set_modes
-from femgear.trains.helical.model import contact_ratios, helical_excitation
+from femgear.trains.helical.model import (
+    SectionStiffness,
+    check_helical_case,
+    contact_ratios,
+    helical_data,
+    helical_excitation,
+    normal_record,
+    section_stiffness,
+    shared_load,
+)
 from femgear.trains.helical.results import (
     HelicalDynamicsResult,
     HelicalModesResult,
@@ -33,14 +42,6 @@ from femgear.trains.helical.results import (
     describe_helical_static,
 )
 from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
-from femgear.trains.helical.setup import (
-    SectionStiffness,
-    check_helical_case,
-    helical_data,
-    normal_record,
-    section_stiffness,
-    shared_load,
-)
 from femgear.trains.protocol import Figures, Progress, Stage, Train
 from femgear.trains.rigid import (
     driving_torque,
