@@ -196,7 +196,7 @@ def eccentric_set(eccentricity: float, floating: bool):
     from femgear.system.assembler import mesh_elements
     from femgear.system.fourier import tooth_lines
     from femgear.system.rigid_bodies import PlanarTorque
-    from femgear.trains.planar.model import phased_series, planar_problem
+    from femgear.trains.gear_set import gear_set_problem, phased_series
 
     data = lin_parker_set(3)
     data = replace(data, sun=replace(data.sun, support=1e6 if floating else 1e9))
@@ -208,7 +208,7 @@ def eccentric_set(eccentricity: float, floating: bool):
     C = equivalent_damping(data, mesh_ratio=0.05, support_ratio=0.03)
     stiffness = phased_series([0.1], [0.1], phases, mean=data.mesh_stiffness)
     meshes = mesh_elements(data, stiffness=stiffness, backlash=60e-6)
-    plain = planar_problem(data, meshes=meshes, torque=PlanarTorque(15.0), damping=C)
+    plain = gear_set_problem(data, meshes=meshes, torque=PlanarTorque(15.0), damping=C)
     dampers = planar_mesh_dampers(data, 0.05)
     return errors, lambda omega: with_errors(plain, errors, dampers=dampers, mesh_frequency=omega)
 

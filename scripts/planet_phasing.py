@@ -173,18 +173,17 @@ def _spectra(points):
     from published.planetary_sets import cases, kahraman_set
 
     from femgear.gears.phasing import phase_factors
-    from femgear.system.assembler import gear_set_system
-    from femgear.trains.helical.model import helical_modes, modal_error_response
+    from femgear.solvers.linear.receptance import modal_error_response
+    from femgear.trains.gear_set import gear_set_modes
 
-    data, frequency = kahraman_set(), np.linspace(100.0, 15e3, points)
-    system, modes = gear_set_system(data), helical_modes(data, damping_ratio=0.05)
+    modes, frequency = gear_set_modes(kahraman_set(), damping_ratio=0.05), np.linspace(100.0, 15e3, points)
     last, turning = TYPES["sequentially phased"], cases()
     sets = {_title(name, letter): turning[letter] for name, letter in TYPES.items()}
     sets[f"{_title('sequentially phased', last)}, phases as printed"] = cases(convention="printed")[last]
     found = []
     for h in (1, 2, 3, 4):
         error = 1e-6 * np.array([phase_factors(one, [h]).T for one in sets.values()])
-        one = modal_error_response(system, modes, frequency / h, error, harmonics=[h])
+        one = modal_error_response(modes, frequency / h, error, harmonics=[h])
         found.append(np.abs(one.force[:, :, 0, :2]))
     forces = {title: np.array([force[c] for force in found]) for c, title in enumerate(sets)}
     kinds, inside = np.array(modes.kind), (modes.frequency > 0.0) & (modes.frequency < frequency[-1])

@@ -7,6 +7,19 @@ import numpy as np
 from femgear.gears.phasing import ZERO, MeshPhasing, check_harmonics, phase_factors, planet_sums
 
 
+def phased_errors(amplitudes, phases) -> np.ndarray:
+    """Transmission errors (n_meshes, H) of meshes that follow each other, ``e_j(tau) = e(tau + phi_j)``.
+
+    Parameters
+    ----------
+    amplitudes : (H,) complex array
+        Harmonics 1 to H at phase zero [m].
+    phases : (n_meshes,) array
+        phi_j as fractions of the mesh period.
+    """
+    return amplitudes * np.exp(2j * np.pi * np.outer(phases, np.arange(1, len(amplitudes) + 1)))
+
+
 def cyclic_shares(phasing: MeshPhasing, harmonics=range(1, 7)) -> np.ndarray:
     """Shares of the motions ``exp(i j psi_n)``, j = 0 to N // 2 and both senses, in the phase pattern.
 

@@ -11,8 +11,7 @@ from published.planetary_sets import kahraman_set
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.checks import check_set
-from femgear.trains.helical.model import HelicalSet
-from femgear.trains.helical.setup import base_helix_angle, check_helical_case, helical_data, overlap_ratio
+from femgear.trains.helical.model import HelicalSet, check_helical_case, contact_ratios, helical_data
 from femgear.trains.helical.stages import HELICAL
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
 from femgear.trains.rigid import rotation_sense
@@ -64,8 +63,10 @@ def test_normal_gears_of_the_shipped_case_have_the_printed_base_radii(case):
     assert check_set(gears) == () and case.notices == ()
     radii = [gear.base_radius for gear in (gears.sun, gears.planet, gears.ring)]
     np.testing.assert_allclose(radii, [0.024, 0.016, 0.056], rtol=1e-9)
-    assert math.degrees(base_helix_angle(case, gears)) == pytest.approx(20.0, abs=1e-7)
-    assert overlap_ratio(case, gears) == pytest.approx(25 * math.tan(math.radians(20)) / (math.pi * 1.6))
+    data = helical_data(case, gears, np.full(8, 1e8))
+    assert math.degrees(data.base_helix_angle) == pytest.approx(20.0, abs=1e-7)
+    ratios = contact_ratios(gears, helix_angle=case.helical.helix_angle, face_width=case.set.face_width)
+    assert ratios[:, 1] == pytest.approx(25 * math.tan(math.radians(20)) / (math.pi * 1.6))
 
 
 def test_gears_are_those_of_the_transverse_section(case):

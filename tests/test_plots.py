@@ -130,6 +130,19 @@ def test_identical_meshes_are_drawn_once():
     assert alone == [("sun-planet 1", 0), ("planet 1-ring", 1)]
 
 
+def test_meshes_of_a_family_that_agree_are_drawn_once():
+    names = [*(f"sun-planet {n}" for n in (1, 2, 3, 4)), *(f"planet {n}-ring" for n in (1, 2, 3, 4))]
+    one, other = np.sin(np.arange(9.0)), np.cos(np.arange(9.0))
+    lines = distinct_lines(names, [one, other, one, other, one, one, one, one], partly=True)
+    assert lines == [
+        ("sun-planet 1, sun-planet 3 (identical)", 0),
+        ("sun-planet 2, sun-planet 4 (identical)", 1),
+        ("all planet-ring meshes (identical)", 4),
+    ]
+    lines = distinct_lines(names, np.diag(np.arange(1.0, 9.0)), partly=True)
+    assert lines == [(name, row) for row, name in enumerate(names)]
+
+
 def line_of(figure, text):
     return next(line for ax in figure.axes for line in ax.get_lines() if line.get_label() == text)
 

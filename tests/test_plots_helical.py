@@ -10,19 +10,17 @@ from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
 from femgear.report.style import png_bytes
-from femgear.storage.dataset import in_space
 from femgear.system.assembler import free_motions, gear_set_system
 from femgear.system.mode_kinds import gear_set_motions, phasing
+from femgear.trains.gear_set import gear_set_modes, in_space
 from femgear.trains.helical.figures import spatial_mode_shapes
-from femgear.trains.helical.model import helical_modes
-from femgear.trains.helical.results import AXES
 
 GEARS = ("sun", "planet", "ring")
 
 
 def modes_file(data, modes):
     """What a figure reads of modes.nc."""
-    shape, dofs = in_space(data, free_motions(data) @ modes.shape, AXES)
+    shape, dofs = in_space(data, modes.shape)
     names = phasing(gear_set_motions(data, modes.shape))
     variables = {
         "frequency": ("mode", modes.frequency),
@@ -48,7 +46,7 @@ def geared(data):
 
 def drawn(data, dof, value):
     """Figure of one mode whose shape moves one coordinate alone."""
-    system, modes = gear_set_system(data), helical_modes(data)
+    system, modes = gear_set_system(data), gear_set_modes(data)
     shape = value * (np.array(system.dofs) == dof)[:, None]
     one = replace(modes, frequency=np.ones(1), kind=("rotational-axial",), shape=shape)
     return spatial_mode_shapes(modes_file(data, one), geared(data), scale=0.1)
@@ -102,7 +100,7 @@ def test_side_view_shows_tilt_and_axial_motion():
 
 def test_twelve_modes_have_two_views_each():
     data = kahraman_set()
-    modes = helical_modes(data)
+    modes = gear_set_modes(data)
     figure = spatial_mode_shapes(modes_file(data, modes), geared(data))
     assert len(figure.axes) == 24 and "644.35 Hz" in figure.axes[0].get_title()
     assert "translational-tilting" in figure.axes[0].get_title()

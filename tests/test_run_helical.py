@@ -16,9 +16,9 @@ from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.run import grid_cache, run_case
 from femgear.storage.results import run_folder
 from femgear.system.system import MeshExcitation
-from femgear.trains.helical.figures import alike_lines, transmission_errors
+from femgear.trains.helical.figures import transmission_errors
+from femgear.trains.helical.model import normal_record, section_stiffness, shared_load
 from femgear.trains.helical.results import describe_helical_static
-from femgear.trains.helical.setup import normal_record, section_stiffness, shared_load
 from femgear.trains.helical.stages import solve_helical_dynamics, solve_helical_modes, solve_helical_static
 from femgear.trains.planar.stages import solve_planar_modes
 from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value
@@ -355,19 +355,6 @@ def test_static_table_has_the_helical_meshes_beside_the_spur_section(results):
     alone = describe_helical_static(results.static, module=module)
     assert not any("helical" in text for text in alone.header)
     assert len(alone.header) == len(alone.rows[0])
-
-
-def test_curves_that_agree_are_drawn_once():
-    names = [*(f"sun-planet {n}" for n in (1, 2, 3, 4)), *(f"planet {n}-ring" for n in (1, 2, 3, 4))]
-    one, other = np.sin(np.arange(9.0)), np.cos(np.arange(9.0))
-    lines = alike_lines(names, [one, other, one, other, one, one, one, one])
-    assert lines == [
-        ("sun-planet 1, sun-planet 3 (identical)", 0),
-        ("sun-planet 2, sun-planet 4 (identical)", 1),
-        ("all planet-ring meshes (identical)", 4),
-    ]
-    lines = alike_lines(names, np.diag(np.arange(1.0, 9.0)))
-    assert lines == [(name, row) for row, name in enumerate(names)]
 
 
 def test_eight_meshes_have_eight_styles(results):

@@ -13,6 +13,7 @@ from femgear import cli
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError, ConvergenceError
 from femgear.run import run_case
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.solution import open_verdict
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.solvers.time.transient import solve_transient
@@ -26,9 +27,9 @@ from femgear.trains.planar.figures import (
     response_mesh_forces,
     weight_response,
 )
-from femgear.trains.planar.model import TAIL_LIMIT, judged_branch, merged_folds, motion_lines
+from femgear.trains.planar.model import TAIL_LIMIT, judged_branch, merged_folds, motion_lines, planar_model
 from femgear.trains.planar.results import comparisons, describe_branch, doubts, planar_verdicts, tail_warnings
-from femgear.trains.planar.stages import planar_model, solve_branch, solve_planar_modes, solve_planar_response
+from femgear.trains.planar.stages import solve_branch, solve_planar_modes, solve_planar_response
 from femgear.trains.reading import open_results, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
 from femgear.trains.static.stages import solve_static
@@ -302,7 +303,7 @@ def test_clearance_of_the_planet_bearings_acts_in_the_response(pgb):
     model = planar_model(case, planetary_set(case), mesh_frequency=True)
     assert model.groups["planets"].shape == (3, 2)
     solution = solve_planar_response(case).solutions[0]
-    pins = motion_lines(model, solution).planet_bearing
+    pins = motion_lines(model, solution).planet_bearing_force
     # the force of the bearing needs more than its clearance
     apart = np.hypot(*solution.deflection[model.groups["planets"]][0, :, 0].real)
     assert 20e-6 < apart < 20e-6 + 3 * np.hypot(*pins[0, :, 0].real) / 5.3e9
@@ -359,14 +360,11 @@ def test_a_branch_ends_before_motions_that_are_not_small(pgb):
 
 
 def test_a_response_that_does_not_converge_is_a_numerical_failure(pgb, monkeypatch, tmp_path, capsys):
-    from femgear.solvers.periodic import harmonic_balance
-
-    honest = harmonic_balance.solve_harmonic_balance
-
     def lost(*arguments, **options):
-        return replace(honest(*arguments, **options), converged=False, message="it wandered off.")
+        found = solve_harmonic_balance(*arguments, **options)
+        return replace(found, converged=False, message="it wandered off.")
 
-    monkeypatch.setattr(harmonic_balance, "solve_harmonic_balance", lost)
+    monkeypatch.setattr("femgear.trains.planar.stages.solve_harmonic_balance", lost)
     path = tmp_path / "case.toml"
     path.write_text(to_toml(pgb), encoding="utf-8")
     out = tmp_path / "out"

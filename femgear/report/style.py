@@ -127,7 +127,7 @@ def family(name: str) -> str:
     return "planet-ring" if "ring" in name else "sun-planet"
 
 
-def distinct_lines(names, values, *, tolerance: float = 1e-6):
+def distinct_lines(names, values, *, tolerance: float = 1e-6, partly: bool = False) -> list[tuple[str, int]]:
     """Rows of `values` to draw: one for a family of meshes whose rows agree, each row otherwise.
 
     Parameters
@@ -138,23 +138,31 @@ def distinct_lines(names, values, *, tolerance: float = 1e-6):
         One row a mesh.
     tolerance : float
         Largest difference of rows counted as equal, relative to the largest value.
+    partly : bool
+        Also one for some meshes of a family whose rows agree.
 
     Returns
     -------
     list of (str, int)
         Legend text and row number.
     """
-    values = np.asarray(values)
-    names = [str(name) for name in names]
-    size = np.abs(values).max(initial=0.0)
+    values, names = np.asarray(values), [str(name) for name in names]
+    limit = tolerance * np.abs(values).max(initial=0.0)
     lines = []
     for kind in dict.fromkeys(family(name) for name in names):
         rows = [i for i, name in enumerate(names) if family(name) == kind]
-        same = np.abs(values[rows] - values[rows[0]]).max() <= tolerance * size
-        if same and len(rows) > 1:
-            lines.append((f"all {kind} meshes (identical)", rows[0]))
-        else:
-            lines += [(names[i], i) for i in rows]
+        groups: list[list[int]] = []
+        for row in rows:
+            alike = (one for one in groups if np.abs(values[row] - values[one[0]]).max() <= limit)
+            if (group := next(alike, None)) is None:
+                groups.append([row])
+            else:
+                group.append(row)
+        if len(groups) > 1 and not partly:
+            groups = [[row] for row in rows]
+        for group in groups:
+            whole = f"all {kind} meshes" if len(group) == len(rows) else ", ".join(names[i] for i in group)
+            lines.append((f"{whole} (identical)" if len(group) > 1 else names[group[0]], group[0]))
     return lines
 
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from femgear.system.rigid_bodies import RigidSet
-
 RPM = np.pi / 30.0
 FOURIER = "x(t) = Re sum_h X_h exp(i h omega t)"
 MEMBERS = ("carrier", "ring", "sun")
@@ -116,29 +114,3 @@ def response_entries(result: Any) -> dict[str, tuple]:
         "floquet_multiplier": (speed, np.abs(stability.multiplier), "1", "largest Floquet multiplier"),
         "stable": (speed, stability.stable, "1", "whether no perturbation grows"),
     }
-
-
-def in_space(data: RigidSet, motions: np.ndarray, axes: tuple[str, ...]) -> tuple[np.ndarray, list[str]]:
-    """Motions of every body along and about x, y (and z) with their names, held ones included.
-
-    Parameters
-    ----------
-    data : RigidSet
-    motions : (n, m) array
-        In all coordinates: two in the plane and ``u``; or three translations, two tilts and ``u``.
-    axes : tuple of str
-        Names of the motions of a body.
-    """
-    from femgear.system.rigid_bodies import member_radius
-
-    N = data.n_planets
-    full = motions.reshape(N + 3, len(axes), -1).copy()
-    cosine, sine = np.cos(data.planet_angles)[:, None], np.sin(data.planet_angles)[:, None]
-    for first in range(0, len(axes), 3):
-        radial, tangential = full[3:, first].copy(), full[3:, first + 1].copy()
-        full[3:, first] = radial * cosine - tangential * sine
-        full[3:, first + 1] = radial * sine + tangential * cosine
-    radii = np.array([member_radius(data, name) for name in MEMBERS] + [data.planet_radius] * N)
-    full[:, -(len(axes) // 2) :] /= radii[:, None, None]
-    bodies = [*MEMBERS, *(f"planet {n + 1}" for n in range(N))]
-    return full.reshape(len(motions), -1), [f"{body}: {axis}" for body in bodies for axis in axes]

@@ -33,7 +33,6 @@ from femgear.contact.assembly import (
     cycle_positions,
     in_windows,
     mesh_windows,
-    rotation_approach,
 )
 from femgear.contact.flank_pairs import mesh_pairs, separation
 from femgear.contact.pivoting import factor
@@ -48,6 +47,7 @@ from femgear.gears.deviations import (
     profile_separation,
     tooth_separation,
 )
+from femgear.gears.kinematics import rotation_approach
 from femgear.study.relief import DesignBasis
 from femgear.trains.protocol import one_blas_thread
 

@@ -101,7 +101,7 @@ def gear_set_system(
     torque: PlanarTorque | None = None,
     carrier_speed: float = 0.0,
     back_flanks: bool = False,
-    bearings: Sequence[str] = (),
+    planet_bearings: bool = False,
 ) -> MechanicalSystem:
     """Assemble the matrices of a planetary set; the meshes are columns of ``W`` and not in ``K``.
 
@@ -118,25 +118,24 @@ def gear_set_system(
     back_flanks : bool
         Adds the columns of the other flanks, positive in their compression, on their own lines of action
         (Y. Guo and R. G. Parker, Eur. J. Mech. A 29, 2010, 1022-1033: tooth wedging).
-    bearings : sequence of {"carrier", "ring", "sun", "planets"}
-        Supports that become columns of ``W``, x and y (planets: radial and tangential, planet less pin);
-        their stiffness is then not in ``K``. `column_groups` tells the places.
+    planet_bearings : bool
+        They become columns of ``W``, radial and tangential, planet less pin; their stiffness is not in ``K``.
 
     Returns
     -------
     MechanicalSystem
-        ``C`` is zero. Columns of ``W``: the slices of mesh 1, of mesh 2 and so on.
+        ``C`` is zero. Columns of ``W``: the slices of mesh 1, of mesh 2 and so on, back flanks, bearings.
 
     Raises
     ------
     CaseError
-        A torque on a held member, a set that cannot move at all (E-MECHANISM), an unknown or infinitely stiff
-        bearing (E-BEARING), a carrier speed or bearings of bodies that move in space (E-RANGE).
+        A torque on a held member, a set that cannot move at all (E-MECHANISM), a carrier speed or planet
+        bearings of bodies that move in space (E-RANGE).
     """
     if len(data.axes) > 3 and carrier_speed:
         refuse("carrier_speed", carrier_speed, "rad/s", "0 of bodies that move in space")
-    if len(data.axes) > 3 and bearings:
-        refuse("bearings", tuple(bearings), "", "none of bodies that move in space")
+    if len(data.axes) > 3 and planet_bearings:
+        refuse("planet_bearings", planet_bearings, "", "none of bodies that move in space")
     T, flank, kept = free_motions(data), flank_sign(data, torque), _kept(data)
     if not T.shape[1]:
         raise CaseError(
@@ -147,8 +146,10 @@ def gear_set_system(
     columns = [mesh_directions(data, flank)]
     if back_flanks:
         columns.append(mesh_directions(data, -flank))
-    columns += [_bearing_columns(data, name) for name in bearings]
-    stiffness, load, gyroscopic = _linear_stiffness(data, bearings), torque_load(data, torque, kept), None
+    if planet_bearings:
+        columns.append(pin_directions(data)[..., :2].reshape(kept.size, -1))
+    stiffness, load = _linear_stiffness(data, planet_bearings), torque_load(data, torque, kept)
+    gyroscopic = None
     if carrier_speed:
         # the translational part is the K_Omega of Lin and Parker
         along = (masses * ~_turning(data)).ravel()
@@ -177,30 +178,6 @@ def mesh_names(n_planets: int) -> list[str]:
     """Names of the 2N meshes, in the order of their columns."""
     planets = range(1, n_planets + 1)
     return [f"sun-planet {n}" for n in planets] + [f"planet {n}-ring" for n in planets]
-
-
-def column_groups(
-    data: RigidSet, *, back_flanks: bool = False, bearings: Sequence[str] = ()
-) -> dict[str, np.ndarray]:
-    """Places of the columns of W: ``meshes`` (2N,), ``back flanks`` (2N,), and (g, 2) of every bearing.
-
-    Parameters
-    ----------
-    data : RigidSet
-    back_flanks : bool
-    bearings : sequence of {"carrier", "ring", "sun", "planets"}
-        In the order in which their columns follow.
-    """
-    n = 2 * data.n_planets
-    groups: dict[str, np.ndarray] = {"meshes": np.arange(n)}
-    if back_flanks:
-        groups["back flanks"] = np.arange(n, 2 * n)
-    start = n * len(groups)
-    for name in bearings:
-        count = data.n_planets if name == "planets" else 1
-        groups[name] = np.arange(start, start + 2 * count).reshape(count, 2)
-        start += 2 * count
-    return groups
 
 
 def mesh_elements(
@@ -395,30 +372,10 @@ def _gyroscopic(along: np.ndarray) -> np.ndarray:
     return G
 
 
-def _linear_stiffness(data: RigidSet, bearings: Sequence[str]) -> np.ndarray:
-    """Supports and planet bearings that are finite and not columns."""
-    diagonal = support_diagonal(data)
-    for name in set(bearings) & set(CENTRAL):
-        diagonal[CENTRAL.index(name), :2] = 0.0
-    K = np.diag(diagonal.ravel())
-    if "planets" not in bearings:
+def _linear_stiffness(data: RigidSet, planet_bearings: bool) -> np.ndarray:
+    """Supports, and planet bearings that are not columns, as far as they are finite."""
+    K = np.diag(support_diagonal(data).ravel())
+    if not planet_bearings:
         pins = pin_directions(data)
         K += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())
     return K
-
-
-def _bearing_columns(data: RigidSet, name: str) -> np.ndarray:
-    if name not in (*CENTRAL, "planets"):
-        raise CaseError(f"a bearing of {name!r}", code="E-BEARING", limit="carrier, ring, sun, planets")
-    planets = name == "planets"
-    stiffness = data.pin_stiffness if planets else data.support_stiffness[CENTRAL.index(name)]
-    if np.any(np.isinf(stiffness[..., :2])):
-        raise CaseError(
-            f"the bearing of the {name} is infinitely stiff, so it has no deflection", code="E-BEARING",
-            remedy="give it a finite stiffness",
-        )  # fmt: skip
-    pins = pin_directions(data)
-    if planets:
-        return pins[..., :2].reshape(-1, 2 * data.n_planets)
-    first = len(data.axes) * CENTRAL.index(name)
-    return np.eye(len(pins))[:, first : first + 2]

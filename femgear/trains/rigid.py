@@ -1,6 +1,6 @@
 """What cases of planetary sets of rigid bodies have in common, in their plane or in space.
 
-Refusals, notices, supports of the members, speeds, mesh stiffness, and the entries of modes.nc.
+Refusals, notices, supports of the members, speeds and mesh stiffness.
 """
 
 from __future__ import annotations
@@ -17,13 +17,10 @@ from femgear.case.sections import Case, MeshStiffnessSection, RigidCase, output_
 from femgear.errors import CaseError
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds
-from femgear.storage.dataset import in_space
 from femgear.system.rigid_bodies import PlanarTorque
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
-    from femgear.system.rigid_bodies import RigidSet
-    from femgear.system.system import Modes
 
 Entry = TypeVar("Entry")
 
@@ -174,39 +171,3 @@ def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:
 def modes_verdict(result: Any) -> dict:
     """Numbers of modes and of coordinates for the manifest."""
     return {"modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape)}
-
-
-def modes_entries(
-    data: RigidSet, modes: Modes, motions: np.ndarray, axes: tuple[str, ...], phasing: tuple[str, ...] = ()
-) -> tuple[dict[str, tuple], dict[str, tuple]]:
-    """Variables and coordinates of modes.nc: frequencies, kinds and shapes of all bodies, no elastic ring.
-
-    Parameters
-    ----------
-    data : RigidSet
-    modes : Modes
-    motions : (n_all, n) array
-        `free_motions` of the set.
-    axes : tuple of str
-        Names of the motions of a body.
-    phasing : (m,) tuple of str, optional
-        Of every mode.
-    """
-    shape, dofs = in_space(data, motions @ modes.shape, axes)
-    mode = ("mode",)
-    variables = {
-        "frequency": (mode, modes.frequency, "Hz", "undamped natural frequency"),
-        "damping_ratio": (mode, modes.damping_ratio, "1", "fraction of critical damping"),
-        "kind": (mode, list(modes.kind), "1", "kind of mode"),
-    }
-    if phasing:
-        variables["phasing"] = (mode, list(phasing), "1", "phasing of the planets in the mode")
-    variables |= {
-        "nodal_diameter": (mode, modes.nodal_diameter, "1", "nodal diameter: -1, the ring is rigid"),
-        "shape": (("dof", "mode"), shape, "kg^-1/2", "mass-normalised mode shape"),
-    }
-    coords = {
-        "mode": (mode, np.arange(len(modes.frequency)), "1", "mode"),
-        "dof": (("dof",), dofs, "1", "degree of freedom"),
-    }
-    return variables, coords

@@ -222,7 +222,7 @@ def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np
 def with_errors(
     problem: NonlinearSystem, errors: TransmissionErrors, *, dampers=None, mesh_frequency: float | None = None
 ) -> NonlinearSystem:
-    """A problem of `planar_problem` with the errors added to the deflections of its drive flanks.
+    """A problem of `gear_set_problem` with the errors added to the deflections of its drive flanks.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def with_errors(
     ):
         raise CaseError(
             "errors need one element of all meshes with Fourier series", code="E-RANGE",
-            remedy="build the problem with planar_problem, without back flanks on their own lines",
+            remedy="build the problem with gear_set_problem, without back flanks on their own lines",
         )  # fmt: skip
     series = errors.series
     parts = known.parts if isinstance(known, SummedSeries) else (known,)
@@ -360,7 +360,7 @@ def planar_mesh_dampers(data: PlanarSet, ratio) -> np.ndarray:
 
 
 def equivalent_damping(data: PlanarSet, *, mesh_ratio, support_ratio, flank: int = 1) -> np.ndarray:
-    """Damping matrix of a set in the coordinates of `gear_set_system`, for ``planar_problem(damping=)``.
+    """Damping matrix of a set in the coordinates of `gear_set_system`, for ``gear_set_problem(damping=)``.
 
     Parameters
     ----------

@@ -19,17 +19,13 @@ from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.system.assembler import mesh_elements
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque
 from femgear.system.system import NonlinearSystem
-from femgear.trains.planar.model import (
+from femgear.trains.gear_set import (
+    Bearings,
     Gravity,
     MemberBearing,
-    bearing_damping_matrix,
-    closed_springs,
-    mode_ratios,
-    open_back_flanks,
+    gear_set_problem,
     phased_series,
-    planar_modes,
-    planar_problem,
-    with_bearing,
+    working_springs,
 )
 
 # printed data of the nonlinear examples: torques on the carrier [N m], speeds [rpm], play [m]
@@ -116,13 +112,13 @@ def gravity_problem_b(
         On the carrier [N m]; the torsional supports of sun and ring carry it.
     """
     data = wind_turbine_b()
-    return planar_problem(
+    return gear_set_problem(
         data,
         meshes=mesh_elements(data, backlash=backlash, smoothing=smoothing),
         back_flanks=own_lines,
         torque=PlanarTorque(torque, "carrier", output=None),
         gravity=Gravity(orders=(1,) if driven else (-1,)),
-        damping=mode_ratios(planar_modes(data).frequency, DAMPING_B),
+        damping=DAMPING_B,
     )
 
 
@@ -145,12 +141,12 @@ def extended_problem_b(
     data = wind_turbine_b()
     phases = np.concatenate([(z * np.arange(3) / 3.0) % 1.0 for z in TEETH_B])
     stiffness = phased_series(fluctuation, fluctuation, phases, mean=data.mesh_stiffness, orders=(0, 1))
-    return planar_problem(
+    return gear_set_problem(
         data,
         meshes=mesh_elements(data, stiffness=stiffness, smoothing=SMOOTHING),
         torque=PlanarTorque(torque, "carrier", output=None),
         gravity=Gravity(orders=(1, 0)),
-        damping=mode_ratios(planar_modes(data).frequency, DAMPING_B),
+        damping=DAMPING_B,
     )
 
 
@@ -179,25 +175,23 @@ def bearing_problem_a(
     """
     data = wind_turbine_a() if data is None else data
     back = backlash is not None
-    base = planar_problem(
+    return gear_set_problem(
         data,
         meshes=mesh_elements(data, backlash=backlash, smoothing=smoothing if back else 0.0),
         back_flanks=back,
         torque=PlanarTorque(TORQUE_A, "carrier", output=None),
+        bearings=Bearings(members=(MemberBearing(BEARING_A, clearance, "carrier", "ring"),)),
         gravity=Gravity(orders=(1,)),
+        damping=DAMPING_A,
     )
-    bearing = MemberBearing(BEARING_A, clearance, "carrier", "ring")
-    problem = with_bearing(base, data, bearing)
-    C = bearing_damping_matrix(problem, closed_springs(problem, data, bearing), DAMPING_A)
-    return replace(problem, system=replace(problem.system, C=C))
 
 
-def drive_reduction(problem: NonlinearSystem, *, n_planets: int = 3) -> Reduction:
+def drive_reduction(problem: NonlinearSystem) -> Reduction:
     """Reduction whose reference springs leave the back flanks open.
 
     The elements' own reference counts them as closed, far from where the train works.
     """
-    return reduce_problem(problem, reference=open_back_flanks(problem, n_planets))
+    return reduce_problem(problem, reference=working_springs(problem))
 
 
 def _set(

@@ -8,7 +8,8 @@ from femgear.gears.phasing import MEMBERS, mesh_phasing, phasing_table
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
 from femgear.system.assembler import gear_set_system, mesh_directions, pin_directions
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport
-from femgear.trains.helical.model import HelicalSet, helical_modes
+from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.helical.model import HelicalSet
 
 HARMONICS = np.arange(1, 7)
 KIND = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}
@@ -120,7 +121,7 @@ def test_harmonics_excite_one_kind_of_mode(sun, ring, planets, offsets):
     """Modal forces of unit mesh errors leak less than 1e-9 into the other kinds."""
     psi, phasing = arranged(sun, ring, planets, offsets, lag=0.5)
     data = helical(psi)
-    modes = helical_modes(data)
+    modes = gear_set_modes(data)
     kind = np.array(modes.kind)
     k = data.mesh_stiffness[:, None]
     force = np.abs(mesh_loads(modes.shape.T @ (gear_set_system(data).W * k.T), phasing, HARMONICS)).max(

@@ -20,7 +20,7 @@ from femgear.system.mode_kinds import (
     phase_shares,
 )
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.trains.planar.model import planar_modes
+from femgear.trains.gear_set import gear_set_modes
 
 ALPHA = np.radians(21.0), np.radians(20.0)
 HARMONICS = np.arange(1, 8)
@@ -131,7 +131,7 @@ def test_harmonics_excite_the_kinds_that_the_rule_names(sun, ring, planets, offs
     data = lumped(psi)
     phasing = mesh_phasing(sun, ring, psi, lag=0.3)
     table = phasing_table(phasing, HARMONICS)
-    modes = planar_modes(data)
+    modes = gear_set_modes(data)
     kind = np.array(modes.kind)
     factor = phase_factors(phasing, HARMONICS).reshape(-1, 2, planets)
     directions = gear_set_system(data).W.reshape(-1, 2, planets)
@@ -163,7 +163,7 @@ def test_planet_modes_are_excited_by_cyclic_harmonic(planets):
     ring = 9 * planets - 2
     phasing = mesh_phasing(sun, ring, equal_planet_angles(planets))
     data = lumped(np.array(equal_planet_angles(planets)))
-    modes = planar_modes(data)
+    modes = gear_set_modes(data)
     motions = gear_set_motions(data, modes.shape)
     shape = modes.shape @ phase_basis(motions, modes.frequency)
     share = phase_shares(gear_set_motions(data, shape))

@@ -22,6 +22,8 @@ from femgear.system.rigid_bodies import CENTRAL, HelicalBody, HelicalSupport, Pl
         (lambda: HelicalBody(1.0, 1.0, 0.0), "diametral inertia of 0.0"),
         (lambda: HelicalBody("1 kg", 1.0, 1.0), "mass of '1 kg'"),
         (lambda: HelicalBody(1.0, 1.0, 1.0, HelicalSupport(np.ones(3))), "3 values"),
+        (lambda: kahraman_set(contact_points="pitch"), "contact points of 'pitch'"),
+        (lambda: kahraman_set(base_helix_angle=20.0), "base helix angle of 20.0 rad"),
     ],
 )
 def test_bodies_and_supports_that_cannot_be_are_refused(make, text):

@@ -108,13 +108,7 @@ def test_height_runs_ahead_by_the_twist_of_the_flanks(helix):
     assert ahead == pytest.approx(0.2 + height * twist * teeth / (2 * math.pi), rel=1e-12)
 
 
-def test_what_cannot_be_is_refused():
-    for overlap in (-0.1, math.nan, [1.0, 1.0, 1.0]):
-        with pytest.raises(CaseError, match="E-RANGE"):
-            helical_excitation(record(), overlap)
-    for options in ({"slices": 0}, {"slices": 1.5}, {"hand": 0}):
-        with pytest.raises(CaseError, match="E-RANGE"):
-            helical_excitation(record(), 1.0, **{"slices": 2} | options)
+def test_a_record_without_stiffness_is_refused():
     empty = cycle_without_load(1, TAU, periods=1, contact="profile")
     with pytest.raises(CaseError, match="E-STIFFNESS"):
         helical_excitation(empty, 1.0)

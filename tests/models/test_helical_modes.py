@@ -11,9 +11,7 @@ from femgear.errors import CaseError
 from femgear.system.assembler import gear_set_system
 from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis, phasing
 from femgear.system.rigid_bodies import HelicalSupport
-from femgear.trains.helical.model import (
-    helical_modes,
-)
+from femgear.trains.gear_set import gear_set_modes
 
 
 def equal(planets, **changes):
@@ -25,7 +23,7 @@ def equal(planets, **changes):
 def test_number_of_modes_of_every_kind(planets, contact_points):
     """12 rotational-axial, 12 pairs of translational-tilting and 6 (N - 3) planet modes (Eritenel 2009)."""
     data = equal(planets, contact_points=contact_points)
-    modes = helical_modes(data)
+    modes = gear_set_modes(data)
     kinds = np.array(modes.kind)
     count = {name: int(np.sum(kinds == name)) for name in set(kinds)}
     assert count.pop("rigid") == 1 and count["rotational-axial"] == 11
@@ -38,7 +36,7 @@ def test_number_of_modes_of_every_kind(planets, contact_points):
 def test_kinds_do_not_follow_the_order_of_the_planets():
     """Turning the whole set turns the shapes, not the frequencies and kinds."""
     one, two = equal(5), kahraman_set(planet_angles=2.0 * np.pi * np.arange(5) / 5 + 0.4)
-    first, second = helical_modes(one), helical_modes(two)
+    first, second = gear_set_modes(one), gear_set_modes(two)
     assert first.frequency == pytest.approx(second.frequency, rel=1e-8, abs=1e-6)
     assert first.kind == second.kind
 
@@ -46,7 +44,7 @@ def test_kinds_do_not_follow_the_order_of_the_planets():
 def test_phasing_of_the_modes_of_six_planets():
     """The classes 0, 1, 2 and 3 of the cyclic group: six modes of each that can be told apart in twos."""
     data = equal(6)
-    modes = helical_modes(data, max_frequency=60e3)
+    modes = gear_set_modes(data, max_frequency=60e3)
     shape = modes.shape @ phase_basis(gear_set_motions(data, modes.shape), modes.frequency)
     names = phasing(gear_set_motions(data, shape))
     kinds = dict(zip(("rotational-axial", "translational-tilting"), ("in phase", "sequentially phased 1")))
@@ -60,13 +58,13 @@ def test_phasing_of_the_modes_of_six_planets():
 
 def test_modes_of_unequal_planets_are_mixed():
     data = kahraman_set(planet_angles=[0.0, 1.2, 3.3, 4.6])
-    assert helical_modes(data).kind.count("mixed") > 5
+    assert gear_set_modes(data).kind.count("mixed") > 5
 
 
 def test_springs_make_the_whole_stiffness_and_their_shares_add_up():
     bearing = HelicalSupport(np.array([1e8, 2e8, 3e8, 4e8]), 1e9, 1e5, 3e3)
     data = kahraman_set(planet_bearing=bearing, slices=2, face_width=0.03, contact_points="pitch_point")
-    system, modes = gear_set_system(data), helical_modes(data, max_frequency=20e3)
+    system, modes = gear_set_system(data), gear_set_modes(data, max_frequency=20e3)
     springs = gear_set_springs(data)
     total = system.K + (system.W * data.column_stiffness) @ system.W.T
     assert stiffness_of(springs) == pytest.approx(total, rel=1e-12, abs=1e-12 * np.abs(total).max())

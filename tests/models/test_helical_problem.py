@@ -5,26 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from phase_patterns import phased_errors
 from published.planetary_sets import cases, kahraman_set, lin_parker_set
 from validation.routes import state_of
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.receptance import modal_error_response
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.system.assembler import gear_set_system, mesh_elements
+from femgear.system.assembler import mesh_elements
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque
 from femgear.system.system import MeshExcitation, element_forces
-from femgear.trains.helical.model import (
-    HelicalSet,
-    helical_excitation,
-    helical_modes,
-    helical_problem,
-    modal_error_response,
-    phased_errors,
-)
-from femgear.trains.planar.model import phased_series, planar_modes, planar_problem
+from femgear.trains.gear_set import gear_set_modes, gear_set_problem, phased_series
+from femgear.trains.helical.model import HelicalSet, helical_excitation
 
 TORQUE = PlanarTorque(300.0)
 PHASES = -np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])
@@ -58,8 +53,8 @@ def both_problems(backlash):
     stiffness = phased_series(WAVE, WAVE, PHASES, mean=planar.mesh_stiffness)
     options = {"stiffness": stiffness, "backlash": backlash}
     return (
-        planar_problem(planar, meshes=mesh_elements(planar, **options), torque=TORQUE, damping=0.05),
-        helical_problem(data, meshes=mesh_elements(data, **options), torque=TORQUE, damping=0.05),
+        gear_set_problem(planar, meshes=mesh_elements(planar, **options), torque=TORQUE, damping=0.05),
+        gear_set_problem(data, meshes=mesh_elements(data, **options), torque=TORQUE, damping=0.05),
     )
 
 
@@ -81,11 +76,10 @@ def test_without_helix_phased_errors_do_the_same():
     planar = lin_parker_set(3)
     data, error = without_helix(planar), phased_errors(1e-6 * WAVE, PHASES)
     hertz = np.linspace(100.0, 9000.0, 60)
-    flat = modal_error_response(
-        gear_set_system(planar), planar_modes(planar, damping_ratio=0.05), hertz, error
-    )
-    system = helical_problem(data, torque=TORQUE).system
-    space = modal_error_response(system, helical_modes(data, damping_ratio=0.05), hertz, error)
+    flat = modal_error_response(gear_set_modes(planar, damping_ratio=0.05), hertz, error)
+    system = gear_set_problem(data, torque=TORQUE).system
+    modes = gear_set_modes(data, system=system, damping_ratio=0.05)
+    space = modal_error_response(modes, hertz, error)
     assert np.abs(space.force - flat.force).max() < 1e-9 * np.abs(flat.force).max()
 
 
@@ -105,7 +99,7 @@ def test_spectral_iteration_and_harmonic_balance_agree_on_a_helical_set():
     around = 500.0 * math.cos(data.base_helix_angle)
     torque = PlanarTorque(4 * around * data.sun_radius)
     meshes = mesh_elements(data, stiffness=record, harmonics=2, separates=False)
-    problem = helical_problem(data, meshes=meshes, torque=torque, damping=0.05)
+    problem = gear_set_problem(data, meshes=meshes, torque=torque, damping=0.05)
     modes = solve_modes(
         replace(problem.system, C=np.zeros_like(problem.system.C)), data.column_stiffness, damping_ratio=0.05
     )
@@ -126,7 +120,7 @@ def test_parting_teeth_by_shooting_and_harmonic_balance():
     record = waves(data, cases()["C"].phases, 0.25)
     torque = PlanarTorque(4 * 500.0 * math.cos(data.base_helix_angle) * data.sun_radius)
     meshes = mesh_elements(data, stiffness=record, harmonics=2, backlash=1e-4)
-    problem = helical_problem(data, meshes=meshes, torque=torque, damping=0.05)
+    problem = gear_set_problem(data, meshes=meshes, torque=torque, damping=0.05)
     omega = 2 * math.pi * 9840.0
     balance = solve_harmonic_balance(problem, omega, harmonics=12, samples=1024, stability=False)
     assert balance.converged
@@ -141,10 +135,10 @@ def test_parting_teeth_by_shooting_and_harmonic_balance():
 
 def test_constant_meshes_and_given_damping():
     data = kahraman_set()
-    problem = helical_problem(data, torque=TORQUE, damping=np.diag(np.arange(42.0)))
+    problem = gear_set_problem(data, torque=TORQUE, damping=np.diag(np.arange(42.0)))
     assert problem.system.C[41, 41] == 41.0
     assert problem.reference == pytest.approx(data.column_stiffness)
-    assert not helical_problem(data).system.C.any()
+    assert not gear_set_problem(data).system.C.any()
 
 
 def test_what_does_not_fit_is_refused():
@@ -153,8 +147,8 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(CaseError, match="E-HARMONICS"):
         mesh_elements(data, stiffness=record)
     with pytest.raises(CaseError, match="E-SHAPE"):
-        helical_problem(data, damping=np.eye(3))
+        gear_set_problem(data, damping=np.eye(3))
     with pytest.raises(CaseError, match="E-SHAPE"):
-        helical_problem(replace(data, slices=2, face_width=0.1), meshes=mesh_elements(data))
+        gear_set_problem(replace(data, slices=2, face_width=0.1), meshes=mesh_elements(data))
     with pytest.raises(CaseError, match="E-LOAD-BALANCE"):
-        helical_problem(data, torque=PlanarTorque(10.0, output=None))
+        gear_set_problem(data, torque=PlanarTorque(10.0, output=None))

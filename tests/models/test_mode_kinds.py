@@ -15,7 +15,7 @@ from femgear.system.mode_kinds import (
     phasing,
     set_motions,
 )
-from femgear.trains.planar.model import planar_modes
+from femgear.trains.gear_set import gear_set_modes
 
 
 def rigid_ring_set(planets, *, spread=0.0):
@@ -229,7 +229,7 @@ def test_planets_at_rest_have_no_phasing():
 def test_names_of_both_models_give_the_same_classes():
     """The lumped set in x, y of the planets instead of radial and tangential."""
     data = lin_parker_set(5)
-    system, shape = gear_set_system(data), planar_modes(data).shape
+    system, shape = gear_set_system(data), gear_set_modes(data).shape
     names, turned = list(system.dofs), np.array(shape)
     for n, angle in enumerate(data.planet_angles):
         rows = [names.index(f"planet {n + 1}: {a}") for a in ("radial", "tangential")]

@@ -15,6 +15,7 @@ from trains import closed_set, published_table, stage, two_stages
 from femgear.errors import CaseError
 from femgear.system.assembler import gear_set_system
 from femgear.system.rigid_bodies import CENTRAL
+from femgear.trains.gear_set import gear_set_modes
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
@@ -31,7 +32,6 @@ from femgear.trains.multistage.model import (
     train_torques,
 )
 from femgear.trains.multistage.stages import multistage_modes, multistage_problem
-from femgear.trains.planar.model import planar_modes
 
 # --- speeds and torques -------------------------------------------------------------------------------
 
@@ -112,7 +112,7 @@ def test_identical_uncoupled_stages_give_each_mode_twice(planets):
     data = lin_parker_set(planets)
     pair = (Stage(data=data), Stage(data=data))
     train = MultistageSet(stages=pair, couplings=(), input=Member(1, "sun"), output=Member(2, "carrier"))
-    found, single = multistage_modes(train), planar_modes(data)
+    found, single = multistage_modes(train), gear_set_modes(data)
     expected = np.repeat(single.frequency, 2)
     assert found.modes.frequency == pytest.approx(expected, rel=1e-10, abs=1e-9)
     assert Counter(found.modes.kind) == {kind: 2 * n for kind, n in Counter(single.kind).items()}
@@ -270,7 +270,7 @@ def test_example_train_has_the_structure_of_coupled_stages():
     assert sorted(found.stage[planet].tolist()) == [3, 3, 3, 4, 4, 4]
     # planet modes are those of the stage alone; lateral springs move translational modes only
     for number in (3, 4):
-        alone = planar_modes(train.stages[number - 1].data)
+        alone = gear_set_modes(train.stages[number - 1].data)
         own = alone.frequency[np.array(alone.kind) == "planet"]
         assert found.modes.frequency[planet & (found.stage == number)] == pytest.approx(own, rel=1e-9)
     soft = multistage_modes(four_stage_train(lateral=False)).modes

@@ -14,6 +14,7 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import mesh_elements
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonic_lines, tooth_lines
 from femgear.system.rigid_bodies import PlanarTorque
+from femgear.trains.gear_set import gear_set_problem, phased_series
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
@@ -27,7 +28,6 @@ from femgear.trains.multistage.model import (
 )
 from femgear.trains.multistage.section import stage_gears
 from femgear.trains.multistage.stages import base_frequencies, error_response, multistage_problem
-from femgear.trains.planar.model import phased_series, planar_problem
 
 SPEED, TORQUE = 50.0 * np.pi, 350.0
 
@@ -236,7 +236,7 @@ def test_one_stage_is_the_planar_problem():
     wave = phased_series([0.2, 0.1j], [0.2, 0.1], one.phases, mean=one.data.mesh_stiffness)
     meshes = mesh_elements(one.data, stiffness=wave, backlash=4e-5)
     ours = multistage_problem(train, meshes={1: meshes}, torque=300.0, damping=0.04)
-    alone = planar_problem(one.data, meshes=meshes, torque=PlanarTorque(300.0), damping=0.04)
+    alone = gear_set_problem(one.data, meshes=meshes, torque=PlanarTorque(300.0), damping=0.04)
     for name in ("M", "K", "C", "W", "load"):
         a, b = getattr(ours.system, name), getattr(alone.system, name)
         assert np.abs(a - b).max() <= 1e-9 * np.abs(b).max(), name

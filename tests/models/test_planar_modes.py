@@ -10,7 +10,7 @@ from validation.planar import by_kind, torsional
 
 from femgear.errors import CaseError
 from femgear.system.mode_kinds import class_shares, gear_set_kinds
-from femgear.trains.planar.model import planar_modes
+from femgear.trains.gear_set import gear_set_modes
 
 # the matrices of Lin and Parker (1999) set up elsewhere and solved in double precision [Hz]
 PLANET = (1808.18088204, 5963.76002161, 6981.70516704)
@@ -36,7 +36,7 @@ PRECISE = {
 @pytest.mark.parametrize("planets", [2, 3, 4, 5, 6, 7])
 def test_structure_of_equally_spaced_planets(planets):
     """Lin and Parker (1999): 6 single, 6 double, 3 (N - 3)-fold; with two planets 9 are left of the 12."""
-    modes = planar_modes(lin_parker_set(planets))
+    modes = gear_set_modes(lin_parker_set(planets))
     kinds = list(modes.kind)
     assert kinds.count("rigid") == 1 and modes.kind[0] == "rigid"
     if planets == 2:
@@ -53,7 +53,7 @@ def test_structure_of_equally_spaced_planets(planets):
 
 @pytest.mark.parametrize("planets", [3, 4, 5])
 def test_frequencies_of_lin_and_parker(planets):
-    found = by_kind(planar_modes(lin_parker_set(planets)))
+    found = by_kind(gear_set_modes(lin_parker_set(planets)))
     times = (1, 2, max(planets - 3, 1))
     for kind, step, expected in zip(("rotational", "translational", "planet"), times, PRECISE[planets]):
         assert found[kind][::step] == pytest.approx(expected, rel=1e-7)
@@ -67,22 +67,22 @@ def test_planet_modes_do_not_depend_on_the_number_of_planets():
     stiffness = k * rows.T @ rows + np.diag([kp, kp, 0.0])
     mass = np.array([0.66, 0.66, 0.61])
     root = np.sqrt(np.linalg.eigvalsh(stiffness / np.sqrt(np.outer(mass, mass)))) / (2 * np.pi)
-    assert by_kind(planar_modes(data))["planet"][::3] == pytest.approx(root, rel=1e-11)
+    assert by_kind(gear_set_modes(data))["planet"][::3] == pytest.approx(root, rel=1e-11)
 
 
 def test_kinds_do_not_depend_on_the_x_axis():
     data = lin_parker_set(4)
     turned = replace(data, planet_angles=data.planet_angles + 0.4)
-    assert planar_modes(turned).kind == planar_modes(data).kind
+    assert gear_set_modes(turned).kind == gear_set_modes(data).kind
 
 
 def test_unequal_spacing_mixes_all_but_the_planet_modes():
     """With the planets' motion free of 1, cos psi and sin psi the central members rest at any angles."""
     data = replace(lin_parker_set(4), planet_angles=np.deg2rad([0.0, 60.0, 150.0, 250.0]))
-    modes = planar_modes(data)
+    modes = gear_set_modes(data)
     found = by_kind(modes)
     assert len(found["mixed"]) > 9
-    assert found["planet"] == pytest.approx(by_kind(planar_modes(lin_parker_set(4)))["planet"], rel=1e-10)
+    assert found["planet"] == pytest.approx(by_kind(gear_set_modes(lin_parker_set(4)))["planet"], rel=1e-10)
     # what is still called by a class has that class's motion of the central members
     energy = np.array(modes.shape) ** 2
     central = energy[:9].reshape(3, 3, -1).sum(axis=0)
@@ -96,7 +96,7 @@ def test_unequal_spacing_mixes_all_but_the_planet_modes():
 def test_opposite_planets_keep_rotational_and_translational_modes():
     """J. Lin and R. G. Parker, J. Sound Vib. 233, 2000: diametrically opposed planets keep the structure."""
     data = replace(lin_parker_set(4), planet_angles=np.deg2rad([0.0, 75.0, 180.0, 255.0]))
-    modes = planar_modes(data)
+    modes = gear_set_modes(data)
     kinds = list(modes.kind)
     assert (kinds.count("rotational"), kinds.count("translational"), kinds.count("planet")) == (5, 12, 3)
     # the translational modes are no longer double
@@ -108,7 +108,7 @@ def test_a_nearly_equal_set_keeps_its_kinds_only_while_they_are_true():
     angles = lin_parker_set(3).planet_angles
     for degrees, kept in ((0.01, True), (12.0, False)):
         data = replace(lin_parker_set(3), planet_angles=angles + np.deg2rad([0.0, degrees, 0.0]))
-        assert ("mixed" not in planar_modes(data).kind) == kept
+        assert ("mixed" not in gear_set_modes(data).kind) == kept
 
 
 def test_shares_are_those_of_constructed_motions():
@@ -130,7 +130,7 @@ def test_shares_are_those_of_constructed_motions():
 
 def test_wind_turbine_set():
     """Lowest modes computed independently: 40.761 and 156.869 double, 69.563 and 302.710 Hz single."""
-    found = by_kind(planar_modes(wind_turbine_b()))
+    found = by_kind(gear_set_modes(wind_turbine_b()))
     assert found["translational"][:4] == pytest.approx([40.761] * 2 + [156.869] * 2, rel=1e-5)
     assert found["rotational"][:2] == pytest.approx([69.563, 302.710], rel=1e-5)
 

@@ -11,16 +11,22 @@ from validation.planar import sharing_set, static_mesh_forces, sun_forces
 
 from femgear.errors import CaseError
 from femgear.system.assembler import (
-    column_groups,
     gear_set_system,
     mesh_directions,
     mesh_elements,
     pin_directions,
 )
 from femgear.system.fourier import FourierSeries, StepSeries, constant
-from femgear.system.rigid_bodies import PlanarTorque, torque_shares
+from femgear.system.rigid_bodies import CENTRAL, PlanarTorque, torque_shares
 from femgear.system.system import MeshExcitation, element_forces, external_force
-from femgear.trains.planar.model import Clearances, Gravity, phased_series, pin_deflections, planar_problem
+from femgear.trains.gear_set import (
+    Bearings,
+    Gravity,
+    MemberBearing,
+    gear_set_problem,
+    phased_series,
+    pin_deflections,
+)
 
 ANGLES = np.array([0.3, 1.9, 4.1])
 
@@ -29,6 +35,11 @@ def supported(**changes):
     """Lin and Parker's set whose carrier cannot run away."""
     data = lin_parker_set(3)
     return replace(data, carrier=replace(data.carrier, torsional_support=1e6), **changes)
+
+
+def unsupported(data):
+    """The same set without radial supports of its central members."""
+    return replace(data, **{name: replace(getattr(data, name), support=0.0) for name in CENTRAL})
 
 
 def linear(problem, load, *, mesh_stiffness):
@@ -60,7 +71,7 @@ def test_pin_errors_act_as_forces_of_the_bearings(sign):
     """Other route: displaced springs, load k_p e on the planets and its reaction on the carrier."""
     data = supported(planet_angles=ANGLES, planet_bearing=[1e8, 2e8, 3e8])
     pins, torque = np.array([[3e-6, 5e-6], [-4e-6, 1e-6], [2e-6, -7e-6]]), PlanarTorque(sign * 900.0)
-    problem = planar_problem(
+    problem = gear_set_problem(
         data, torque=torque, pin_errors=pins, meshes=mesh_elements(data, separates=False)
     )
     system = gear_set_system(data, torque=torque)
@@ -71,8 +82,8 @@ def test_pin_errors_act_as_forces_of_the_bearings(sign):
 
 def test_pin_errors_turn_with_the_carrier_as_masses_do():
     data, pins, speed = supported(), np.array([[1e-5, 0.0], [0.0, 2e-5], [0.0, 0.0]]), 200.0
-    load = planar_problem(data, pin_errors=pins, carrier_speed=speed).system.load
-    bare = planar_problem(data, carrier_speed=speed).system.load
+    load = gear_set_problem(data, pin_errors=pins, carrier_speed=speed).system.load
+    bare = gear_set_problem(data, carrier_speed=speed).system.load
     difference = np.zeros((6, 3))
     difference[3:, :2] = 0.66 * speed**2 * pins
     assert load - bare == pytest.approx(difference.ravel(), abs=1e-8)
@@ -85,7 +96,7 @@ def test_torque_of_the_mirrored_set():
     two = replace(one, planet_angles=2 * np.pi - ANGLES[::-1])
     forces = [
         static_mesh_forces(
-            planar_problem(
+            gear_set_problem(
                 data, torque=PlanarTorque(t), pin_errors=p, meshes=mesh_elements(data, separates=False)
             )
         )
@@ -97,11 +108,11 @@ def test_torque_of_the_mirrored_set():
 @pytest.mark.parametrize("theta", [0.0, 1.1, 3.9])
 def test_slow_weight_is_the_static_one_of_the_turned_set(theta):
     data, gravity = supported(planet_angles=ANGLES), Gravity(orders=(0, 1))
-    problem = planar_problem(data, gravity=gravity)
+    problem = gear_set_problem(data, gravity=gravity)
     force = external_force(problem, np.array([0.7, theta]))
     q = linear(problem, force, mesh_stiffness=5e8)
     standing = replace(data, planet_angles=ANGLES + theta)
-    still = planar_problem(standing, gravity=Gravity(orders=None))
+    still = gear_set_problem(standing, gravity=Gravity(orders=None))
     assert still.forces == () and still.system.load.any()
     other = linear(still, still.system.load, mesh_stiffness=5e8)
     c, s = math.cos(theta), math.sin(theta)
@@ -114,7 +125,7 @@ def test_slow_weight_is_the_static_one_of_the_turned_set(theta):
 
 def test_weight_of_all_bodies_points_down_at_every_phase():
     data = supported(planet_angles=ANGLES)
-    problem = planar_problem(data, gravity=Gravity(9.81, direction=-0.5 * math.pi, orders=(1,)))
+    problem = gear_set_problem(data, gravity=Gravity(9.81, direction=-0.5 * math.pi, orders=(1,)))
     shift = np.zeros((18, 2))
     shift[[0, 3, 6], 0] = shift[[1, 4, 7], 1] = 1.0
     shift[9::3] = np.array([np.cos(ANGLES), np.sin(ANGLES)]).T
@@ -129,10 +140,10 @@ def test_weight_of_all_bodies_points_down_at_every_phase():
 def test_bearings_with_no_clearance_are_the_linear_ones():
     data = supported(planet_angles=ANGLES)
     torque, gravity = PlanarTorque(300.0), Gravity(orders=None)
-    plain = planar_problem(data, torque=torque, gravity=gravity)
-    loose = planar_problem(
-        data, torque=torque, gravity=gravity,
-        clearances=Clearances(carrier=0.0, ring=0.0, sun=0.0, planets=0.0),
+    members = tuple(MemberBearing(getattr(data, name).support, 0.0, name) for name in CENTRAL)
+    plain = gear_set_problem(data, torque=torque, gravity=gravity)
+    loose = gear_set_problem(
+        unsupported(data), torque=torque, gravity=gravity, bearings=Bearings(0.0, members),
     )  # fmt: skip
     q = np.random.default_rng(3).normal(scale=1e-6, size=18)
     parts = []
@@ -147,8 +158,9 @@ def test_bearings_with_no_clearance_are_the_linear_ones():
 def test_carrier_drops_through_its_clearance():
     """The weight of a set whose carrier has play is carried at c + F / k' of the closed bearing law."""
     data, clearance = supported(), 1e-3
-    problem = planar_problem(data, clearances=Clearances(carrier=clearance), gravity=Gravity(orders=None))
-    columns = column_groups(data, bearings=("carrier",))["carrier"]
+    bearings = Bearings(members=(MemberBearing(data.carrier.support, clearance, "carrier"),))
+    problem = gear_set_problem(unsupported(data), bearings=bearings, gravity=Gravity(orders=None))
+    columns = bearings.columns(data, back_flanks=False)["members"]
     x = np.zeros(8)
     x[columns] = [[0.0, 0.999 * clearance]]
     assert not element_forces(problem, x, np.zeros(1))[0][columns].any()
@@ -169,7 +181,9 @@ def test_static_record_is_the_quasi_static_solution():
     states = np.array([np.linalg.solve(system.K + (system.W * row) @ system.W.T, system.load) for row in k.T])
     deflection = (states @ system.W).T
     record = MeshExcitation(k, deflection, k * deflection, np.full(6, 5e-5))
-    problem = planar_problem(data, torque=torque, meshes=mesh_elements(data, stiffness=record, harmonics=15))
+    problem = gear_set_problem(
+        data, torque=torque, meshes=mesh_elements(data, stiffness=record, harmonics=15)
+    )
     assert np.array_equal(problem.elements[0].backlash, np.full(6, 5e-5))
     for i in (0, 5, 17):
         force = element_forces(problem, states[i] @ problem.system.W, np.array([2 * np.pi * tau[i]]))[0]
@@ -193,7 +207,7 @@ def test_a_planet_pushed_outwards_wedges_in_the_ring():
     """Both flanks of a mesh approach by d sin(alpha) when the centres approach by d."""
     data, b, d = supported(), 2e-5, 1e-4
     meshes = mesh_elements(data, backlash=b)
-    problem = planar_problem(data, meshes=meshes, back_flanks=True)
+    problem = gear_set_problem(data, meshes=meshes, back_flanks=True)
     q = np.zeros(18)
     q[9] = d
     W = problem.system.W
@@ -202,7 +216,7 @@ def test_a_planet_pushed_outwards_wedges_in_the_ring():
     expected = np.zeros((4, 3))
     expected[1, 0], expected[3, 0] = 5e8 * approach, 5e8 * (approach - b)
     assert force == pytest.approx(expected, rel=1e-12)
-    on_one_line = planar_problem(data, meshes=meshes)
+    on_one_line = gear_set_problem(data, meshes=meshes)
     single = element_forces(on_one_line, on_one_line.system.W.T @ q, np.zeros(1))[0]
     assert single[3] == pytest.approx(5e8 * approach)
 
@@ -216,7 +230,7 @@ def test_back_flanks_in_rotation_are_those_of_one_line(turn):
     q[8] = turn
     moments = []
     for own in (False, True):
-        problem = planar_problem(data, meshes=meshes, back_flanks=own, pin_errors=pins)
+        problem = gear_set_problem(data, meshes=meshes, back_flanks=own, pin_errors=pins)
         force = element_forces(problem, problem.system.W.T @ q, np.zeros(1))[0]
         moments.append((problem.system.W @ force)[[2, 5, 8, 11, 14, 17]])
     assert moments[1] == pytest.approx(moments[0], rel=1e-12, abs=1e-9)
@@ -228,7 +242,7 @@ def test_back_flanks_of_a_record_touch_beyond_its_unloaded_deflection(theta):
     k = phased_series([0.2], [0.1], np.zeros(6), mean=data.mesh_stiffness)
     waves = FourierSeries(np.tile([[2e-6, 5e-7j]], (6, 1))), FourierSeries(np.tile([[800.0, 100.0]], (6, 1)))
     meshes = replace(mesh_elements(data, stiffness=k, backlash=3e-5), deflection=waves[0], force=waves[1])
-    problem = planar_problem(data, meshes=meshes, back_flanks=True)
+    problem = gear_set_problem(data, meshes=meshes, back_flanks=True)
     start = (waves[0].at(phase) - waves[1].at(phase) / k.at(phase))[0]
     for x in (start + 1e-6, start - 1.5e-5, start - 3.1e-5):
         deflection = np.concatenate([np.full(6, x), np.full(6, -x)])
@@ -239,9 +253,9 @@ def test_back_flanks_of_a_record_touch_beyond_its_unloaded_deflection(theta):
 
 def test_damping_is_modal_at_standstill_with_closed_meshes():
     data = supported()
-    problem = planar_problem(
+    problem = gear_set_problem(
         data, damping=0.03, carrier_speed=50.0, back_flanks=True,
-        meshes=mesh_elements(data, backlash=1e-5), clearances=Clearances(carrier=1e-4),
+        meshes=mesh_elements(data, backlash=1e-5), bearings=Bearings(1e-4),
     )  # fmt: skip
     plain = gear_set_system(data)
     value, shape = np.linalg.eigh(
@@ -252,29 +266,29 @@ def test_damping_is_modal_at_standstill_with_closed_meshes():
     found = modes.T @ problem.system.C @ modes
     assert found == pytest.approx(expected, abs=1e-8 * expected.max())
     assert problem.speed == 50.0 and problem.system.gyroscopic is not None
-    given = planar_problem(data, damping=np.diag(np.arange(18.0)))
+    given = gear_set_problem(data, damping=np.diag(np.arange(18.0)))
     assert np.array_equal(given.system.C, np.diag(np.arange(18.0)))
-    assert not planar_problem(data).system.C.any()
+    assert not gear_set_problem(data).system.C.any()
 
 
 def test_constant_meshes_are_the_default():
     data = supported(stiffness_sun_planet=[4e8, 5e8, 6e8])
-    problem = planar_problem(data)
+    problem = gear_set_problem(data)
     assert problem.reference == pytest.approx(data.mesh_stiffness)
     assert np.isinf(problem.elements[0].backlash).all() and problem.bases == 1
-    assert planar_problem(data, gravity=Gravity()).bases == 2
+    assert gear_set_problem(data, gravity=Gravity()).bases == 2
 
 
 def test_output_torque_balances_and_a_missing_one_is_refused():
     data = lin_parker_set(3)
-    problem = planar_problem(data, torque=PlanarTorque(80.0))
+    problem = gear_set_problem(data, torque=PlanarTorque(80.0))
     forces = static_mesh_forces(
-        planar_problem(supported(), torque=PlanarTorque(80.0), meshes=mesh_elements(data, separates=False))
+        gear_set_problem(supported(), torque=PlanarTorque(80.0), meshes=mesh_elements(data, separates=False))
     )
     assert forces == pytest.approx(np.full(6, 80.0 / data.sun_radius / 3), rel=1e-9)
     assert problem.system.load[2] == pytest.approx(torque_shares(data)["carrier"] * 80.0 / data.sun_radius)
     with pytest.raises(CaseError, match="E-LOAD-BALANCE"):
-        planar_problem(data, torque=PlanarTorque(80.0, output=None))
+        gear_set_problem(data, torque=PlanarTorque(80.0, output=None))
 
 
 def test_pin_deflections_are_the_approach_of_the_flanks():
@@ -291,15 +305,15 @@ def test_impossible_requests_are_refused():
     data = supported()
     steps = StepSeries(np.full((6, 2), 5e8), [0.0, 0.5])
     for error, call in (
-        ("E-BACKLASH", lambda: planar_problem(data, back_flanks=True)),
-        ("E-BACKLASH", lambda: planar_problem(
+        ("E-BACKLASH", lambda: gear_set_problem(data, back_flanks=True)),
+        ("E-BACKLASH", lambda: gear_set_problem(
             data, back_flanks=True,
             meshes=replace(mesh_elements(data, stiffness=steps, backlash=1e-5), force=constant(np.ones(6))))),
-        ("E-BEARING", lambda: planar_problem(
-            replace(data, sun=replace(data.sun, support=0.0)), clearances=Clearances(sun=1e-5))),
-        ("E-SHAPE", lambda: planar_problem(data, pin_errors=np.zeros((3, 3)))),
-        ("E-SHAPE", lambda: planar_problem(data, damping=np.zeros((4, 4)))),
-        ("E-SHAPE", lambda: planar_problem(
+        ("E-BEARING", lambda: gear_set_problem(
+            replace(data, planet_bearing=np.inf), bearings=Bearings(1e-5))),
+        ("E-SHAPE", lambda: gear_set_problem(data, pin_errors=np.zeros((3, 3)))),
+        ("E-SHAPE", lambda: gear_set_problem(data, damping=np.zeros((4, 4)))),
+        ("E-SHAPE", lambda: gear_set_problem(
             data, meshes=replace(mesh_elements(data), columns=np.arange(1, 7)))),
         ("E-SHAPE", lambda: mesh_elements(data, stiffness=constant(np.ones(4)))),
         ("E-HARMONICS", lambda: mesh_elements(

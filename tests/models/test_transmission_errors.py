@@ -21,7 +21,7 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.assembler import gear_set_system, mesh_elements
 from femgear.system.fourier import tooth_lines
 from femgear.system.rigid_bodies import PlanarTorque
-from femgear.trains.planar.model import planar_problem
+from femgear.trains.gear_set import gear_set_problem
 
 DATA = lin_parker_set(3)
 TEETH = {"sun": 28, "planet": 36, "ring": 101}
@@ -73,7 +73,7 @@ def slow_response(support, amplitude=10e-6):
     data = replace(DATA, sun=replace(DATA.sun, support=support))
     eccentric = TransmissionErrors(data=data, teeth=TEETH, sun=Eccentricity(amplitude))
     meshes = mesh_elements(data, separates=False)
-    problem = planar_problem(data, meshes=meshes, torque=PlanarTorque(300.0), damping=0.02)
+    problem = gear_set_problem(data, meshes=meshes, torque=PlanarTorque(300.0), damping=0.02)
     problem = with_errors(problem, eccentric)
     frequency = eccentric.frequency(27.0)
     orders = eccentric.lines(mesh=1)
@@ -97,7 +97,7 @@ def test_dampers_act_on_the_rate_less_the_error():
     dampers = planar_mesh_dampers(DATA, 0.04)
     C = equivalent_damping(DATA, mesh_ratio=0.04, support_ratio=0.03)
     meshes = mesh_elements(DATA, separates=False)
-    plain = planar_problem(DATA, meshes=meshes, torque=PlanarTorque(300.0), damping=C)
+    plain = gear_set_problem(DATA, meshes=meshes, torque=PlanarTorque(300.0), damping=C)
     omega = 2 * np.pi * 1500.0
     problem = with_errors(plain, both, dampers=dampers, mesh_frequency=omega)
     found = solve_harmonic_balance(problem, omega, harmonics=3, stability=False)
@@ -117,7 +117,7 @@ def test_two_bases_against_integration():
         tooth=tooth_lines([2e-6], [1e-6], np.arange(6) / 3),
     )  # fmt: skip
     meshes = mesh_elements(DATA, backlash=40e-6)
-    problem = planar_problem(DATA, meshes=meshes, torque=PlanarTorque(12.0), damping=0.08)
+    problem = gear_set_problem(DATA, meshes=meshes, torque=PlanarTorque(12.0), damping=0.08)
     problem, frequency = with_errors(problem, eccentric), eccentric.frequency(2 * np.pi * 2200.0)
     orders = eccentric.lines(mesh=6, member=3, bands=3)
     found = solve_harmonic_balance(problem, frequency, orders=orders, stability=False)
@@ -174,9 +174,9 @@ def test_phases_that_are_no_pairs_are_refused(phases):
 
 def test_problems_that_cannot_take_errors_are_refused():
     meshes = mesh_elements(DATA, backlash=40e-6)
-    wedging = planar_problem(DATA, meshes=meshes, torque=PlanarTorque(60.0), back_flanks=True)
+    wedging = gear_set_problem(DATA, meshes=meshes, torque=PlanarTorque(60.0), back_flanks=True)
     with pytest.raises(CaseError, match="E-RANGE"):
         with_errors(wedging, errors(sun=Eccentricity(1e-6)))
-    plain = planar_problem(DATA, meshes=meshes, torque=PlanarTorque(60.0))
+    plain = gear_set_problem(DATA, meshes=meshes, torque=PlanarTorque(60.0))
     with pytest.raises(CaseError, match="E-RANGE"):
         with_errors(plain, errors(sun=Eccentricity(1e-6)), dampers=np.ones(6))

@@ -18,7 +18,7 @@ from femgear.solvers.linear.modal import complex_modes, solve_modes
 from femgear.solvers.linear.receptance import direct_response, modal_response
 from femgear.system.assembler import gear_set_system
 from femgear.system.system import MechanicalSystem
-from femgear.trains.planar.model import planar_modes
+from femgear.trains.gear_set import gear_set_modes
 
 NO_MESH = np.zeros(0)
 
@@ -145,7 +145,7 @@ def test_planet_phasing_selects_the_kind_of_mode(harmonic, kind):
     """R. G. Parker, J. Sound Vib. 236, 2000: with N = 4, h z_s mod 4 = 0, +-1 or 2 chooses the kind."""
     data = lin_parker_set(4)
     system, k, N = gear_set_system(data), data.mesh_stiffness, 4
-    modes = planar_modes(data, damping_ratio=0.05)
+    modes = gear_set_modes(data, damping_ratio=0.05)
     wave = np.exp(-1j * harmonic * data.planet_angles)
     error = np.concatenate([wave, 0.6 * wave * np.exp(0.4j)])[:, None] * 1e-6
     f = np.linspace(500.0, 9000.0, 40)

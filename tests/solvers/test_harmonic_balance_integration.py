@@ -20,7 +20,7 @@ from femgear.system.system import (
     element_forces,
     external_force,
 )
-from femgear.trains.planar.model import Clearances, planar_problem
+from femgear.trains.gear_set import Bearings, MemberBearing, gear_set_problem
 
 
 def state_of(problem, solution):
@@ -121,7 +121,7 @@ def test_planetary_set_with_backlash():
     phases = np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])
     mesh = 5e8 * np.array([1.0, 0.25, 0.075, 0.0375])
     stiffness = FourierSeries(mesh * np.exp(-2j * np.pi * phases[:, None] * np.arange(4)))
-    problem = planar_problem(
+    problem = gear_set_problem(
         data, meshes=mesh_elements(data, stiffness=stiffness, backlash=20e-6), torque=PlanarTorque(300.0),
         damping=0.03,
     )  # fmt: skip
@@ -220,9 +220,11 @@ def test_commensurable_bases_give_the_one_base_signal():
 def test_sun_that_floats_in_its_bearing():
     """The clearance adds columns that free rotation does not move; by symmetry the sun stays centred."""
     data, torque = lin_parker_set(3), PlanarTorque(300.0)
-    floating = planar_problem(data, clearances=Clearances(sun=5e-6), torque=torque, damping=0.03)
+    loose = replace(data, sun=replace(data.sun, support=0.0))
+    bearings = Bearings(members=(MemberBearing(data.sun.support, 5e-6, "sun"),))
+    floating = gear_set_problem(loose, bearings=bearings, torque=torque, damping=0.03)
     found = solve_harmonic_balance(floating, 1000.0, harmonics=3)
-    held = solve_harmonic_balance(planar_problem(data, torque=torque, damping=0.03), 1000.0, harmonics=3)
+    held = solve_harmonic_balance(gear_set_problem(data, torque=torque, damping=0.03), 1000.0, harmonics=3)
     assert found.converged
     assert np.abs(found.deflection[6:]).max() < 1e-9 * np.abs(found.deflection[:6]).max()
     np.testing.assert_allclose(found.deflection[:6], held.deflection, rtol=1e-9, atol=1e-18)

@@ -23,7 +23,7 @@ from femgear.solvers.linear.tracking import campbell_data, oscillating, track_mo
 from femgear.system.assembler import gear_set_system
 from femgear.system.mode_kinds import gear_set_kinds
 from femgear.system.system import MechanicalSystem
-from femgear.trains.planar.model import planar_modes
+from femgear.trains.gear_set import gear_set_modes
 
 # two masses 1 on springs 1 + p and 2 - p, joined by kc: eigenvalues 1.5 + kc -+ sqrt((p - 1/2)^2 + kc^2)
 SPLIT = np.diag([1.0, -1.0])
@@ -137,7 +137,7 @@ def test_equal_planets_cross_and_keep_their_kinds():
     (planet,) = (one for one in veering if kinds[one.first] == "planet")
     where, gap = planet_veering(base, planet.value)
     assert planet.gap == pytest.approx(gap, rel=0.02) and planet.value == pytest.approx(where, rel=0.02)
-    exact = planar_modes(at(1e9)).frequency[1:]
+    exact = gear_set_modes(at(1e9)).frequency[1:]
     assert np.sort(tracked.frequency[-1]) == pytest.approx(exact, rel=1e-9)
 
 
@@ -226,7 +226,7 @@ def test_campbell_of_the_planar_set():
 
 def test_energy_shares():
     data = lin_parker_set(3)
-    system, modes, springs = gear_set_system(data), planar_modes(data), gear_set_springs(data)
+    system, modes, springs = gear_set_system(data), gear_set_modes(data), gear_set_springs(data)
     total = system.K + (system.W * data.mesh_stiffness) @ system.W.T
     assert np.abs(stiffness_of(springs) - total).max() < 1e-12 * np.abs(total).max()
     kinetic = kinetic_shares(system.M, modes.shape, body_groups(system.dofs))
@@ -243,7 +243,7 @@ def test_energy_shares():
     ):
         k = np.array(getattr(data, change))
         k[int(name.split("planet ")[1][0]) - 1 if "ring" in name else 0] *= 1.0 + 1e-4
-        stiffer = planar_modes(replace(data, **{change: k})).frequency[rotational]
+        stiffer = gear_set_modes(replace(data, **{change: k})).frequency[rotational]
         slope = 2.0 * (stiffer / modes.frequency[rotational] - 1.0) / 1e-4
         assert strain[name][rotational] == pytest.approx(slope, rel=1e-2)
 

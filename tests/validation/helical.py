@@ -10,14 +10,11 @@ import numpy as np
 from published.planetary_sets import TABLE_2, cases, kahraman_set
 
 from femgear.gears.phasing import phase_factors
+from femgear.solvers.linear.receptance import modal_error_response
 from femgear.system.assembler import gear_set_system, mesh_directions
 from femgear.system.mode_kinds import gear_set_motions, phasing
-from femgear.trains.helical.model import (
-    HelicalSet,
-    helical_modes,
-    modal_error_response,
-    phased_errors,
-)
+from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.helical.model import HelicalSet
 from validation import independent
 from validation.reference.frequency_response import mesh_error_response
 from validation.rows import Row, at_most, counted, information, within
@@ -38,7 +35,7 @@ UNIT, SHARE = 1.0, 3e-4
 
 def by_phasing(data: HelicalSet, *, below: float = 15e3) -> dict[str, np.ndarray]:
     """Frequencies [Hz] of the elastic modes of every phasing below a frequency [Hz]."""
-    modes = helical_modes(data)
+    modes = gear_set_modes(data)
     names = np.array(phasing(gear_set_motions(data, modes.shape)))
     inside = (modes.frequency > 0.0) & (modes.frequency < below)
     return {key: modes.frequency[inside & (names == name)] for key, name in PHASINGS.items()}
@@ -47,7 +44,7 @@ def by_phasing(data: HelicalSet, *, below: float = 15e3) -> dict[str, np.ndarray
 def table_4() -> tuple[Row, ...]:
     """All modes below 15 kHz, with their phasing from the shapes."""
     rows, data = [], kahraman_set()
-    modes, found = helical_modes(data), by_phasing(data)
+    modes, found = gear_set_modes(data), by_phasing(data)
     moved, others = _entries_of_pairs(data), independent.kahraman().frequencies()
     for key, (printed, precise) in TABLE_4.items():
         twins = 2 if key == "SP" else 1
@@ -187,10 +184,10 @@ def table_1() -> tuple[Row, ...]:
 def leakage() -> tuple[Row, ...]:
     """Forces that phased transmission errors exert on modes of another phasing, over those on their own."""
     data, rows = kahraman_set(), []
-    modes = helical_modes(data, max_frequency=20e3)
+    modes = gear_set_modes(data, max_frequency=20e3)
     names = np.array(phasing(gear_set_motions(data, modes.shape)))
     for letter, case in cases().items():
-        push = data.mesh_stiffness[:, None] * phased_errors(np.full(4, 1e-6), case.phases)
+        push = data.mesh_stiffness[:, None] * 1e-6 * phase_factors(case, range(1, 5)).T
         work = np.abs(modes.mesh_deflection.T @ push)
         worst, kinds = 0.0, []
         for h in range(1, 5):
@@ -206,11 +203,11 @@ def leakage() -> tuple[Row, ...]:
 def response() -> tuple[Row, ...]:
     """Forced response to 1 um in four harmonics, 5 % damping: modes against direct solution, and the peak."""
     data, rows = kahraman_set(), []
-    system, modes = gear_set_system(data), helical_modes(data, damping_ratio=0.05)
-    amplitudes, hertz = np.full(4, 1e-6), np.linspace(50.0, 15e3, 300)
+    system, modes = gear_set_system(data), gear_set_modes(data, damping_ratio=0.05)
+    hertz = np.linspace(50.0, 15e3, 300)
     for letter, convention in product("EF", ("rotation", "printed")):
-        error = phased_errors(amplitudes, cases(convention=convention)[letter].phases)
-        found = modal_error_response(system, modes, hertz, error)
+        error = 1e-6 * phase_factors(cases(convention=convention)[letter], range(1, 5)).T
+        found = modal_error_response(modes, hertz, error)
         k = data.column_stiffness
         direct = mesh_error_response(system, hertz, error, mesh_stiffness=k, damping_ratio=0.05)
         away = np.abs(found.force[0] - direct.force).max() / np.abs(direct.force).max()
@@ -220,12 +217,12 @@ def response() -> tuple[Row, ...]:
     fine = np.arange(5000.0, 15000.0, 5.0)
     # a mode and any constant beside it peak within the damping ratio of the mode: it is the gate
     light = 0.005
-    sharp = helical_modes(data, damping_ratio=light)
+    sharp = gear_set_modes(data, damping_ratio=light)
     for letter, h, kind, mode in (
         ("C", 1, "CP", 9840.0), ("C", 3, "CP", 9840.0), ("C", 2, "IP", None), ("C", 4, "IP", None),
         ("D", 1, "CP", 7625.0), ("D", 3, "CP", 7625.0), ("F", 1, "SP", None), ("F", 3, "SP", None),
     ):  # fmt: skip
-        peak, wide = (_peak(system, one, letter, h, fine) for one in (sharp, modes))
+        peak, wide = (_peak(one, letter, h, fine) for one in (sharp, modes))
         choices = np.array(TABLE_4[kind][0])
         mode = mode or choices[np.abs(choices - peak).argmin()]
         name = f"case {letter}, harmonic {h}: highest peak from 5 to 15 kHz, {kind} mode [Hz]"
@@ -234,10 +231,10 @@ def response() -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def _peak(system, modes, letter: str, harmonic: int, hertz) -> float:
+def _peak(modes, letter: str, harmonic: int, hertz) -> float:
     """Frequency [Hz] of the harmonic at which the force of the first sun mesh is largest."""
     error = 1e-6 * phase_factors(cases()[letter], [harmonic]).T
-    found = modal_error_response(system, modes, hertz / harmonic, error, harmonics=[harmonic])
+    found = modal_error_response(modes, hertz / harmonic, error, harmonics=[harmonic])
     return float(hertz[np.abs(found.force[0, :, 0, 0]).argmax()])
 
 

@@ -16,6 +16,7 @@ from published.multistage_example import (
 )
 from published.planetary_sets import lin_parker_set, torsional_set
 
+from femgear.trains.gear_set import gear_set_modes
 from femgear.trains.multistage.model import (
     Member,
     MultistageSet,
@@ -29,7 +30,6 @@ from femgear.trains.multistage.model import (
     train_torques,
 )
 from femgear.trains.multistage.stages import error_response, loaded_errors, multistage_modes
-from femgear.trains.planar.model import planar_modes
 from validation.reference.frequency_response import mesh_error_response
 from validation.rows import Row, at_most, counted, information, within
 
@@ -63,7 +63,7 @@ def uncoupled() -> tuple[Row, ...]:
         data = lin_parker_set(planets)
         pair = (Stage(data=data), Stage(data=data))
         train = MultistageSet(stages=pair, couplings=(), input=Member(1, "sun"), output=Member(2, "carrier"))
-        found, single = multistage_modes(train), planar_modes(data)
+        found, single = multistage_modes(train), gear_set_modes(data)
         elastic = single.frequency > 0.0
         error = np.abs(found.modes.frequency[2:] / np.repeat(single.frequency[elastic], 2) - 1.0).max()
         name = f"two uncoupled stages of {planets} planets: "
@@ -86,7 +86,7 @@ def structure() -> tuple[Row, ...]:
     ]
     planet = np.array(found.modes.kind) == "planet"
     for number in (3, 4):
-        alone = planar_modes(train.stages[number - 1].data)
+        alone = gear_set_modes(train.stages[number - 1].data)
         own = alone.frequency[np.array(alone.kind) == "planet"]
         error = np.abs(found.modes.frequency[planet & (found.stage == number)] / own - 1.0).max()
         name = f"planet modes of stage {number}, coupled and alone: relative difference"

@@ -34,7 +34,7 @@ from femgear.errors import ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import side_bands
-from femgear.trains.planar.model import planar_modes
+from femgear.trains.gear_set import gear_set_modes
 from validation import independent, independent_weight
 from validation.rows import Row, at_most, information, within
 
@@ -102,7 +102,7 @@ def _springs_b(net) -> np.ndarray:
 
 
 def _by_kind(data) -> dict[str, np.ndarray]:
-    modes = planar_modes(data)
+    modes = gear_set_modes(data)
     kinds = np.array(modes.kind)
     pairs = modes.frequency[kinds == "translational"][::2]
     return {"rotational": modes.frequency[kinds == "rotational"], "translational": pairs}

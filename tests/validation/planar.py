@@ -18,7 +18,7 @@ from femgear.system.rigid_bodies import (
     planar_from_set,
 )
 from femgear.system.system import NonlinearSystem, element_forces
-from femgear.trains.planar.model import planar_modes, planar_problem
+from femgear.trains.gear_set import gear_set_modes, gear_set_problem
 from validation import independent
 from validation.planetary import nrel_set
 from validation.rows import Row, at_most, counted, information, printed, within
@@ -87,7 +87,7 @@ def frequencies() -> tuple[Row, ...]:
     """F1: natural frequencies, single and double ones checked by their kind."""
     rows = []
     for planets, published in PUBLISHED.items():
-        modes = planar_modes(lin_parker_set(planets))
+        modes = gear_set_modes(lin_parker_set(planets))
         found = by_kind(modes)
         multiplicity = (1, 2, planets - 3)
         ours = [found[kind][::times] if times else () for kind, times in zip(KINDS, multiplicity)]
@@ -115,7 +115,7 @@ def structure() -> tuple[Row, ...]:
     """F3: 6 single, 6 double and 3 (N - 3)-fold modes."""
     rows, source = [], "Lin and Parker, 1999: structure of the modes"
     for planets in (3, 4, 5, 6):
-        kinds = list(planar_modes(lin_parker_set(planets)).kind)
+        kinds = list(gear_set_modes(lin_parker_set(planets)).kind)
         name = f"{planets} planets: "
         expected = (("rotational, one rigid", 6), ("translational", 12), ("planet", 3 * (planets - 3)))
         counts = (kinds.count("rotational") + kinds.count("rigid"), *map(kinds.count, KINDS[1:]))
@@ -133,7 +133,7 @@ def torsional() -> tuple[Row, ...]:
         low, high = others[[1, -1]]
         data = torsional_set(lin_parker_set(planets))
         held = replace(data, ring=replace(data.ring, torsional_support=math.inf))
-        modes = planar_modes(held)
+        modes = gear_set_modes(held)
         name = f"torsional, {planets} planets, ring held: "
         expected = [0.0, low, *[math.sqrt(1e9 / 0.61) / (2.0 * math.pi)] * (planets - 1), high]
         closed = modes.frequency[2:-1]
@@ -161,7 +161,7 @@ def sharing_set(
 def sun_forces(data: PlanarSet, torque: float, tangential) -> np.ndarray:
     """Static sun-planet forces (N,) [N] with tangential pin errors (N,) [m], no play and no separation."""
     pins = np.column_stack([np.zeros(data.n_planets), tangential])
-    problem = planar_problem(
+    problem = gear_set_problem(
         data,
         meshes=mesh_elements(data, separates=False),
         torque=PlanarTorque(torque, output=None),
@@ -261,7 +261,7 @@ def balance() -> tuple[Row, ...]:
         stiffness_planet_ring=stiffness,
         planet_bearing=1e9,
     )
-    forces = static_mesh_forces(planar_problem(data, torque=PlanarTorque(162105.5, output=None)))
+    forces = static_mesh_forces(gear_set_problem(data, torque=PlanarTorque(162105.5, output=None)))
     ring = forces[3:].sum() * data.ring_radius
     both = math.cos(data.pressure_angle_sun_planet), math.cos(data.pressure_angle_planet_ring)
     carrier = data.centre_distance * (forces[:3].sum() * both[0] + forces[3:].sum() * both[1])
@@ -277,7 +277,7 @@ def balance() -> tuple[Row, ...]:
 
 def wind_turbine() -> tuple[Row, ...]:
     """Lowest modes of the wind turbine set."""
-    found = by_kind(planar_modes(wind_turbine_b()))
+    found = by_kind(gear_set_modes(wind_turbine_b()))
     others = independent.wind_turbine_b().frequencies(independent.PLANAR)
     rows = []
     for kind, values in (

@@ -22,7 +22,7 @@ from femgear.system.elements import GearMeshes
 from femgear.system.fourier import FourierSeries, harmonics_of
 from femgear.system.rigid_bodies import PlanarTorque
 from femgear.system.system import NonlinearSystem
-from femgear.trains.planar.model import phased_series, planar_problem
+from femgear.trains.gear_set import gear_set_problem, phased_series
 from validation.nonlinear import duffing, one_harmonic, oscillator, shooting_motion
 from validation.rows import Row, at_most, counted, information
 
@@ -140,7 +140,7 @@ def planetary_train(damping: float = 0.05, backlash: float = 20e-6) -> Nonlinear
     wave = np.array([0.25, 0.075, 0.0375])
     stiffness = phased_series(wave, wave, -late, mean=data.mesh_stiffness)
     meshes = mesh_elements(data, stiffness=stiffness, backlash=backlash)
-    return planar_problem(data, meshes=meshes, torque=PlanarTorque(300.0), damping=damping)
+    return gear_set_problem(data, meshes=meshes, torque=PlanarTorque(300.0), damping=damping)
 
 
 @cache

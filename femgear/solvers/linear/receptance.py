@@ -49,14 +49,12 @@ class MeshErrorResponse:
         ``W^T q`` [m]: the dynamic transmission error of every mesh.
     force : (F, H, n_meshes) complex array
         Dynamic mesh force ``k (W^T q - e)`` [N].
-    output : (F, H, n_outputs) complex array
     """
 
     mesh_frequency: np.ndarray
     harmonics: np.ndarray
     deflection: np.ndarray
     force: np.ndarray
-    output: np.ndarray
 
 
 def direct_response(
@@ -158,6 +156,70 @@ def modal_response(
         static = outputs @ pseudo_solve(*rigid_basis(system, modes), inputs)
         result += static - (left[:, elastic] / natural[elastic] ** 2) @ right[elastic]
     return result
+
+
+def modal_error_response(modes: Modes, mesh_frequency, error, *, harmonics=None) -> MeshErrorResponse:
+    """Respond to transmission errors ``e_j(t) = Re sum_h error_jh exp(i h omega_m t)`` by summing modes.
+
+    ``q = sum phi (phi^T W k e) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega)``, with the static
+    flexibility of modes that were left out (Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 2.9;
+    A. Kahraman, J. Mech. Des. 116, 1994, 713-720, sums all modes). Many cases share one gain. A transmission
+    error does no work on rigid motions, so that these stay at rest.
+
+    Parameters
+    ----------
+    modes : Modes
+        ``modes.mesh_stiffness`` are the stiffnesses ``k`` of the columns of ``W``.
+    mesh_frequency : (F,) array
+        [Hz]
+    error : (n_columns, H) or (n_cases, n_columns, H) complex array
+        [m]; of one case the result has a first axis of length one. For phases phi_j as fractions of the mesh
+        period, ``k_j(tau) = k(tau + phi_j)``, it is ``e_h exp(2 pi i h phi_j)``.
+    harmonics : (H,) int array, optional
+        Whole numbers from 1; 1 to H when not given.
+
+    Returns
+    -------
+    MeshErrorResponse
+        With a first axis of the cases, (n_cases, F, H, n_columns).
+
+    Raises
+    ------
+    CaseError
+        Errors that do not fit (E-SHAPE), harmonics or frequencies that are none (E-HARMONICS, E-RANGE).
+    ConvergenceError
+        An undamped resonance (E-RESONANCE).
+    """
+    k, error = modes.mesh_stiffness, np.asarray(error, complex)
+    error = error[None] if error.ndim == 2 else error
+    harmonics = np.arange(1, error.shape[-1] + 1) if harmonics is None else np.atleast_1d(harmonics)
+    if harmonics.ndim != 1 or harmonics.dtype.kind not in "iu" or np.any(harmonics < 1):
+        raise CaseError(
+            f"harmonics {harmonics.tolist()} of the mesh frequency", code="E-HARMONICS", key="harmonics",
+            limit="whole numbers from 1", remedy="the mean of a transmission error is a static load",
+        )  # fmt: skip
+    if error.shape[1:] != (len(k), len(harmonics)) or not np.all(np.isfinite(error)):
+        raise CaseError(
+            f"transmission errors of shape {error.shape}", code="E-SHAPE",
+            limit=f"(cases, {len(k)} meshes, {len(harmonics)} harmonics), finite",
+        )  # fmt: skip
+    frequency = np.atleast_1d(np.asarray(mesh_frequency, float))
+    elastic = np.flatnonzero(modes.frequency > 0.0)
+    natural, ratio = 2.0 * np.pi * modes.frequency[elastic], modes.damping_ratio[elastic]
+    left = modes.mesh_deflection[:, elastic]
+    push = k[:, None] * error
+    modal = np.einsum("jm,cjh->chm", left, push)
+    # all modes leave nothing out but rounding
+    rest = modes.residual if modes.shape.shape[1] < len(modes.shape) else np.zeros_like(modes.residual)
+    static = np.einsum("oj,cjh->cho", rest, push)
+    deflection = np.empty((len(error), len(frequency), len(harmonics), len(k)), complex)
+    for place, harmonic in enumerate(harmonics):
+        w = _angular(harmonic * frequency)[:, None]
+        below = natural**2 - w**2 + 2j * ratio * natural * w
+        gain = _gain(below, np.maximum(natural**2, w**2), modes, elastic)
+        deflection[:, :, place] = (gain * modal[:, None, place]) @ left.T + static[:, None, place]
+    force = k * (deflection - error.transpose(0, 2, 1)[:, None])
+    return MeshErrorResponse(frequency, harmonics, deflection, force)
 
 
 @dataclass(frozen=True)
@@ -419,7 +481,6 @@ def source_columns(problem: NonlinearSystem, orders: np.ndarray) -> np.ndarray:
 
 def _checked(frequency, inputs, outputs, n: int):
     """Angular frequencies, and inputs and outputs as matrices that fit."""
-    frequency = np.atleast_1d(np.asarray(frequency, float))
     inputs, outputs = np.asarray(inputs), np.atleast_2d(np.asarray(outputs))
     inputs = inputs[:, None] if inputs.ndim == 1 else inputs
     if inputs.ndim != 2 or len(inputs) != n or outputs.ndim != 2 or outputs.shape[1] != n:
@@ -427,6 +488,12 @@ def _checked(frequency, inputs, outputs, n: int):
             f"inputs of shape {inputs.shape} and outputs of shape {outputs.shape}", code="E-SHAPE",
             limit=f"({n}, inputs) and (outputs, {n})",
         )  # fmt: skip
+    return _angular(frequency), inputs, outputs
+
+
+def _angular(frequency) -> np.ndarray:
+    """Angular frequencies (F,) [rad/s] of frequencies [Hz] that must be finite and not negative."""
+    frequency = np.atleast_1d(np.asarray(frequency, float))
     finite = np.all(np.isfinite(frequency)) and np.all(frequency >= 0.0)
     if frequency.ndim != 1 or not len(frequency) or not finite:
         raise CaseError(
@@ -434,10 +501,29 @@ def _checked(frequency, inputs, outputs, n: int):
             key="frequency", limit="a list of one or more numbers >= 0 Hz",
             remedy="list the frequencies of the response",
         )  # fmt: skip
-    return 2.0 * np.pi * frequency, inputs, outputs
+    return 2.0 * np.pi * frequency
 
 
-def _resonance(where: str, remedy="give the motion some damping or move the frequency") -> ConvergenceError:
+def _gain(
+    below: np.ndarray, size: np.ndarray, modes: Modes, kept: np.ndarray | slice = slice(None)
+) -> np.ndarray:
+    """``1 / below`` (F, m) of all modes, or of those that are kept."""
+    bad = np.abs(below) <= _RESONANT * size
+    if np.any(bad):
+        mode = int(np.arange(len(modes.frequency))[kept][np.argwhere(bad)[0, 1]])
+        raise _resonance(f"of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz")
+    return 1.0 / below
+
+
+def _superposed(gain: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """``sum_k left_ok gain_fk right_ki`` as one matrix product."""
+    pairs = left.T[:, :, None] * right[:, None, :]
+    return (gain @ pairs.reshape(len(right), -1)).reshape(len(gain), len(left), right.shape[1])
+
+
+def _resonance(
+    where: str, remedy: str = "give the motion some damping or move the frequency"
+) -> ConvergenceError:
     return ConvergenceError(
         f"undamped resonance {where}: infinite response", code="E-RESONANCE", remedy=remedy
     )

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.case.case import planetary_set, set_deviations
+from femgear.case.case import material_of, planetary_set, set_deviations
 from femgear.case.dependencies import (
     Steps,
     check_entries,
@@ -74,7 +74,6 @@ from femgear.trains.static.stages import (
     STATIC,
     STRESS,
     case_supports,
-    material_of,
     mesh_backlash,
     response_verdict,
     ring_foundation,

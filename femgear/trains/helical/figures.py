@@ -12,15 +12,16 @@ import numpy as np
 
 from femgear.case.case import planetary_set
 from femgear.errors import CaseError
+from femgear.gears.phasing import phasing_of_set
 from femgear.report.response import (
-    MANY_SPEEDS,
+    RESPONSE_CAPTIONS,
     draw_static,
     excited_harmonics,
     fine_positions,
+    harmonics_of,
     name_kinds,
+    response_figures,
     some_speeds,
-    speed_sweep,
-    transmission_error_spectrum,
 )
 from femgear.report.style import (
     BLACK,
@@ -30,7 +31,7 @@ from femgear.report.style import (
     GREEN,
     SIZE,
     VERMILION,
-    family,
+    distinct_lines,
     label,
     legend_below,
     line_style,
@@ -40,6 +41,7 @@ from femgear.report.style import (
 )
 from femgear.system.rigid_bodies import CENTRAL, gear_geometry
 from femgear.trains.protocol import Drawn, Figures
+from femgear.trains.static.charts import phase_diagram
 from femgear.trains.static.figures import FIGURES as STATIC
 
 if TYPE_CHECKING:
@@ -47,7 +49,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from femgear.gears.planetary import PlanetarySet
-    from femgear.trains.helical.model import HelicalSet
 
 _CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
 _BODIES = {"carrier": GREEN, "ring": BLACK, "sun": VERMILION, "planets": BLUE}
@@ -61,21 +62,13 @@ _WIDTHS = {"carrier": 1.6, "ring": 4.5, "sun": 3.2, "planets": 1.6}
 _MARKS = {"in phase": "o", "counter-phased": "s"}
 
 
-def draw_mode(front, side, data: HelicalSet | SimpleNamespace, moved: np.ndarray, scale: float) -> None:
+def _draw_mode(front, side, data: SimpleNamespace, moved: np.ndarray, scale: float) -> None:
     """Draw both views of one mode, each at its own magnification.
 
     From the front: pitch circles, for the carrier the circle of planet centres, with a spoke that turns.
     From the side, seen along y: every body as the line of its diameter along x, which tilts about y and moves
-    along z, drawn at the scale of the front view times the factor in the title.
-
-    Parameters
-    ----------
-    front, side : matplotlib.axes.Axes
-    data : HelicalSet, or its entries of `gear_geometry`
-    moved : (N + 3, 6) array
-        x, y, z, tilts and rotation of every body as arcs, in the axes of the set.
-    scale : float
-        Largest displacement of each view as a share of the ring's radius.
+    along z, drawn at the scale of the front view times the factor in the title. ``moved`` (N + 3, 6) are x,
+    y, z, tilts and rotation of every body as arcs, in the axes of the set of `gear_geometry`.
     """
     sizes = [np.abs(moved[:, axis]).max() for axis in ([0, 1, 5], [2, 3, 4])]
     # a view without motion shows none
@@ -87,7 +80,7 @@ def draw_mode(front, side, data: HelicalSet | SimpleNamespace, moved: np.ndarray
     side.set_title(f"from the side, scale × {times}", fontsize=SIZE - 3, color="0.4")
 
 
-def pitch_radii(data) -> tuple[float, float, float]:
+def _pitch_radii(data) -> tuple[float, float, float]:
     """Working pitch radii of ring, sun and planet [m]: their circles touch.
 
     The centre distance is divided as the base radii are. Where the meshes of a planet have two pitch circles,
@@ -103,7 +96,7 @@ def _bodies(data):
 
     In the order of the coordinates; rotations and tilts are arcs on base circles.
     """
-    ring, sun, planet = pitch_radii(data)
+    ring, sun, planet = _pitch_radii(data)
     drawn = (data.centre_distance, ring, sun)
     bases = (data.centre_distance, data.ring_radius, data.sun_radius)
     for name, radius, base in zip(CENTRAL, drawn, bases):
@@ -137,7 +130,7 @@ def _draw_side(ax, data, moved: np.ndarray) -> None:
 
 
 def _limits(ax, data, high: float) -> None:
-    ring = pitch_radii(data)[0]
+    ring = _pitch_radii(data)[0]
     ax.set_xlim(-1.25 * ring, 1.25 * ring)
     ax.set_ylim(-high * ring, high * ring)
 
@@ -146,34 +139,8 @@ def _xy(points):
     return points.real, points.imag
 
 
-def helical_modes_figures(
-    modes: xr.Dataset, gears: PlanetarySet, static: xr.Dataset | None
-) -> dict[str, Figure]:
-    """Figures of modes.nc, by file name.
-
-    Parameters
-    ----------
-    modes : xarray.Dataset
-        Contents of modes.nc of a helical case.
-    gears : PlanetarySet
-        Of its transverse section.
-    static : xarray.Dataset, optional
-        Contents of static.nc, the spur gears of that section.
-    """
-    from femgear.gears.phasing import phasing_of_set
-    from femgear.trains.static.charts import phase_diagram
-
-    figures = {
-        "spatial_mode_shapes": spatial_mode_shapes(modes, gears),
-        "mesh_phasing": phase_diagram(phasing_of_set(gears)),
-    }
-    if "helical_stiffness" in modes and static is not None:
-        figures["helical_mesh_stiffness"] = helical_mesh_stiffness(modes, static)
-    return figures
-
-
 def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float = 0.16) -> Figure:
-    """The first twelve modes that are no rigid-body motions, each from the front and below it from the side.
+    """Draw the first twelve modes that are no rigid-body motions, from the front and, below, from the side.
 
     Parameters
     ----------
@@ -206,14 +173,14 @@ def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float 
     for place, mode in enumerate(shown):
         row, column = divmod(place, columns)
         front, side = (axes[(2 * row + i) * columns + column] for i in (0, 1))
-        draw_mode(front, side, data, moved[:, :, mode], scale)
+        _draw_mode(front, side, data, moved[:, :, mode], scale)
         kind, phasing = str(modes["kind"].values[mode]), str(modes["phasing"].values[mode])
         front.set_title(f"mode {mode + 1}: {frequency[mode]:.6g} Hz\n{kind}\n{phasing}", fontsize=SIZE - 2)
     legend_below(figure, columns=5)
     return figure
 
 
-def helical_mesh_stiffness(modes: xr.Dataset, static: xr.Dataset) -> Figure:
+def _mesh_stiffness(modes: xr.Dataset, static: xr.Dataset) -> Figure:
     """Stiffness and transmission error of the meshes of planet 1 beside those of the spur gears."""
     figure, axes = new_figure(rows=2, height=7.0, sharex=True)
     names, first = [str(name) for name in modes["mesh"].values], (0, modes.sizes["mesh"] // 2)
@@ -235,7 +202,7 @@ def helical_mesh_stiffness(modes: xr.Dataset, static: xr.Dataset) -> Figure:
 
 
 def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
-    """Fluctuation of the dynamic transmission error over one mesh period beside the static one.
+    """Draw the fluctuation of the dynamic transmission error over one mesh period beside the static one.
 
     Parameters
     ----------
@@ -252,10 +219,11 @@ def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
     h = dynamics["harmonic"].values
     position = fine_positions(int(h.max()))
     wave = np.exp(2j * np.pi * np.outer(h[h > 0], position))
-    dte = 1e6 * (dynamics["dte_real"].values + 1j * dynamics["dte_imag"].values)[..., h > 0]
+    dte = 1e6 * harmonics_of(dynamics, "dte")[..., h > 0]
     ste = modes["helical_ste"].values
     # what is one line at one speed need not be one at another: the lines are those of all speeds
-    lines = alike_lines(dynamics["mesh"].values, np.hstack([*(dte[speeds] @ wave).real, 1e6 * ste]))
+    curves = np.hstack([*(dte[speeds] @ wave).real, 1e6 * ste])
+    lines = distinct_lines(dynamics["mesh"].values, curves, partly=True)
     for ax, s in zip(axes, speeds):
         for i, (text, row) in enumerate(lines):
             style = line_style(i)
@@ -272,48 +240,11 @@ def transmission_errors(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
     return figure
 
 
-def alike_lines(names, values, *, tolerance: float = 1e-6) -> list[tuple[str, int]]:
-    """Legend texts and row numbers of the curves to draw: one for all meshes of a kind whose curves agree.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Mesh labels.
-    values : (n, ...) array
-        A row a mesh.
-    tolerance : float
-        Largest difference of curves counted as equal, relative to the largest value.
-    """
-    names, values = [str(name) for name in names], np.asarray(values)
-    kinds, size, groups = [family(name) for name in names], np.abs(values).max(initial=0.0), []
-    for row, kind in enumerate(kinds):
-        for group in groups:
-            near = np.abs(values[row] - values[group[0]]).max() <= tolerance * size
-            if kinds[group[0]] == kind and near:
-                group.append(row)
-                break
-        else:
-            groups.append([row])
-    lines = []
-    for group in groups:
-        text = ", ".join(names[row] for row in group)
-        if 1 < len(group) == kinds.count(kinds[group[0]]):
-            text = f"all {kinds[group[0]]} meshes"
-        lines.append((text + " (identical)" if len(group) > 1 else text, group[0]))
-    return lines
-
-
-def mesh_force_figure(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
-    """Amplitudes of the mesh forces of planet 1 over the frequency of every harmonic.
-
-    Parameters
-    ----------
-    dynamics, modes : xarray.Dataset
-        Contents of dynamics.nc and modes.nc; marks along the axis are natural frequencies by phasing.
-    """
+def _mesh_force_spectra(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
+    """Amplitudes of the mesh forces of planet 1 over the frequency of every harmonic; modes are marked."""
     order = np.argsort(dynamics["mesh_frequency"].values)
     hertz = dynamics["mesh_frequency"].values[order]
-    force = np.hypot(dynamics["mesh_force_real"].values, dynamics["mesh_force_imag"].values)[order]
+    force = np.abs(harmonics_of(dynamics, "mesh_force"))[order]
     count = min(_HARMONICS, force.shape[-1] - 1)
     names, n = [str(name) for name in dynamics["mesh"].values], dynamics.sizes["mesh"] // 2
     figure, axes = new_figure(rows=2, height=7.4, sharex=True)
@@ -347,16 +278,24 @@ def _mark(ax, modes: xr.Dataset, top: float) -> None:
             )  # fmt: skip
 
 
+def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
+    modes, static, gears = drawn.data["modes"], drawn.data.get("static"), planetary_set(drawn.case)
+    figures = {
+        "spatial_mode_shapes": spatial_mode_shapes(modes, gears),
+        "mesh_phasing": phase_diagram(phasing_of_set(gears)),
+    }
+    if "helical_stiffness" in modes and static is not None:
+        figures["helical_mesh_stiffness"] = _mesh_stiffness(modes, static)
+    return figures
+
+
 def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
     dynamics, modes = drawn.data["dynamics"], drawn.data["modes"]
-    figures = {
-        "dynamic_spectrum": transmission_error_spectrum(dynamics),
-        "dynamic_transmission_error": transmission_errors(dynamics, modes),
-        "mesh_force_spectra": mesh_force_figure(dynamics, modes),
-    }
-    if dynamics.sizes["speed"] > MANY_SPEEDS:
-        figures["speed_sweep"] = speed_sweep(dynamics)
-    return figures
+    return response_figures(
+        dynamics,
+        dynamic_transmission_error=transmission_errors(dynamics, modes),
+        mesh_force_spectra=_mesh_force_spectra(dynamics, modes),
+    )
 
 
 FIGURES = {
@@ -386,25 +325,11 @@ FIGURES = {
                 "mode of that kind."
             ),
         },
-        draw=lambda drawn: helical_modes_figures(
-            drawn.data["modes"], planetary_set(drawn.case), drawn.data.get("static")
-        ),
+        draw=_modes_figures,
     ),
     "dynamics": Figures(
-        {
-            "dynamic_transmission_error": (
-                "Dynamic transmission error over one mesh period (thick) beside the static one of the set "
-                "on its supports, both without their mean. The thin static curve has the harmonics of the "
-                "excitation alone: what rings in both curves is the cut series, not vibration. Pale: the "
-                "whole static curve."
-            ),
-            "dynamic_spectrum": (
-                "Harmonics of the dynamic transmission error, down to five decades below the largest."
-            ),
-            "speed_sweep": (
-                "Fluctuation of the transmission error over the speed, and the verdicts on the solution: "
-                "the fixed point contracts below 1, the motion is stable up to 1."
-            ),
+        RESPONSE_CAPTIONS
+        | {
             "mesh_force_spectra": (
                 "Mesh forces of planet 1 along the tooth normals over the frequency of each harmonic, h "
                 "times the mesh frequency. Marks along the axis are natural frequencies by the phasing of "

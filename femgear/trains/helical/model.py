@@ -1,60 +1,68 @@
-"""Helical planetary set of rigid bodies that move in space: data, excitation, modes, forced response.
+"""Helical planetary set of rigid bodies that move in space: the set of a case, and what its teeth excite.
 
 Carrier, ring, sun and N planets have three translations and three rotations each, 6 (N + 3) coordinates.
 A. Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
 springs along the tooth normals, supports and planet pins in all directions, without terms of the carrier's
 speed. The matrices are those of `femgear.system.assembler.gear_set_system`; with the meshes as elements,
-`helical_problem`, they have a stiffness that changes, play and contact loss.
+`femgear.trains.gear_set.gear_set_problem`, they have a stiffness that changes, play and contact loss.
 
-The mesh stiffness follows from that of spur teeth. A helical gear is cut across its axis into thin slices,
-each of them a spur gear that is turned by the helix against its neighbour, and the slices carry side by side
-without any coupling between them (thin-slice approximation, J. D. Smith, Gear Noise and Vibration, 2nd ed.,
-2003). It leaves out that loaded slices draw unloaded neighbours along, and that teeth are softer at their
-ends. Each slice has the stiffness of the spur gear of its normal section, per length of the contact line.
+The mesh stiffness follows from that of spur teeth. Teeth are solved as spur gears of the transverse section;
+those of the normal section, the virtual gears, tell by how much their stiffness differs. A helical gear is
+cut across its axis into thin slices, each of them a spur gear that is turned by the helix against its
+neighbour, and the slices carry side by side without any coupling between them (thin-slice approximation,
+J. D. Smith, Gear Noise and Vibration, 2nd ed., 2003). It leaves out that loaded slices draw unloaded
+neighbours along, and that teeth are softer at their ends. Each slice has the stiffness of the spur gear of
+its normal section, per length of the contact line.
 
-The forced response to transmission errors is a modal summation, which also gives the loads of meshes, pins
-and bearings.
+Refused before anything is computed are supports that are missing and torques too large.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.case.case import material_of
+from femgear.contact.bodies import make_bodies, make_sectors
+from femgear.contact.cycle import walk_mesh_cycle
+from femgear.errors import CaseError, ConvergenceError, GeometryError
 from femgear.gears import profile
-from femgear.solvers.linear.modal import residual_output, solve_modes, viscous_damping
-from femgear.solvers.linear.receptance import MeshErrorResponse
-from femgear.system.assembler import check_mesh_columns, gear_set_system, mesh_elements
-from femgear.system.elements import GearMeshes
-from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis
+from femgear.gears.kinematics import torques
+from femgear.gears.planetary import virtual_set
+from femgear.solvers.linear.modal import solve_modes
+from femgear.system.assembler import gear_set_system
 from femgear.system.rigid_bodies import (
     ContactLines,
+    HelicalBody,
     HelicalSupport,
-    PlanarTorque,
     RigidSet,
     check_support,
     gear_geometry,
     refuse,
 )
-from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem
+from femgear.system.system import MeshExcitation
+from femgear.trains.helical.section import HelicalCase
+from femgear.trains.protocol import one_blas_thread
+from femgear.trains.rigid import check_one_period, driving_torque, mesh_stiffnesses, needed, torsional_support
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
 
-CONTACT_POINTS = ("pitch_point", "base_circles")
 # Rounded numbers miss each other by less than 1 %, other distances or angles than those of the gears by more.
-LARGEST_CLOSURE = 0.1
-
-# Relative distance of frequencies that rounding alone makes.
-_ONE_FREQUENCY = 1e-9
-
-# Distance to an undamped pole, relative to it, below which the response is infinite.
-_RESONANT = 1e-12
+_CLOSURE = 0.1
+# both sections are solved on the same grid, and only the ratio of their stiffnesses counts
+FLANK_ELEMENTS, POSITIONS = 8, 16
+# any stiffness shows whether something takes up the load [N/m, N m/rad]
+_TRIAL = 1e8
+# entries of the supports that helical teeth ask for, their directions, and what they take up
+_AXES = {"axial_stiffness": ("axial", "thrust"), "tilt_stiffness": ("tilt", "tilting moments")}
+# c' of steel teeth [N/m^2] and Young's modulus of steel [Pa] (ISO 6336-1, method B); what teeth give way by
+# before nothing is left of their contact [modules]
+_TOOTH, _STEEL, _MOST = 14e9, 206e9, 0.25
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,33 +92,36 @@ class HelicalSet(RigidSet):
     Raises
     ------
     CaseError
-        Numbers that no set can have, planet angles that are none, unordered or span more than a turn, or
-        radii, centre distance and pressure angles that miss each other by more than 10 % (E-RANGE).
-        `closure` tells by how much they do.
+        As `RigidSet`, and radii, centre distance and pressure angles that miss each other by more than 10 %
+        (E-RANGE). `closure` tells by how much they do.
     """
 
     base_helix_angle: float
     planet_bearing: HelicalSupport
-    contact_points: str = "pitch_point"
+    contact_points: Literal["pitch_point", "base_circles"] = "pitch_point"
     slices: int = 1
     face_width: float = 0.0
 
     def __post_init__(self):
         super().__post_init__()
-        if self.ring_radius <= self.planet_radius:
-            allowed = f"above the {self.planet_radius} m of the planets"
-            refuse("ring_radius", self.ring_radius, "m", allowed)
-        if not abs(self._numbers("base_helix_angle", 0)) < 0.5 * math.pi:
-            allowed = "between -pi/2 and pi/2"
-            refuse("base_helix_angle", self.base_helix_angle, "rad", allowed, remedy="give radians")
         check_support("planet_bearing", self.planet_bearing, count=self.n_planets)
-        _check_contact(self)
-        _check_closure(self)
+        if self.contact_points not in ("pitch_point", "base_circles"):
+            refuse("contact_points", repr(self.contact_points), "", "pitch_point or base_circles")
+        if not abs(self.base_helix_angle) < 0.5 * math.pi:
+            refuse("base_helix_angle", self.base_helix_angle, "rad", "between -pi/2 and pi/2")
+        worst = max(self.closure, key=abs)
+        if abs(worst) > _CLOSURE:
+            raise CaseError(
+                f"centre distance of {self.centre_distance} m", code="E-RANGE", key="centre_distance",
+                value=self.centre_distance,
+                limit=f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {_CLOSURE:.0%}",
+                remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
+            )  # fmt: skip
 
     @property
     def column_stiffness(self) -> np.ndarray:
         """Mean stiffness of the 2N S columns of ``W`` [N/m], the slices of a mesh side by side."""
-        return self.per_column(self.mesh_stiffness) / self.slices
+        return np.repeat(self.mesh_stiffness, self.slices) / self.slices
 
     @property
     def slice_heights(self) -> np.ndarray:
@@ -128,30 +139,47 @@ class HelicalSet(RigidSet):
         heights = tuple(self.slice_heights.tolist())
         return ContactLines(self.base_helix_angle, heights, self.contact_points == "base_circles")
 
-    def per_column(self, values) -> np.ndarray:
-        """Values (2N, ...) of the meshes repeated for their slices, (2N S, ...)."""
-        return np.repeat(np.asarray(values), self.slices, axis=0)
 
-
-def helical_from_set(planetary_set: PlanetarySet, *, helix_angle: float, **data: Any) -> HelicalSet:
-    """Make a helical set with the radii and angles of a geared one.
+def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) -> HelicalSet:
+    """Make the helical set of a case: bodies and supports of its entries, radii and angles of its gears.
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
-        Its gears in the transverse section: transverse module and pressure angle.
-    helix_angle : float
-        beta at the reference circle [rad], positive for a right-handed sun; ``tan beta_b = tan beta cos
-        alpha_t`` (ISO 21771, section 4.2.6).
-    **data
-        Bodies, stiffnesses, bearing, contact points and slices of `HelicalSet`.
+    case : Case
+    gears : PlanetarySet
+        Of the transverse section.
+    mesh_stiffness : (2N,) array, optional
+        Mean stiffnesses along the tooth normals [N/m] where the case gives none.
     """
-    base = math.atan(math.tan(helix_angle) * math.cos(planetary_set.sun.pressure_angle))
-    return HelicalSet(base_helix_angle=base, **data, **gear_geometry(planetary_set))
+    helical = case.helical
+    bodies = {}
+    for name, one in (("sun", case.sun), ("ring", helical.ring), ("carrier", case.carrier)):
+        space = getattr(helical, name)
+        torsional = torsional_support(case, name, space.torsional_stiffness)
+        radial = needed(one.support_stiffness, f"{name}.support_stiffness")
+        support = HelicalSupport(radial, space.axial_stiffness, space.tilt_stiffness, torsional)
+        bodies[name] = HelicalBody(one.mass, one.inertia, space.diametral_inertia, support)
+    pin = helical.planet
+    return HelicalSet(
+        **gear_geometry(gears),
+        base_helix_angle=profile.base_helix_angle(case.sun.pressure_angle, helical.signed_helix_angle),
+        **bodies,
+        planet=HelicalBody(case.planet.mass, case.planet.inertia, pin.diametral_inertia),
+        **mesh_stiffnesses(helical.mesh_stiffness, mesh_stiffness),
+        planet_bearing=HelicalSupport(
+            case.planet.bearing_stiffness,
+            pin.axial_stiffness,
+            pin.tilt_stiffness,
+            pin.torsional_stiffness or 0.0,
+        ),
+        contact_points=helical.contact_points,
+        slices=helical.slices,
+        face_width=case.set.face_width,
+    )
 
 
 def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_width: float) -> np.ndarray:
-    """Transverse and overlap contact ratio (2, 2) of the sun-planet and the planet-ring mesh.
+    """Compute the transverse and overlap contact ratio (2, 2) of the sun-planet and the planet-ring mesh.
 
     ``eps_gamma = eps_alpha + eps_beta``, ``eps_beta = b sin|beta| / (pi m_n)`` (ISO 21771, sections 5.4.2.3
     and 5.4.4); a row is one mesh.
@@ -171,65 +199,10 @@ def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float, face_widt
     return np.array([[s.contact_ratio_sun_planet, overlap], [s.contact_ratio_planet_ring, overlap]])
 
 
-def _check_contact(data: HelicalSet) -> None:
-    if data.contact_points not in CONTACT_POINTS:
-        refuse("contact_points", repr(data.contact_points), "", " or ".join(CONTACT_POINTS))
-    if isinstance(data.slices, bool) or int(data.slices) != data.slices or data.slices < 1:
-        refuse("slices", data.slices, "", "a whole number of 1 or more")
-    if not (math.isfinite(data.face_width) and data.face_width >= 0.0):
-        refuse("face_width", data.face_width, "m", "finite, 0 or more")
-    if data.slices > 1 and not data.face_width:
-        refuse("face_width", data.face_width, "m", "above 0 for several slices")
-
-
-def _check_closure(data: HelicalSet) -> None:
-    worst = max(data.closure, key=abs)
-    if abs(worst) > LARGEST_CLOSURE:
-        refuse(
-            "centre_distance", data.centre_distance, "m",
-            f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {LARGEST_CLOSURE:.0%}",
-            remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
-        )  # fmt: skip
-
-
-def helical_problem(
-    data: HelicalSet,
-    *,
-    meshes: GearMeshes | None = None,
-    torque: PlanarTorque | None = None,
-    damping: float | np.ndarray | None = None,
-) -> NonlinearSystem:
-    """Helical set with its meshes as elements, for harmonic balance and time integration.
-
-    Back flanks act on the line of the drive flanks: there is no wedging.
-
-    Parameters
-    ----------
-    data : HelicalSet
-    meshes : GearMeshes, optional
-        From `mesh_elements`; constant stiffnesses without back side when not given.
-    torque : PlanarTorque, optional
-    damping : float, (n_modes,) array or (n, n) array, optional
-        Damping ratio of all modes, or one a mode, with mean stiffnesses; or the matrix ``C``.
-
-    Raises
-    ------
-    CaseError
-        A load that accelerates the set (E-LOAD-BALANCE), arrays that do not fit (E-SHAPE).
-    """
-    meshes = mesh_elements(data) if meshes is None else meshes
-    check_mesh_columns(data, meshes)
-    system = gear_set_system(data, torque=torque)
-    reference = NonlinearSystem(system, (meshes,)).reference
-    # refuses a load that nothing takes up before a solver drifts away with it
-    solve_modes(system, reference)
-    return NonlinearSystem(replace(system, C=viscous_damping(system, reference, damping)), (meshes,))
-
-
 def helical_excitation(
     record: MeshExcitation, overlap_ratio, *, slices: int = 1, hand: int = 1
 ) -> MeshExcitation:
-    """Record of helical meshes, or of their slices, from that of spur meshes with the same mesh period.
+    """Make the record of helical meshes, or of their slices, from that of spur meshes of the same period.
 
     Height z above mid-face runs ahead of it by ``eps_beta z / b`` mesh periods, so that
 
@@ -264,12 +237,11 @@ def helical_excitation(
     Raises
     ------
     CaseError
-        Overlap ratios, slices or a hand that cannot be (E-RANGE), a slice that loses its stiffness
-        (E-STIFFNESS).
+        A slice that loses its stiffness (E-STIFFNESS).
     """
     count = len(record.stiffness)
-    ahead = slice_phases(np.zeros(count), overlap_ratio, slices=slices, hand=hand).reshape(count, slices)
-    overlap = _overlap(overlap_ratio, count)
+    overlap = np.broadcast_to(np.asarray(overlap_ratio, float), count)
+    ahead = slice_phases(np.zeros(count), overlap, slices=slices, hand=hand).reshape(count, slices)
     backlash = np.broadcast_to(getattr(record, "backlash", 0.0), count)
     filtered = [
         _sliced(values, record.periods, ahead, overlap / slices) / slices
@@ -291,7 +263,7 @@ def helical_excitation(
 
 
 def slice_phases(phases, overlap_ratio, *, slices: int, hand: int = 1) -> np.ndarray:
-    """Phases (n_meshes S,) of the slices of meshes, as fractions of the mesh period.
+    """Compute phases (n_meshes S,) of the slices of meshes, as fractions of the mesh period.
 
     Parameters
     ----------
@@ -301,11 +273,7 @@ def slice_phases(phases, overlap_ratio, *, slices: int, hand: int = 1) -> np.nda
         See `helical_excitation`.
     """
     phases = np.asarray(phases, float)
-    overlap = _overlap(overlap_ratio, len(phases))
-    if isinstance(slices, bool) or int(slices) != slices or slices < 1:
-        raise CaseError(f"{slices} slices of the face width", code="E-RANGE", limit="1 or more")
-    if hand not in (1, -1):
-        raise CaseError(f"a hand of {hand}", code="E-RANGE", limit="1 or -1")
+    overlap = np.broadcast_to(np.asarray(overlap_ratio, float), len(phases))
     height = (np.arange(slices) + 0.5) / slices - 0.5
     return (phases[:, None] + hand * overlap[:, None] * height).ravel()
 
@@ -321,195 +289,262 @@ def _sliced(values: np.ndarray, periods: int, ahead: np.ndarray, width: np.ndarr
     return np.fft.irfft(np.fft.rfft(values)[:, None] * shift, n=count)
 
 
-def _overlap(overlap_ratio, meshes: int) -> np.ndarray:
-    overlap = np.asarray(overlap_ratio, float)
-    if overlap.shape not in ((), (meshes,)) or not np.all(np.isfinite(overlap)) or np.any(overlap < 0.0):
-        raise CaseError(
-            f"overlap ratios {overlap.tolist()}", code="E-RANGE", key="overlap_ratio",
-            limit=f"one number of 0 or more, or {meshes}", remedy="give b sin|beta| / (pi m_n)",
-        )  # fmt: skip
-    return np.broadcast_to(overlap, (meshes,))
-
-
-def helical_modes(
-    data: HelicalSet,
-    *,
-    system: MechanicalSystem | None = None,
-    mesh_stiffness=None,
-    damping_ratio: float = 0.0,
-    max_frequency: float | None = None,
-) -> Modes:
-    """Solve for the modes of the set at standstill, with their kinds.
+@dataclass(frozen=True)
+class SectionStiffness:
+    """Stiffness of one tooth pair in the transverse section and in the normal one.
 
     Parameters
     ----------
-    data : HelicalSet
-    system : MechanicalSystem, optional
-        `gear_set_system` of the set, with the flanks that a torque loads; without torque when not given.
-    mesh_stiffness : (2N S,) array, optional
-        Of the columns [N/m]; that of the set when not given.
-    damping_ratio : float
-        Of all modes.
-    max_frequency : float, optional
-        Keep the modes up to this frequency [Hz]; all when not given.
-
-    Returns
-    -------
-    Modes
-        ``kind`` from `gear_set_kinds`; modes of one frequency have one phasing each.
+    teeth : (3,) tuple of int
+        Of the virtual sun, planet and ring.
+    transverse, normal : (2,) array
+        Mean stiffness c' of a tooth pair [N/m^2] of the sun-planet and the planet-ring mesh: of the
+        transverse section, per face width along the transverse line of action; of the virtual gears, per
+        length of the contact line along the tooth normal.
+    base_helix_angle : float
+        [rad]
     """
-    system = gear_set_system(data) if system is None else system
-    stiffness = data.column_stiffness if mesh_stiffness is None else mesh_stiffness
-    modes = solve_modes(system, stiffness, damping_ratio=damping_ratio, max_frequency=max_frequency)
-    # tilts of the planets that no mesh feels have one frequency in several classes
-    Q = phase_basis(gear_set_motions(data, modes.shape), modes.frequency, tolerance=_ONE_FREQUENCY)
-    shape = modes.shape @ Q
-    return replace(
-        modes,
-        shape=shape,
-        mesh_deflection=modes.mesh_deflection @ Q,
-        modal_load=None if modes.modal_load is None else Q.T @ modes.modal_load,
-        kind=gear_set_kinds(data, shape, frequency=modes.frequency),
-    )
+
+    teeth: tuple[int, int, int]
+    transverse: np.ndarray
+    normal: np.ndarray
+    base_helix_angle: float
+
+    @property
+    def factor(self) -> np.ndarray:
+        """``c'_n cos(beta_b) / c'_t`` (2,): helical stiffness over that of the transverse section.
+
+        A piece dz of the face width holds ``dz / cos beta_b`` of contact line. A turn that closes the
+        transverse line of action by d closes the normal by ``d cos beta_b``, and of the normal force the
+        part ``cos beta_b`` makes torque: ``dF_t = c'_n (dz / cos beta_b) cos^2 beta_b d``. ISO 6336-1,
+        method B, likewise takes c' of virtual gears times ``cos beta``.
+        """
+        return self.normal * math.cos(self.base_helix_angle) / self.transverse
 
 
-def modal_error_response(
-    system: MechanicalSystem, modes: Modes, mesh_frequency, error, *, harmonics=None, outputs=None
-) -> MeshErrorResponse:
-    """Response to transmission errors ``e_j(t) = Re sum_h error_jh exp(i h omega_m t)`` by summing modes.
+@one_blas_thread()
+def section_stiffness(
+    case: HelicalCase, gears: PlanetarySet, *, cache: Path | None = None
+) -> SectionStiffness:
+    """Compute the stiffness of the teeth of both sections, from one planet each under equal load a length.
 
-    ``q = sum phi (phi^T W k e) / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega)``, with the static
-    flexibility of modes that were left out (Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 2.9;
-    A. Kahraman, J. Mech. Des. 116, 1994, 713-720, sums all modes). Many cases share one gain. A transmission
-    error does no work on rigid motions, so that these stay at rest.
-    `femgear.solvers.linear.receptance.direct_response` is the direct solution.
+    The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse.
 
     Parameters
     ----------
-    system : MechanicalSystem
-    modes : Modes
-        Of that system; ``modes.mesh_stiffness`` are the stiffnesses ``k`` of the columns of ``W``.
-    mesh_frequency : (F,) array
-        [Hz]
-    error : (n_columns, H) or (n_cases, n_columns, H) complex array
-        [m]; of one case the result has a first axis of length one. For phases phi_j as fractions of the mesh
-        period, ``k_j(tau) = k(tau + phi_j)``, it is ``e_h exp(2 pi i h phi_j)``, see `phased_errors`.
-    harmonics : (H,) int array, optional
-        Whole numbers from 1; 1 to H when not given.
-    outputs : (n_outputs, n) array, optional
-        ``L``, such as the rows of `spring_loads`; none when not given.
-
-    Returns
-    -------
-    MeshErrorResponse
-        With a first axis of the cases: deflection and force (n_cases, F, H, n_columns), output (n_cases, F,
-        H, n_outputs).
+    case : Case
+        With a section helical.
+    gears : PlanetarySet
+        Of its transverse section.
+    cache : path, optional
+        Folder of generated grids.
 
     Raises
     ------
     CaseError
-        Errors or harmonics that do not fit (E-SHAPE), harmonics or frequencies that are none (E-HARMONICS,
-        E-RANGE).
-    ConvergenceError
-        An undamped resonance (E-RESONANCE).
+        Virtual gears that cannot be made (E-GEOMETRY).
+    GridError, ContactError
     """
-    k, count = modes.mesh_stiffness, len(system.M)
-    error, harmonics = _errors(error, harmonics, len(k))
-    frequency = _frequencies(mesh_frequency)
-    rows = np.empty((0, count)) if outputs is None else np.atleast_2d(np.asarray(outputs, float))
-    elastic = modes.frequency > 0.0
-    left = np.vstack([system.W.T, rows]) @ modes.shape[:, elastic]
-    gain = _gain(modes, elastic, np.outer(frequency, harmonics))
-    # forces k e of the errors on the meshes, and on the modes
-    push = k[:, None] * error
-    modal = np.einsum("jm,cjh->chm", modes.mesh_deflection[:, elastic], push)
-    static = np.zeros((len(error), len(harmonics), len(left)))
-    if modes.shape.shape[1] < count:
-        rest = np.vstack([modes.residual, residual_output(system, modes, rows)])
-        static = np.einsum("oj,cjh->cho", rest, push)
-    answer = np.empty((len(error), len(frequency), len(harmonics), len(left)), complex)
-    for h in range(len(harmonics)):
-        answer[:, :, h] = (gain[:, h] * modal[:, None, h]) @ left.T + static[:, None, h]
-    deflection, output = answer[..., : len(k)], answer[..., len(k) :]
-    force = k * (deflection - error.transpose(0, 2, 1)[:, None])
-    return MeshErrorResponse(frequency, harmonics, deflection, force, output)
+    virtual = _virtual_gears(case, gears)
+    single = replace(gears, planet_angles=gears.planet_angles[:1])
+    load = _line_load(case, gears)
+    transverse, normal = (_pair_stiffness(case, one, load, cache) for one in (single, virtual))
+    teeth = (virtual.sun.teeth, virtual.planet.teeth, virtual.ring.teeth)
+    base = profile.base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
+    return SectionStiffness(teeth, transverse, normal, base)
 
 
-def phased_errors(amplitudes, phases) -> np.ndarray:
-    """Transmission errors (n_meshes, H) of meshes that follow each other.
+def _virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
+    """Virtual gears of the normal section of a case; refused where they cannot be made (E-GEOMETRY)."""
+    try:
+        return virtual_set(gears, case.helical.helix_angle)
+    except GeometryError as error:
+        raise CaseError(
+            f"the virtual gears of the normal section cannot be made: {error.message}",
+            code="E-GEOMETRY",
+            key="helical.section",
+            value=case.helical.section,
+            limit='"transverse" for these teeth',
+            remedy='write section = "transverse": teeth then are those of the transverse section, too stiff',
+            file=case.location("helical.section"),
+        ) from None
+
+
+def normal_record(
+    record: MeshExcitation, factor: np.ndarray, base_helix_angle: float, *, reversed_time: bool = False
+) -> MeshExcitation:
+    """Make the record along tooth normals, without overlap, from spur gears of the transverse section.
+
+    ``k_n = factor k_t / cos^2 beta_b``, ``F_n = F_t / cos beta_b``; the tangent line of force over deflection
+    keeps its intercept ``d_t - F_t / k_t``, which holds deviations of the flanks, and changes its slope:
+    ``d_n = (d_t - F_t / k_t + F_t / (factor k_t)) cos beta_b``.
 
     Parameters
     ----------
-    amplitudes : (H,) or (n_meshes, H) complex array
-        Harmonics 1 to H at phase zero [m].
-    phases : (n_meshes,) array
-        phi_j as fractions of the mesh period, ``e_j(tau) = e(tau + phi_j)``: `PlanetarySet.mesh_phases`.
+    record : MeshExcitation
+        Along the transverse line of action, 2N rows.
+    factor : (2,) array
+        Of the sun-planet and the planet-ring meshes.
+    base_helix_angle : float
+        [rad]
+    reversed_time : bool
+        For a sun that turns clockwise against the carrier: positions of the record run the other way.
     """
-    amplitudes, phases = np.asarray(amplitudes, complex), np.asarray(phases, float)
-    turns = phases[:, None] * np.arange(1, amplitudes.shape[-1] + 1)
-    return amplitudes * np.exp(2j * np.pi * turns)
+    scale = np.repeat(np.asarray(factor, float), len(record.stiffness) // 2)[:, None]
+    along = math.cos(base_helix_angle)
+    softer = record.force / record.stiffness * (1.0 / scale - 1.0)
+    values = [
+        record.stiffness * scale / along**2,
+        (record.deflection + softer) * along,
+        record.force / along,
+    ]
+    if reversed_time:
+        values = [np.roll(one[:, ::-1], 1, axis=1) for one in values]
+    return MeshExcitation(*values, backlash=record.backlash * along, periods=record.periods)
 
 
-def spring_loads(springs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names and rows (n_outputs, n) that read the loads of springs from the coordinates.
+def shared_load(record: MeshExcitation) -> MeshExcitation:
+    """Move tangent lines to the static state of a set with fixed centres.
+
+    Each planet passes the force on that it takes, ``F = k_s (d_s - e_s) = k_r (d_r - e_r)``, and one rotation
+    of the sun closes the meshes of all planets, ``d_s + d_r = X``; the forces on the sun add up to those of
+    the record.
 
     Parameters
     ----------
-    springs : mapping of str to (columns (n, g), stiffness (g,))
-        Columns and stiffnesses by name; those of meshes give ``k W^T q`` without the
-        transmission error, whose force is in `MeshErrorResponse.force`.
-
-    Returns
-    -------
-    names : tuple of str
-        The name of the spring, with ``1`` and ``2`` behind it where it has two columns or more.
-    rows : (n_outputs, n) array
-        [N/m, N m/rad and the like]
+    record : MeshExcitation
+        2N rows, one a mesh.
     """
-    names, rows = [], []
-    for name, (columns, stiffness) in springs.items():
-        several = len(stiffness) > 1
-        names += [f"{name} {i + 1}" if several else name for i in range(len(stiffness))]
-        rows.append((columns * stiffness).T)
-    return tuple(names), np.vstack(rows)
+    meshes = (2, len(record.stiffness) // 2, -1)
+    k = record.stiffness.reshape(meshes)
+    intercept = (record.deflection - record.force / record.stiffness).reshape(meshes)
+    compliance, gap = (1.0 / k).sum(axis=0), intercept.sum(axis=0)
+    total = record.force.reshape(meshes)[0].sum(axis=0)
+    closing = (total + (gap / compliance).sum(axis=0)) / (1.0 / compliance).sum(axis=0)
+    force = (closing - gap) / compliance
+    deflection = intercept + force / k
+    return replace(
+        record, force=np.concatenate([force, force]), deflection=deflection.reshape(record.deflection.shape)
+    )
 
 
-def _errors(error, harmonics, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    error = np.asarray(error, complex)
-    error = error[None] if error.ndim == 2 else error
-    harmonics = np.arange(1, error.shape[-1] + 1) if harmonics is None else np.atleast_1d(harmonics)
-    if harmonics.ndim != 1 or harmonics.dtype.kind not in "iu" or np.any(harmonics < 1):
+def _line_load(case: HelicalCase, gears: PlanetarySet) -> float:
+    """Load a width of each sun mesh in the transverse section, which is that a length of contact line [N/m].
+
+    ``F_n / (b / cos beta_b)`` with ``F_n = F_t / cos beta_b``.
+    """
+    sun = torques(gears, member=case.operation.input, torque=case.operation.torque).sun
+    return abs(sun) / (gears.n_planets * gears.sun.base_radius * gears.sun.face_width)
+
+
+def _pair_stiffness(case: HelicalCase, gears: PlanetarySet, load: float, cache: Path | None) -> np.ndarray:
+    """Mean stiffness of a tooth pair per width (2,) of the meshes of one planet [N/m^2]."""
+    material = material_of(case)
+    sectors = make_sectors(gears, material, flank_elements=FLANK_ELEMENTS, cache=cache)
+    width = gears.sun.face_width
+    cycle = walk_mesh_cycle(
+        gears,
+        make_bodies(sectors, material),
+        sun_torque=load * width * gears.sun.base_radius,
+        positions=POSITIONS,
+        contact=case.static.contact,
+    )
+    ratios = np.array([gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring])
+    return cycle.stiffness.mean(axis=1) / (width * ratios)
+
+
+def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
+    """Refuse what the helical model cannot represent, before anything is computed.
+
+    Raises
+    ------
+    CaseError
+        E-MECHANISM: torque, thrust or tilting moments that nothing takes up. E-RANGE: stiffnesses too far
+        apart, a torque that no teeth carry. E-PERIODS: a static record of several mesh
+        periods. E-GEOMETRY: virtual gears that cannot be made.
+    """
+    _check_supports(case, gears)
+    if case.helical.mesh_stiffness is not None:
+        return
+    _check_torque(case, gears)
+    check_one_period(case, gears, "the helical model takes")
+    if case.helical.section == "normal":
+        _virtual_gears(case, gears)
+
+
+def _check_torque(case: HelicalCase, gears: PlanetarySet) -> None:
+    """A load under which teeth would give way by a large part of their height has no static solution."""
+    stiffness = _TOOTH * case.material.youngs_modulus / _STEEL
+    share = _line_load(case, gears) / (stiffness * gears.sun.module)
+    if share > _MOST:
         raise CaseError(
-            f"harmonics {harmonics.tolist()} of the mesh frequency", code="E-HARMONICS", key="harmonics",
-            limit="whole numbers from 1", remedy="the mean of a transmission error is a static load",
-        )  # fmt: skip
-    if error.shape[1:] != (columns, len(harmonics)) or not np.all(np.isfinite(error)):
+            f"a tooth pair would give way by {share:.3g} modules under this torque",
+            code="E-RANGE",
+            key="operation.torque",
+            value=f"{case.operation.torque:.6g} N m",
+            limit=f"{abs(case.operation.torque) * _MOST / share:.3g} N m, by {_MOST} modules, for this set",
+            remedy="check the unit of the torque, or give the teeth a wider face or a larger module",
+            file=case.location("operation.torque"),
+        )
+
+
+def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
+    """The thrust of helical teeth needs axial supports and its moments tilt supports."""
+    data = helical_data(case, gears, np.full(2 * gears.n_planets, _TRIAL))
+    try:
+        balanced = _balanced(case, data)
+    except ConvergenceError as error:
+        if error.code != "E-RIGID-MODE":
+            raise
         raise CaseError(
-            f"transmission errors of shape {error.shape}", code="E-SHAPE",
-            limit=f"(cases, {columns} meshes, {len(harmonics)} harmonics), finite",
-        )  # fmt: skip
-    return error, harmonics
+            "the stiffest supports are too stiff beside the softest: rounding hides the soft ones",
+            code="E-RANGE",
+            key="helical",
+            limit="tilt and torsional stiffnesses over the radius squared within 1e17 N/m",
+            remedy="lower the largest axial_stiffness, tilt_stiffness or torsional_stiffness",
+            file=case.location("helical"),
+        ) from None
+    if not balanced:
+        _refuse_loose(case, data)
 
 
-def _frequencies(mesh_frequency) -> np.ndarray:
-    frequency = np.atleast_1d(np.asarray(mesh_frequency, float))
-    if frequency.ndim != 1 or not np.all(np.isfinite(frequency)) or np.any(frequency < 0.0):
-        raise CaseError(
-            f"mesh frequencies of shape {frequency.shape}", code="E-RANGE", key="mesh_frequency",
-            limit="a list of numbers >= 0 Hz",
-        )  # fmt: skip
-    return frequency
+def _balanced(case: HelicalCase, data: HelicalSet) -> bool:
+    """Whether supports take up what the torque asks of them."""
+    try:
+        solve_modes(gear_set_system(data, torque=driving_torque(case)), data.column_stiffness)
+    except CaseError as error:
+        if error.code != "E-LOAD-BALANCE":
+            raise
+        return False
+    return True
 
 
-def _gain(modes: Modes, elastic: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """``1 / (omega_k^2 - omega^2 + 2 i zeta_k omega_k omega)`` (F, H, m)."""
-    natural, w = 2.0 * np.pi * modes.frequency[elastic], 2.0 * np.pi * frequency[..., None]
-    below = natural**2 - w**2 + 2j * modes.damping_ratio[elastic] * natural * w
-    bad = np.abs(below) <= _RESONANT * np.maximum(natural**2, w**2)
-    if np.any(bad):
-        mode = int(np.argwhere(bad)[0, -1])
-        raise ConvergenceError(
-            f"undamped resonance at {natural[mode] / (2 * np.pi):.6g} Hz: infinite response",
-            code="E-RESONANCE", remedy="give the motion some damping or move the frequency",
-        )  # fmt: skip
-    return 1.0 / below
+def _refuse_loose(case: HelicalCase, data: HelicalSet) -> None:
+    """Name the supports of zero stiffness that would each take up what nothing takes up."""
+    free = [
+        (body, entry)
+        for body in ("sun", "ring", "carrier", "planet")
+        for entry in _AXES
+        if getattr(getattr(case.helical, body), entry) == 0.0
+    ]
+    cures = [one for one in free if _balanced(case, _supported(data, *one))] or free
+    names = [f"helical.{body}.{entry}" for body, entry in cures]
+    lost = " or the ".join(dict.fromkeys(_AXES[entry][1] for _, entry in cures)) or "torque"
+    raise CaseError(
+        f"nothing takes up the {lost} of the helical teeth",
+        code="E-MECHANISM",
+        key=names[0] if names else "helical",
+        value="0" if names else None,
+        limit=f"above 0: {' or '.join(names)}" if names else "supports of sun, ring and carrier above 0",
+        remedy="give axial_stiffness, tilt_stiffness and support_stiffness",
+        file=case.location(names[0] if names else "helical"),
+    )
+
+
+def _supported(data: HelicalSet, body: str, entry: str) -> HelicalSet:
+    """The same set with one support that was missing."""
+    change = {_AXES[entry][0]: _TRIAL}
+    if body == "planet":
+        return replace(data, planet_bearing=replace(data.planet_bearing, **change))
+    one = getattr(data, body)
+    return replace(data, **{body: replace(one, support=replace(one.support, **change))})

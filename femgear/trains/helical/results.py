@@ -25,9 +25,9 @@ from femgear.storage.dataset import (
     response_entries,
 )
 from femgear.system.system import MeshExcitation
-from femgear.trains.helical.model import contact_ratios
-from femgear.trains.helical.setup import SectionStiffness
-from femgear.trains.rigid import modes_entries, stiffness_text, torsion_text
+from femgear.trains.gear_set import modes_dataset
+from femgear.trains.helical.model import HelicalSet, SectionStiffness, contact_ratios
+from femgear.trains.rigid import stiffness_text, torsion_text
 from femgear.trains.static.description import static_warnings
 
 if TYPE_CHECKING:
@@ -37,10 +37,7 @@ if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
     from femgear.solvers.stability.parametric import Stability
     from femgear.system.system import MechanicalSystem, Modes, Response
-    from femgear.trains.helical.model import HelicalSet
     from femgear.trains.helical.section import HelicalCase
-
-AXES = ("x", "y", "z", "tilt x", "tilt y", "rotation")
 
 _BODIES = (
     "", "mass [kg]", "polar, diametral inertia [kg m^2]", "radial, axial [N/m]", "tilt, torsional [N m/rad]",
@@ -67,42 +64,30 @@ class HelicalModesResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
-        from femgear.system.assembler import free_motions
-
-        modes, data = self.modes, self.data
-        meshes = (2 * data.n_planets, data.slices)
-        deflection = modes.mesh_deflection.reshape(*meshes, -1).mean(axis=1)
-        variables, coords = modes_entries(data, modes, free_motions(data), AXES, self.phasing)
-        variables |= {
-            "mesh_stiffness": (
-                ("mesh",), modes.mesh_stiffness.reshape(meshes).sum(axis=1), "N/m",
-                "mean mesh stiffness along the tooth normals",
-            ),
-            "mesh_deflection": (
-                ("mesh", "mode"), deflection, "kg^-1/2",
-                "mesh deflection of the mode along the tooth normals",
-            ),
-        }  # fmt: skip
-        coords = _coordinates(self) | coords
-        if self.whole is not None:
-            along, whole = np.cos(data.base_helix_angle), self.whole
-            where = ("mesh", "position")
-            variables["helical_stiffness"] = (
+        found = modes_dataset(
+            self.data,
+            self.planetary_set,
+            self.modes,
+            attrs={"title": "modes of the helical set at standstill"} | _attributes(self),
+            phasing=self.phasing,
+            along=" along the tooth normals",
+        )
+        if (whole := self.whole) is None:
+            return found
+        along, where = np.cos(self.data.base_helix_angle), ("mesh", "position")
+        position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
+        curves = {
+            "helical_stiffness": (
                 where, whole.stiffness * along**2, "N/m",
                 "mesh stiffness along the transverse line of action",
-            )  # fmt: skip
-            variables["helical_ste"] = (
+            ),
+            "helical_ste": (
                 where, whole.deflection / along, "m",
                 "static transmission error along the transverse line of action, centres fixed",
-            )  # fmt: skip
-            position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
-            coords["position"] = (("position",), position, "1", "position in mesh periods")
-        return dataset(
-            variables,
-            coords=coords,
-            attrs={"title": "modes of the helical set at standstill", "unknowns": len(modes.shape)}
-            | _attributes(self),
-        )
+            ),
+        }  # fmt: skip
+        coords = {"position": (("position",), position, "1", "position in mesh periods")}
+        return found.merge(dataset(curves, coords=coords, attrs={}))
 
 
 @dataclass(frozen=True)
@@ -128,10 +113,8 @@ class HelicalDynamicsResult:
         force, deflection = response.force.reshape(whole), response.deflection.reshape(whole)
         pin, support = self.loads["pin"], self.loads["support"]
         along = np.cos(data.base_helix_angle)
-        on_planet, on_member = (
-            ("speed", "planet", "direction", "harmonic"),
-            ("speed", "member", "axis", "harmonic"),
-        )
+        on_planet = ("speed", "planet", "direction", "harmonic")
+        on_member = ("speed", "member", "axis", "harmonic")
         entries = (
             (
                 "dte", lines, deflection.mean(axis=2) / along, "m",
@@ -153,7 +136,7 @@ class HelicalDynamicsResult:
         )  # fmt: skip
         return dataset(
             response_entries(self) | complex_entries(entries),
-            coords=_coordinates(basis) | _lines(self),
+            coords=_coordinates(self),
             attrs={
                 "title": "periodic response of the helical set by the spectral method",
                 "message": response.message,
@@ -164,23 +147,19 @@ class HelicalDynamicsResult:
         )
 
 
-def _lines(result: HelicalDynamicsResult) -> dict[str, tuple]:
-    data, harmonics = result.modes.data, np.arange(result.response.force.shape[-1])
-    planets = np.arange(1, data.n_planets + 1)
-    axes, directions = ["x", "y", "z"], ["radial", "tangential", "axial"]
+def _coordinates(result: HelicalDynamicsResult) -> dict[str, tuple]:
+    data, meshes = result.modes.data, list(result.modes.planetary_set.mesh_names)
+    harmonics, planets = np.arange(result.response.force.shape[-1]), np.arange(1, data.n_planets + 1)
     return {
+        "mesh": (("mesh",), meshes, "1", "gear mesh"),
         "speed": (("speed",), result.input_speed / RPM, "rpm", "speed of the input"),
         "harmonic": (("harmonic",), harmonics, "1", "harmonic of the mesh frequency"),
         "slice": (("slice",), data.slice_heights, "m", "height of the slice above mid-face"),
         "planet": (("planet",), planets, "1", "planet"),
-        "direction": (("direction",), directions, "1", "direction at the planet"),
+        "direction": (("direction",), ["radial", "tangential", "axial"], "1", "direction at the planet"),
         "member": (("member",), list(MEMBERS), "1", "member"),
-        "axis": (("axis",), axes, "1", "axis of the frame of the carrier"),
+        "axis": (("axis",), ["x", "y", "z"], "1", "axis of the frame of the carrier"),
     }
-
-
-def _coordinates(result: HelicalModesResult) -> dict[str, tuple]:
-    return {"mesh": (("mesh",), list(result.planetary_set.mesh_names), "1", "gear mesh")}
 
 
 def _attributes(result: HelicalModesResult) -> dict:
@@ -197,7 +176,7 @@ def _attributes(result: HelicalModesResult) -> dict:
 
 
 def describe_helical(case: HelicalCase, planetary: PlanetarySet) -> tuple[Block, ...]:
-    """Helix, contact ratios, bodies and supports of a helical case.
+    """Tabulate helix, contact ratios, bodies and supports of a helical case.
 
     Parameters
     ----------

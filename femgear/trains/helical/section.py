@@ -18,8 +18,8 @@ from femgear.trains.rigid import (
     unheld_member,
 )
 
-LARGEST_HELIX = math.radians(45.0)
-MOST_SLICES = 30
+_LARGEST_HELIX = math.radians(45.0)
+_MOST_SLICES = 30
 # measured with 8 meshes of 10 to 30 slices: the time of one speed grows with the cube of the columns
 _SECONDS = 2.7e-7
 # time that is worth a notice [s]
@@ -67,9 +67,9 @@ class HelicalSection(Section):
     run solves the set of Kahraman in place of the elastic ring.
     """
 
-    helix_angle: Annotated[float, Quantity(ANGLE, 0.0, LARGEST_HELIX)]
+    helix_angle: Annotated[float, Quantity(ANGLE, 0.0, _LARGEST_HELIX)]
     hand: Literal["right", "left"] = "right"
-    slices: Annotated[int, Count(1, MOST_SLICES)] = 1
+    slices: Annotated[int, Count(1, _MOST_SLICES)] = 1
     contact_points: Literal["pitch_point", "base_circles"] = "pitch_point"
     section: Literal["normal", "transverse"] = "normal"
     mesh_stiffness: MeshStiffnessSection | None = None
@@ -151,7 +151,7 @@ class HelicalCase(RigidCase):
 
 
 def check_helical(case: HelicalCase) -> Iterator[CaseError]:
-    """Refusals of what a helical section does not go with."""
+    """Refuse what a helical section does not go with."""
     helical = case.helical
     if helical.helix_angle == 0.0:
         yield CaseError(

@@ -14,8 +14,26 @@ import numpy as np
 from femgear.case.case import planetary_set
 from femgear.case.dependencies import check_entries, static_entries
 from femgear.errors import CaseError
+from femgear.gears import profile
 from femgear.report.tables import describe_modes, describe_response, response_warnings
+from femgear.solvers.linear.modal import output_load, output_response, residual_output
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.solvers.stability.parametric import stability as floquet_verdict
+from femgear.system.assembler import free_motions, gear_set_system, mesh_directions, pin_directions
+from femgear.system.mode_kinds import gear_set_motions, phasing
+from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation
+from femgear.trains.gear_set import gear_set_modes
+from femgear.trains.helical.model import (
+    SectionStiffness,
+    check_helical_case,
+    contact_ratios,
+    helical_data,
+    helical_excitation,
+    normal_record,
+    section_stiffness,
+    shared_load,
+)
 from femgear.trains.helical.results import (
     HelicalDynamicsResult,
     HelicalModesResult,
@@ -23,16 +41,6 @@ from femgear.trains.helical.results import (
     describe_helical_static,
 )
 from femgear.trains.helical.section import HelicalCase, check_helical, helical_notices
-from femgear.trains.helical.setup import (
-    SectionStiffness,
-    base_helix_angle,
-    check_helical_case,
-    helical_data,
-    normal_record,
-    overlap_ratio,
-    section_stiffness,
-    shared_load,
-)
 from femgear.trains.protocol import Figures, Progress, Stage, Train, one_blas_thread
 from femgear.trains.rigid import (
     driving_torque,
@@ -56,7 +64,7 @@ _SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "t
 def solve_helical_static(
     case: HelicalCase, *, cache: Path | None = None, progress: Progress | None = None
 ) -> StaticResult:
-    """Static solution of the spur gears of the transverse section, the whole face width loaded at once."""
+    """Solve the spur gears of the transverse section, the whole face width loaded at once."""
     return static_stages.solve_static(_drive_flanks(case), cache=cache, progress=progress)
 
 
@@ -74,7 +82,7 @@ def solve_helical_modes(
     section: SectionStiffness | None = None,
     cache: Path | None = None,
 ) -> HelicalModesResult:
-    """Natural frequencies, modes, their kinds and phasing.
+    """Solve for natural frequencies, modes, their kinds and phasing.
 
     Parameters
     ----------
@@ -92,11 +100,6 @@ def solve_helical_modes(
     CaseError
         What `check_helical_case` refuses.
     """
-    from femgear.system.assembler import gear_set_system
-    from femgear.system.mode_kinds import gear_set_motions, phasing
-    from femgear.system.rigid_bodies import flank_sign
-    from femgear.trains.helical.model import helical_excitation, helical_modes
-
     gears = planetary_set(case)
     check_helical_case(case, gears)
     excitation, whole = None, None
@@ -107,11 +110,12 @@ def solve_helical_modes(
         if case.helical.section == "normal":
             section = section or section_stiffness(case, gears, cache=cache)
             factor = section.factor
-        sense, overlap = rotation_sense(case, gears), overlap_ratio(case, gears)
-        cycle = static.cycle
+        sense, cycle, beta = rotation_sense(case, gears), static.cycle, case.helical.helix_angle
+        overlap = contact_ratios(gears, helix_angle=beta, face_width=case.set.face_width)[0, 1]
+        base = profile.base_helix_angle(case.sun.pressure_angle, beta)
         backlash = np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], gears.n_planets)
         spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, backlash)
-        record = normal_record(spur, factor, base_helix_angle(case, gears), reversed_time=sense < 0)
+        record = normal_record(spur, factor, base, reversed_time=sense < 0)
         hand = sense * (1 if case.helical.hand == "right" else -1)
         whole = shared_load(helical_excitation(record, overlap))
         excitation = helical_excitation(record, overlap, slices=case.helical.slices, hand=hand)
@@ -119,7 +123,7 @@ def solve_helical_modes(
     torque = driving_torque(case)
     system, flank = gear_set_system(data, torque=torque), flank_sign(data, torque)
     stiffness = data.column_stiffness if excitation is None else excitation.stiffness.mean(axis=1)
-    modes = helical_modes(
+    modes = gear_set_modes(
         data, system=system, mesh_stiffness=stiffness, damping_ratio=case.dynamics.damping_ratio
     )
     phases = phasing(gear_set_motions(data, modes.shape))
@@ -130,15 +134,12 @@ def solve_helical_modes(
 def solve_helical_dynamics(
     case: HelicalCase, modes: HelicalModesResult, *, progress: Progress | None = None
 ) -> HelicalDynamicsResult:
-    """Periodic response at the case's speeds by the spectral method, with a Floquet verdict at each.
+    """Solve for the periodic response at all speeds by the spectral method, with a Floquet verdict at each.
 
     Raises
     ------
     ConvergenceError
     """
-    from femgear.solvers.periodic.spectral import solve_spectral
-    from femgear.solvers.stability.parametric import stability as floquet_verdict
-
     if modes.excitation is None:
         raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness")
     operation, dynamics = case.operation, case.dynamics
@@ -166,15 +167,10 @@ def solve_helical_dynamics(
 
 def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:
     """Loads of pins on planets and of supports on central members, harmonics (speeds, ..., 6, H + 1)."""
-    from femgear.solvers.linear.modal import output_load, output_response, residual_output
-    from femgear.system.assembler import free_motions, mesh_directions, pin_directions
-    from femgear.system.rigid_bodies import CENTRAL, member_radius
-
     data, system, basis = result.data, result.system, result.modes
     T, pins, N = free_motions(data), pin_directions(data), data.n_planets
-    radii = np.array([member_radius(data, name) for name in CENTRAL])
-    scale = np.hstack([np.ones((3, 3)), np.repeat(radii[:, None], 3, axis=1)])
-    springs = np.stack([getattr(data, name).support.stiffness for name in CENTRAL])
+    scale = np.hstack([np.ones((3, 3)), np.repeat(data.radii[:3, None], 3, axis=1)])
+    springs = data.support_stiffness
     stiffness = np.where(np.isinf(springs), 0.0, springs)
     rows = np.concatenate(
         [

@@ -177,8 +177,7 @@ def error_response(
         deflection = np.einsum("fhoj,jh->fho", transfer, error)
         force = k * deflection
         force[..., columns] -= k[columns] * error.T
-        output = np.empty((*force.shape[:2], 0))
-        found[number] = MeshErrorResponse(hertz, harmonics, deflection, force, output)
+        found[number] = MeshErrorResponse(hertz, harmonics, deflection, force)
     return found
 
 

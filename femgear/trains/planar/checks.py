@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.linear.modal import solve_modes
 from femgear.storage.dataset import RPM
+from femgear.trains.gear_set import mode_ratios
+from femgear.trains.planar.model import planar_ratios
 from femgear.trains.planar.section import PlanarCase
-from femgear.trains.rigid import check_one_period, needed
+from femgear.trains.rigid import check_one_period
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
 _MODULES = {"motion": 2.0, "approach": 0.5}
 # distance of a line from an undamped natural frequency, relative to it, at which the response has no bound
 _ON_RESONANCE = 1e-3
+# what a curve holds of every point
+_ALONG = ("points", "parameter", "tangent", "iterations", "error")
 
 
 def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
@@ -85,7 +90,7 @@ def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -
 
 
 def mean_compression(model: PlanarModel) -> float:
-    """Least compression [m] under the mean load of all meshes: force over stiffness with closed flanks."""
+    """Compute the least compression [m] of a mesh under the mean load, force / stiffness, flanks closed."""
     system, count = model.problem.system, 2 * model.data.n_planets
     K = system.K + (system.W * model.springs) @ system.W.T
     # free turning of the whole set has no stiffness, and the load none of it
@@ -93,80 +98,63 @@ def mean_compression(model: PlanarModel) -> float:
     return float(np.abs(system.W[:, :count].T @ moved).min())
 
 
-def check_branch_damping(case: PlanarCase, model: PlanarModel) -> None:
-    """Refuse a range of frequencies over a natural frequency without damping.
-
-    Raises
-    ------
-    CaseError
-        E-RESONANCE.
-    """
-    wanted = needed(case.planar.branch, "planar.branch")
-    bare = _undamped(case, model)
-    bare = bare[(bare >= wanted.start) & (bare <= wanted.to)]
-    if len(bare):
-        raise _resonance(case, bare[0], "planar.branch crosses it")
-
-
-def check_response_damping(
-    case: PlanarCase, model: PlanarModel, frequency: np.ndarray, orders: np.ndarray
-) -> None:
-    """Refuse a speed at which the weight or a mesh harmonic meets a natural frequency without damping.
+def check_damping(case: PlanarCase, model: PlanarModel, spans: Iterable[tuple[float, float, str]]) -> None:
+    """Refuse natural frequencies without damping where something excites them.
 
     Parameters
     ----------
     case : Case
     model : PlanarModel
-    frequency : (2,) array
-        Of carrier and mesh [rad/s].
-    orders : (L, 2) int array
+    spans : iterable of (lowest [Hz], highest [Hz], text)
+        Frequencies that are excited, and how, as in "planar.branch crosses it".
 
     Raises
     ------
     CaseError
         E-RESONANCE.
     """
-    bare = _undamped(case, model)
-    pure = (orders[:, 0] == 0) | ((np.abs(orders[:, 0]) == 1) & (orders[:, 1] == 0))
-    lines = np.abs(orders[pure] @ frequency) / (2.0 * np.pi)
-    met = np.abs(lines[:, None] - bare) < _ON_RESONANCE * bare
-    if met.any():
-        raise _resonance(
-            case, bare[met.any(axis=0)][0], f"the line at {lines[met.any(axis=1)][0]:.6g} Hz is on it"
-        )
-
-
-def _undamped(case: PlanarCase, model: PlanarModel) -> np.ndarray:
-    """Natural frequencies [Hz] above zero of the modes without damping."""
-    from femgear.solvers.linear.modal import solve_modes
-    from femgear.trains.planar.model import mode_ratios
-
-    ratios = case.planar.damping_ratios or case.dynamics.damping_ratio
+    ratios = planar_ratios(case)
     if np.min(ratios) > 0.0:
-        return np.zeros(0)
+        return
     system = model.problem.system
     plain = replace(system, C=np.zeros_like(system.C), gyroscopic=None)
     hertz = solve_modes(plain, model.springs).frequency
-    return hertz[(hertz > 0.0) & (mode_ratios(hertz, ratios) == 0.0)]
-
-
-def _resonance(case: PlanarCase, hertz: float, words: str) -> CaseError:
+    bare = hertz[(hertz > 0.0) & (mode_ratios(hertz, ratios) == 0.0)]
     key = "planar.damping_ratios" if case.planar.damping_ratios else "dynamics.damping_ratio"
-    return CaseError(
-        f"the natural frequency {hertz:.6g} Hz has no damping and {words}: the response has no bound there",
-        code="E-RESONANCE",
-        key=key,
-        value="0",
-        limit="above 0 at a resonance",
-        remedy="give the mode some damping, or move the range or the speed",
-        file=case.location(key),
-    )
+    for lowest, highest, words in spans:
+        met = bare[(bare >= lowest) & (bare <= highest)]
+        if len(met):
+            raise CaseError(
+                f"the natural frequency {met[0]:.6g} Hz has no damping and {words}: "
+                "the response has no bound there",
+                code="E-RESONANCE",
+                key=key,
+                value="0",
+                limit="above 0 at a resonance",
+                remedy="give the mode some damping, or move the range or the speed",
+                file=case.location(key),
+            )
+
+
+def excited_spans(frequency: np.ndarray, orders: np.ndarray) -> Iterator[tuple[float, float, str]]:
+    """Make the spans of `check_damping` around the lines of the weight and of the mesh harmonics.
+
+    Parameters
+    ----------
+    frequency : (2,) array
+        Of carrier and mesh [rad/s].
+    orders : (L, 2) int array
+    """
+    pure = (orders[:, 0] == 0) | ((np.abs(orders[:, 0]) == 1) & (orders[:, 1] == 0))
+    for line in np.abs(orders[pure] @ frequency) / (2.0 * np.pi):
+        words = f"the line at {line:.6g} Hz is on it"
+        yield line / (1.0 + _ON_RESONANCE), line / (1.0 - _ON_RESONANCE), words
 
 
 def bounded_branch(
     branch: Branch, lines: Iterable[MotionLines], gears: PlanetarySet
 ) -> tuple[Branch, tuple[MotionLines, ...]]:
-    """A branch up to the last point that converged and whose displacements are small, and its motions.
+    """Cut a branch at the last point that converged with small displacements, and compute its motions.
 
     Parameters
     ----------
@@ -180,8 +168,6 @@ def bounded_branch(
     ConvergenceError
         Not even the first two points are good (E-MOTION, E-CONVERGENCE).
     """
-    from femgear.trains.planar.model import cut_branch
-
     good: list[MotionLines] = []
     for solution, one in zip(branch.solutions, lines):
         hertz = f"{solution.frequency[0] / (2.0 * np.pi):.6g} Hz"
@@ -190,9 +176,25 @@ def bounded_branch(
             if len(good) < 2:
                 raise _moved_too_far(f"at {hertz} of the weight", words, solution.converged)
             ending = f"stopped before {hertz}, where {words}" if solution.converged else f"{words} at {hertz}"
-            return cut_branch(branch, len(good), ending), tuple(good)
+            return _cut(branch, len(good), ending), tuple(good)
         good.append(one)
     return branch, tuple(good)
+
+
+def _cut(branch: Branch, count: int, message: str) -> Branch:
+    """The first points of a branch, which then did not reach an end of its range."""
+    known = branch.curve
+    curve = replace(
+        known,
+        **{name: getattr(known, name)[:count] for name in _ALONG},
+        **{name: getattr(known, name)[getattr(known, name) < count] for name in ("folds", "branch_points")},
+        closed=False,
+        complete=False,
+        message=message,
+    )
+    return replace(
+        branch, parameter=branch.parameter[:count], solutions=branch.solutions[:count], curve=curve
+    )
 
 
 def check_response_motions(
@@ -245,7 +247,7 @@ def _moved_too_far(where: str, words: str, converged: bool) -> ConvergenceError:
 
 
 def end_of_branch(branch: Branch, wanted: BranchSection) -> str:
-    """How a branch ended, in frequencies and entries of the case file."""
+    """Tell how a branch ended, in frequencies [Hz] and entries of the case file."""
     hertz, count = branch.parameter[-1] / (2.0 * np.pi), len(branch.parameter)
     if branch.complete:
         side = "start" if abs(hertz - wanted.start) < abs(hertz - wanted.to) else "end"

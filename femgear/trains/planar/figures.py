@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.case import planetary_set
-from femgear.report.response import mode_shapes, shown_speeds
+from femgear.report.response import MODE_CAPTIONS, harmonics_of, mode_shapes, shown_speeds
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure
 from femgear.trains.planar.model import TAIL_LIMIT, merged_folds
 from femgear.trains.planar.results import PHASES
@@ -39,7 +39,7 @@ _INSTANTS = 20_000
 
 
 def pieces(stable, wanted: int) -> list[slice]:
-    """Runs of segments of a curve of one kind: 1 stable, 0 not stable, -1 not known.
+    """Find runs of segments of a curve of one kind: 1 stable, 0 not stable, -1 not known.
 
     A segment is drawn once: unknown where one of its ends is, otherwise unstable where one is.
     """
@@ -49,16 +49,13 @@ def pieces(stable, wanted: int) -> list[slice]:
     return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
 
 
-def orbits(curves: Sequence[tuple], *, title: str = ""):
-    """Paths of a member's centre in the carrier frame.
+def orbits(curves: Sequence[tuple], *, title: str = "") -> Figure:
+    """Draw paths of a member's centre in the carrier frame.
 
     Parameters
     ----------
     curves : sequence of (text, path (2, n) [m])
-
-    Returns
-    -------
-    Figure
+    title : str
     """
     figure, (ax,) = new_figure(width=6.2, height=6.2)
     for number, (text, path) in enumerate(curves):
@@ -71,51 +68,46 @@ def orbits(curves: Sequence[tuple], *, title: str = ""):
     return figure
 
 
-def bearing_forces(angle, curves: Sequence[tuple], *, title: str = ""):
-    """Sizes of bearing forces over one turn of the weight against the carrier.
+def bearing_forces(angle, curves: Sequence[tuple], *, title: str = "") -> Figure:
+    """Draw sizes of bearing forces over one turn of the weight against the carrier.
 
     Parameters
     ----------
     angle : (n,) array
         [rad]
     curves : sequence of (text, force (2, n) [N])
-
-    Returns
-    -------
-    Figure
+    title : str
     """
     figure, (ax,) = new_figure()
     for number, (text, force) in enumerate(curves):
         ax.plot(np.degrees(angle), 1e-3 * np.hypot(*force), label=text, **line_style(number))
-    ax.set_xlim(0.0, 360.0)
-    ax.set_xticks(np.arange(0.0, 361.0, 60.0))
-    label(ax, "phase of the weight [°]", "force [kN]", title)
+    _phase_axis(ax)
+    label(ax, y="force [kN]", title=title)
     legend_below(figure)
     return figure
 
 
-def branch_figures(branch: xr.Dataset) -> dict[str, Figure]:
-    """All figures of a branch, by file name.
+def _phase_axis(ax) -> None:
+    ax.set_xlim(0.0, 360.0)
+    ax.set_xticks(np.arange(0.0, 361.0, 60.0))
+    label(ax, "phase of the weight [°]")
 
-    Parameters
-    ----------
-    branch : xarray.Dataset
-        Contents of branch.nc.
-    """
-    top = int(branch["shown_point"].values[-1])
+
+def branch_figures(branch: xr.Dataset) -> dict[str, Figure]:
+    """Draw all figures of branch.nc, by file name."""
     figures = {
         "weight_response": weight_response(branch),
-        "carrier_orbit": weight_orbits(branch),
-        "planet_bearing_forces": weight_bearing_forces(branch, top),
+        "carrier_orbit": _weight_orbits(branch),
+        "planet_bearing_forces": _weight_bearing_forces(branch),
         "tooth_contact": contact_over_branch(branch),
     }
     if np.any(branch["back_force_real"].values):
-        figures["wedged_teeth"] = mesh_forces(branch)
+        figures["wedged_teeth"] = _flank_forces(branch)
     return figures
 
 
 def weight_response(branch: xr.Dataset) -> Figure:
-    """Amplitudes of carrier, ring and sun: drawn by what is known of their stability, folds marked."""
+    """Draw amplitudes of carrier, ring and sun by what is known of their stability, folds marked."""
     figure, axes = new_figure(rows=3, width=8.5, height=8.0, sharex=True)
     hertz, folds = branch["weight_frequency"].values, merged_folds(
         branch["weight_frequency"].values, branch["fold"].values
@@ -171,9 +163,9 @@ def _parts(branch: xr.Dataset) -> list[tuple]:
     return [(*STABILITY[wanted], part) for wanted in STABILITY for part in pieces(stable, wanted)]
 
 
-def weight_orbits(branch: xr.Dataset) -> Figure:
+def _weight_orbits(branch: xr.Dataset) -> Figure:
     """Paths of the carrier's centre in the carrier frame during one turn of the weight against it."""
-    lines = branch["displacement_real"].values + 1j * branch["displacement_imag"].values
+    lines = harmonics_of(branch, "displacement")
     curves = []
     for point, words in zip(branch["shown_point"].values, branch["shown_as"].values):
         path = _wave(branch) @ np.swapaxes(lines[point, 0], 0, 1)
@@ -183,12 +175,12 @@ def weight_orbits(branch: xr.Dataset) -> Figure:
     return orbits(curves)
 
 
-def weight_bearing_forces(branch: xr.Dataset, point: int) -> Figure:
+def _weight_bearing_forces(branch: xr.Dataset) -> Figure:
     """Sizes of the planet-bearing forces over one turn of the weight against the carrier."""
-    lines = (branch["planet_bearing_force_real"] + 1j * branch["planet_bearing_force_imag"]).values[point]
-    phase, wave = np.linspace(0.0, 2.0 * np.pi, PHASES), _wave(branch)
+    lines = harmonics_of(branch, "planet_bearing_force")[branch["shown_point"].values[-1]]
+    wave = _wave(branch)
     curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
-    return bearing_forces(phase, curves, title=_top(branch))
+    return bearing_forces(np.linspace(0.0, 2.0 * np.pi, PHASES), curves, title=_top(branch))
 
 
 def _top(branch: xr.Dataset) -> str:
@@ -198,7 +190,7 @@ def _top(branch: xr.Dataset) -> str:
     return words + _doubt(_tails(branch)[point])
 
 
-def mesh_forces(branch: xr.Dataset) -> Figure:
+def _flank_forces(branch: xr.Dataset) -> Figure:
     """Forces of drive and back flanks over one turn of the weight against the carrier."""
     figure, axes = new_figure(rows=2, width=8.0, height=6.0, sharex=True)
     names, degrees = [str(name) for name in branch["mesh"].values], np.degrees(branch["phase"].values)
@@ -207,50 +199,22 @@ def mesh_forces(branch: xr.Dataset) -> Figure:
             force = branch[kind].values[-1, mesh]
             ax.plot(degrees, 1e-3 * force, label=names[mesh], **line_style(number))
         label(ax, y="force [kN]", title=words)
-    axes[-1].set_xlim(0.0, 360.0)
-    axes[-1].set_xticks(np.arange(0.0, 361.0, 60.0))
+    _phase_axis(axes[-1])
     # what is doubted stands on a line of its own, below
     words, *doubt = _top(branch).split("\n")
     label(axes[0], title="\n".join([f"{words}: drive flanks", *doubt]))
-    label(axes[-1], "phase of the weight [°]")
     legend_below(figure, axes[0])
     return figure
 
 
 def contact_over_branch(branch: xr.Dataset) -> Figure:
-    """Share of the cycle in which flanks touch over the frequency, drawn by stability."""
+    """Draw the share of the cycle in which flanks touch over the frequency, by stability."""
     return _contact(branch, branch["weight_frequency"].values, _AXIS, _parts(branch))
 
 
-def response_figures(response: xr.Dataset, speed: int) -> dict[str, Figure]:
-    """Figures of one speed, and with the first one those over all speeds.
-
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Contents of response.nc.
-    speed : int
-        Its number.
-    """
-    figures = {
-        "response_orbit": response_orbit(response, speed),
-        "response_bearing_forces": response_bearing_forces(response, speed),
-        "response_mesh_forces": response_mesh_forces(response, speed),
-        "response_spectrum": response_spectrum(response, speed),
-    }
-    return figures
-
-
-def contact_over_speed(response: xr.Dataset) -> Figure:
-    """Share of the time in which flanks touch over the speeds."""
-    speed = response["speed"].values
-    order = np.argsort(speed)
-    return _contact(response.isel(speed=order), speed[order], "speed of the input [rpm]", None)
-
-
-def response_orbit(response: xr.Dataset, speed: int) -> Figure:
+def _response_orbit(response: xr.Dataset, speed: int) -> Figure:
     """Paths of carrier, ring and sun in the carrier frame during one carrier turn."""
-    lines = (response["displacement_real"] + 1j * response["displacement_imag"]).values[speed]
+    lines = harmonics_of(response, "displacement")[speed]
     _, wave = _carrier_turn(response, speed)
     figure, axes = new_figure(columns=3, width=11.0, height=4.2)
     for ax, colour, name, one in zip(axes, COLOURS, response["member"].values, lines):
@@ -264,9 +228,9 @@ def response_orbit(response: xr.Dataset, speed: int) -> Figure:
     return figure
 
 
-def response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
+def _response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
     """Sizes of the planet-bearing forces over one carrier turn."""
-    lines = (response["planet_bearing_force_real"] + 1j * response["planet_bearing_force_imag"]).values[speed]
+    lines = harmonics_of(response, "planet_bearing_force")[speed]
     turn, wave = _carrier_turn(response, speed)
     figure, (ax,) = new_figure()
     for number, one in enumerate(lines):
@@ -280,8 +244,8 @@ def response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
 
 
 def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
-    """Mesh forces of the first planet over one carrier turn, and over the first mesh periods if they vary."""
-    lines = (response["mesh_force_real"] + 1j * response["mesh_force_imag"]).values[speed]
+    """Draw mesh forces of planet 1 over one carrier turn, and over the first mesh periods if they vary."""
+    lines = harmonics_of(response, "mesh_force")[speed]
     names = [str(name) for name in response["mesh"].values]
     turn, wave = _carrier_turn(response, speed)
     mesh, carrier = float(response["mesh_frequency"][speed]), _carrier_frequency(response, speed)
@@ -307,10 +271,10 @@ def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
     return figure
 
 
-def response_spectrum(response: xr.Dataset, speed: int) -> Figure:
+def _response_spectrum(response: xr.Dataset, speed: int) -> Figure:
     """Lines of the first mesh's force and of the sun's displacement, by the mesh harmonic they stand at."""
-    force = (response["mesh_force_real"] + 1j * response["mesh_force_imag"]).values[speed, 0]
-    moved = (response["displacement_real"] + 1j * response["displacement_imag"]).values[speed, 0, 0]
+    force = harmonics_of(response, "mesh_force")[speed, 0]
+    moved = harmonics_of(response, "displacement")[speed, 0, 0]
     hertz, mesh = np.abs(response["frequency"].values[speed]), response["mesh_order"].values
     figure, axes = new_figure(rows=2, width=8.5, height=6.0, sharex=True)
     quantities = (
@@ -377,29 +341,29 @@ def _carrier_turn(response: xr.Dataset, speed: int) -> tuple[np.ndarray, np.ndar
     return turn, wave
 
 
-def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
-    return {"mode_shapes": mode_shapes(drawn.data["modes"], planetary_set(drawn.case))}
-
-
 def _response_figures(drawn: Drawn) -> dict[str, Figure]:
+    """Figures of the speeds that are shown, and over all speeds where there are several."""
     response, figures = drawn.data["response"], {}
+    speed = response["speed"].values
     for s in shown_speeds(response):
-        name = f"{round(float(response['speed'][s]))}_rpm"
-        figures |= {f"{key}_{name}": figure for key, figure in response_figures(response, s).items()}
-    if response.sizes["speed"] > 1:
-        figures["contact_over_speed"] = contact_over_speed(response)
+        figures |= {f"{name}_{round(speed[s])}_rpm": draw(response, s) for name, draw in _OF_A_SPEED.items()}
+    if len(speed) > 1:
+        order, words = np.argsort(speed), "speed of the input [rpm]"
+        figures["contact_over_speed"] = _contact(response.isel(speed=order), speed[order], words, None)
     return figures
 
 
+_OF_A_SPEED = {
+    "response_orbit": _response_orbit,
+    "response_bearing_forces": _response_bearing_forces,
+    "response_mesh_forces": response_mesh_forces,
+    "response_spectrum": _response_spectrum,
+}
+
 FIGURES = STATIC | {
     "modes": Figures(
-        {
-            "mode_shapes": (
-                "Mode shapes with mean mesh stiffness: bodies with a mark of their rotation, and the outer "
-                "surface of the ring; at rest in grey."
-            ),
-        },
-        draw=_modes_figures,
+        MODE_CAPTIONS,
+        draw=lambda drawn: {"mode_shapes": mode_shapes(drawn.data["modes"], planetary_set(drawn.case))},
     ),
     "branch": Figures(
         {

@@ -1,53 +1,52 @@
-"""The lumped planetary set in its plane: mesh stiffness, play, bearings, weight, pin errors, modes, motions.
+"""The lumped planetary set of a case in its plane, and what it does in a periodic solution.
 
-`planar_problem` joins a lumped set with its elements and forces for harmonic balance and time integration;
-`with_bearing` adds a bearing between two central members, or between one and the housing; `planar_modes`
-gives the modes at standstill with their kinds. `PlanarModel` and what follows it tell what the set does in a
-periodic solution: orbits, forces, contact of its flanks.
+`planar_model` makes the set of a case with its elements and forces; `weight_curve` and `judged_branch` follow
+its response to the weight; `motion_lines` and what follows it give orbits, forces and contact of its flanks.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.case.dependencies import check_entries, static_entries
 from femgear.solvers.continuation.branches import Branch, frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
-from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.solvers.periodic.harmonic_balance import displacements
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
-from femgear.system.assembler import (
-    check_mesh_columns,
-    column_groups,
-    free_motions,
-    gear_set_system,
-    mesh_directions,
-    mesh_elements,
-    pin_directions,
-)
-from femgear.system.elements import GearMeshes, RadialBearings
+from femgear.system.assembler import free_motions, mesh_elements, pin_directions
+from femgear.system.elements import GearMeshes
 from femgear.system.fourier import (
-    FourierSeries,
-    Series,
-    StepSeries,
-    SummedSeries,
+    constant,
     line_tail,
-    series_of,
-    tooth_lines,
 )
-from femgear.system.mode_kinds import gear_set_kinds
-from femgear.system.rigid_bodies import CENTRAL, PlanarSet, PlanarTorque, flank_sign
-from femgear.system.system import HarmonicForce, Modes, NonlinearSystem, element_forces
+from femgear.system.rigid_bodies import (
+    CENTRAL,
+    PlanarBody,
+    PlanarSet,
+    planar_from_set,
+)
+from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
+from femgear.trains.gear_set import Bearings, Gravity, MemberBearing, gear_set_problem, working_springs
+from femgear.trains.rigid import (
+    driving_torque,
+    member_speeds,
+    mesh_stiffnesses,
+    needed,
+    rotation_sense,
+    torsional_support,
+)
+from femgear.trains.static.results import StaticResult
 
-# natural frequencies closer than this, relative to the frequency, count as one
-_SAME = 1e-3
+if TYPE_CHECKING:
+    from femgear.gears.planetary import PlanetarySet
+    from femgear.trains.planar.section import PlanarCase
 
 TAIL_LIMIT = 0.05
 """Share of the amplitude in the upper half of the lines beyond which what they add up to is wrong."""
@@ -62,388 +61,6 @@ _GRID = (256, 48)
 _COARSE, _FINE, _BATCH = 1e-3, 1e-6, 32
 # fluctuation of a force, relative to its mean, below which there is none: residual of the equations
 _STILL = 1e-6
-# what a curve holds of every point
-_ALONG = ("points", "parameter", "tangent", "iterations", "error")
-
-
-@dataclass(frozen=True)
-class Clearances:
-    """Radial clearances of the bearings, from the centred position [m]; None leaves a bearing linear.
-
-    Parameters
-    ----------
-    carrier, ring, sun : float, optional
-        Of the member's support in the housing.
-    planets : float or (N,) array, optional
-        Of the planet bearings.
-    springs : int, optional
-        Number of springs of each bearing, see `RadialBearings`; they turn with the carrier.
-    smoothing : float
-        [m]
-    """
-
-    carrier: float | None = None
-    ring: float | None = None
-    sun: float | None = None
-    planets: float | np.ndarray | None = None
-    springs: int | None = None
-    smoothing: float = 0.0
-
-    @property
-    def bearings(self) -> tuple[str, ...]:
-        """The bearings that have a clearance."""
-        return tuple(name for name in (*CENTRAL, "planets") if getattr(self, name) is not None)
-
-
-@dataclass(frozen=True)
-class Gravity:
-    """Weight of all bodies, which turns backwards in the carrier frame.
-
-    Parameters
-    ----------
-    acceleration : float
-        [m/s^2]
-    direction : float
-        Angle of the weight from the x axis when the carrier's phase is zero [rad]; downwards along -y.
-    orders : tuple of int, optional
-        Multiples of the base frequencies that make the carrier's phase; None for a carrier that stands.
-        With a counter-clockwise carrier ``(0, 1)`` says that it turns with the second base frequency.
-    """
-
-    acceleration: float = 9.80665
-    direction: float = -0.5 * math.pi
-    orders: tuple[int, ...] | None = (0, 1)
-
-
-def planar_problem(
-    data: PlanarSet,
-    *,
-    meshes: GearMeshes | None = None,
-    back_flanks: bool = False,
-    torque: PlanarTorque | None = None,
-    clearances: Clearances | None = None,
-    gravity: Gravity | None = None,
-    pin_errors=None,
-    carrier_speed: float = 0.0,
-    damping: float | np.ndarray | None = None,
-) -> NonlinearSystem:
-    """Lumped set with its elements and forces.
-
-    Parameters
-    ----------
-    data : PlanarSet
-    meshes : GearMeshes, optional
-        From `mesh_elements`; constant stiffnesses without back side when not given.
-    back_flanks : bool
-        The back flanks act on their own lines of action, with the stiffness of the drive side, so that teeth
-        can wedge; otherwise they act on the line of the drive flanks.
-    torque : PlanarTorque, optional
-    clearances : Clearances, optional
-        A bearing with a clearance acts on columns of its own; its stiffness is not in ``K``.
-    gravity : Gravity, optional
-    pin_errors : (N, 2) array, optional
-        Radial (outwards) and tangential (counter-clockwise) displacement of the pins [m], from which the
-        coordinates of the planets then count. Not to be given again when the static record holds them.
-    carrier_speed : float
-        See `gear_set_system`.
-    damping : float, (n_modes,) array or (n, n) array, optional
-        Damping ratio of all modes, or one a mode, at standstill with mean stiffnesses and closed bearings;
-        or the matrix ``C``.
-
-    Raises
-    ------
-    CaseError
-        A load that accelerates the set (E-LOAD-BALANCE), back flanks without backlash (E-BACKLASH), a
-        bearing without stiffness (E-BEARING), arrays that do not fit (E-SHAPE).
-    """
-    bearings = clearances.bearings if clearances else ()
-    pins = np.zeros((data.n_planets, 2)) if pin_errors is None else _pins(data, pin_errors)
-    groups = column_groups(data, back_flanks=back_flanks, bearings=bearings)
-    meshes = mesh_elements(data) if meshes is None else meshes
-    check_mesh_columns(data, meshes)
-    elements = _mesh_elements(data, meshes, pins, flank_sign(data, torque), groups)
-    elements += _bearing_elements(data, clearances, groups)
-    options = {"torque": torque, "back_flanks": back_flanks, "bearings": bearings}
-    still = gear_set_system(data, **options)
-    reference = NonlinearSystem(still, elements).reference
-    # teeth in the middle of the drive flanks do not touch their back flanks
-    reference[groups.get("back flanks", np.arange(0))] = 0.0
-    # refuses a load that nothing takes up before a solver drifts away with it
-    solve_modes(still, reference)
-    system = gear_set_system(data, carrier_speed=carrier_speed, **options)
-    steady, forces = _weight(data, gravity)
-    load = system.load + steady + _pin_inertia(data, pins, carrier_speed)
-    system = replace(system, load=load, C=viscous_damping(still, reference, damping))
-    return NonlinearSystem(system, elements, forces, speed=carrier_speed)
-
-
-def pin_deflections(data: PlanarSet, pin_errors, *, flank: int = 1) -> np.ndarray:
-    """Approach of the flanks (2N,) [m] by displaced pins (N, 2), all bodies resting in their bearings."""
-    shifted = np.zeros((data.n_planets + 3, 3))
-    shifted[3:, :2] = _pins(data, pin_errors)
-    return mesh_directions(data, flank).T @ shifted.ravel()
-
-
-def phased_series(sun_planet, planet_ring, phases, *, mean, orders: tuple[int, ...] = (1,)) -> FourierSeries:
-    """Stiffness of the 2N meshes from one wave of each kind, shifted by the mesh phases.
-
-    Parameters
-    ----------
-    sun_planet, planet_ring : (H,) complex arrays
-        Harmonics 1 to H of the stiffness over its mean, at phase zero; the shorter one is filled with zeros.
-    phases : (2N,) array
-        phi_j as fractions of the mesh period, ``k_j(tau) = k(tau + phi_j)``: `PlanetarySet.mesh_phases`
-        (Parker and Lin, J. Mech. Des. 126, 2004).
-    mean : (2N,) array
-        [N/m], such as `PlanarSet.mesh_stiffness`.
-    orders : tuple of int
-        Multiples of the base frequencies that make the mesh frequency.
-    """
-    phases, mean = np.asarray(phases, float), np.asarray(mean, float)
-    if phases.ndim != 1 or len(phases) % 2 or phases.shape != mean.shape:
-        raise CaseError(
-            f"{phases.size} phases and {mean.size} mean stiffnesses", code="E-SHAPE", limit="2N of each"
-        )
-    lines = tooth_lines(sun_planet, planet_ring, phases)
-    return FourierSeries(mean[:, None] * np.column_stack([np.ones(len(phases)), lines]), orders)
-
-
-def _mesh_elements(data: PlanarSet, meshes: GearMeshes, pins, flank: int, groups) -> tuple[GearMeshes, ...]:
-    """The meshes with the approach by the pins, and the back flanks on their own lines."""
-    drive = replace(meshes, deflection=_raised(meshes.state[0], -pin_deflections(data, pins, flank=flank)))
-    if "back flanks" not in groups:
-        return (drive,)
-    if not np.all(np.isfinite(meshes.backlash)) or not meshes.separates:
-        raise CaseError(
-            "back flanks need the backlash of every mesh, and meshes that separate", code="E-BACKLASH",
-            key="backlash", remedy="give a finite backlash, or leave the back flanks out",
-        )  # fmt: skip
-    behind = meshes.backlash - pin_deflections(data, pins, flank=-flank)
-    start = _raised(_unloaded(meshes), behind, sign=-1.0)
-    back = replace(meshes, columns=groups["back flanks"], deflection=start, force=None, backlash=np.inf)
-    return replace(drive, backlash=np.inf), back
-
-
-def _unloaded(meshes: GearMeshes) -> Series:
-    """Deflection at which the mesh line carries nothing, ``deflection - force / k``."""
-    deflection, force = meshes.state
-    if isinstance(force, FourierSeries) and not np.any(force.amplitudes):
-        return deflection
-    series = [one for one in (meshes.stiffness, deflection, force) if isinstance(one, FourierSeries)]
-    if len(series) < 3:
-        raise CaseError(
-            "back flanks cannot follow a stepwise record that holds mesh forces", code="E-BACKLASH",
-            remedy="give Fourier series, or the unloaded deflection with no force",
-        )  # fmt: skip
-    # the quotient of two series has no last harmonic: sample finely, keep what the samples resolve
-    count = max(one.amplitudes.shape[1] for one in series)
-    phase = 2.0 * np.pi * np.arange(16 * count)[:, None] / (16 * count)
-    k, deflection, force = (replace(one, orders=(1,)).at(phase) for one in series)
-    return series_of((deflection - force / k).T, 4 * count, orders=series[0].orders)
-
-
-def _raised(series: Series, offset, *, sign: float = 1.0) -> Series:
-    """The series times a sign, with a constant (2N,) added."""
-    if isinstance(series, StepSeries):
-        return replace(series, values=sign * series.values + offset[:, None])
-    if isinstance(series, SummedSeries):
-        offsets = [offset] + [np.zeros_like(offset)] * (len(series.parts) - 1)
-        parts = (_raised(one, part, sign=sign) for one, part in zip(series.parts, offsets))
-        return SummedSeries(tuple(one for one in parts if isinstance(one, FourierSeries)))
-    amplitudes = sign * series.amplitudes
-    amplitudes[:, 0] += offset
-    return replace(series, amplitudes=amplitudes)
-
-
-def _bearing_elements(data: PlanarSet, clearances: Clearances | None, groups) -> tuple[RadialBearings, ...]:
-    elements = []
-    if clearances is None:
-        return ()
-    for name in clearances.bearings:
-        stiffness = data.planet_bearing if name == "planets" else getattr(data, name).support
-        if np.any(np.asarray(stiffness) == 0.0):
-            raise CaseError(
-                f"the bearing of the {name} has a clearance but no stiffness", code="E-BEARING",
-                remedy="give it a support stiffness, or leave the clearance out",
-            )  # fmt: skip
-        options = {"springs": clearances.springs, "smoothing": clearances.smoothing}
-        elements.append(RadialBearings(groups[name], stiffness, getattr(clearances, name), **options))
-    return tuple(elements)
-
-
-def _weight(data: PlanarSet, gravity: Gravity | None) -> tuple[np.ndarray, tuple[HarmonicForce, ...]]:
-    """Steady load (n,) and harmonic forces of the weight.
-
-    In the carrier frame the weight stands at ``direction - theta_c``. On x and y of a member it is the real
-    part of ``m g (1, -i) exp(i (direction - theta_c))``, which is order -1 of the carrier; its conjugate
-    with order +1 is the same force.
-    """
-    T = free_motions(data)
-    if gravity is None:
-        return np.zeros(T.shape[1]), ()
-    force = np.zeros((data.n_planets + 3, 3), complex)
-    masses = [getattr(data, name).mass for name in CENTRAL] + [data.planet.mass] * data.n_planets
-    axis = np.concatenate([np.zeros(3), data.planet_angles])
-    force[:, 0] = np.array(masses) * gravity.acceleration * np.exp(1j * (gravity.direction - axis))
-    force[:, 1] = -1j * force[:, 0]
-    reduced = T.T @ force.ravel()
-    if gravity.orders is None:
-        return np.real(reduced), ()
-    return np.zeros(T.shape[1]), (HarmonicForce(reduced.conj(), gravity.orders),)
-
-
-def _pins(data: PlanarSet, pin_errors) -> np.ndarray:
-    pins = np.asarray(pin_errors, float)
-    if pins.shape != (data.n_planets, 2) or not np.all(np.isfinite(pins)):
-        raise CaseError(
-            f"pin errors of shape {pins.shape}", code="E-SHAPE", key="pin_errors",
-            limit=f"({data.n_planets}, 2) finite numbers, radial and tangential",
-        )  # fmt: skip
-    return pins
-
-
-def _pin_inertia(data: PlanarSet, pins: np.ndarray, carrier_speed: float) -> np.ndarray:
-    """Centrifugal force (n,) of the planets by the displacement of their pins."""
-    force = np.zeros((data.n_planets + 3, 3))
-    force[3:, :2] = carrier_speed**2 * data.planet.mass * pins
-    return free_motions(data).T @ force.ravel()
-
-
-@dataclass(frozen=True)
-class MemberBearing:
-    """A radial bearing between two central members, or between one and the housing.
-
-    Parameters
-    ----------
-    stiffness : float
-        [N/m]
-    clearance : float or None
-        Radial, from the centred position [m]; None leaves the columns without a bearing.
-    inner, outer : str
-        ``"carrier"``, ``"ring"`` or ``"sun"``; ``outer`` also ``"housing"``.
-    """
-
-    stiffness: float
-    clearance: float | None = 0.0
-    inner: str = "carrier"
-    outer: str = "housing"
-
-    def __post_init__(self):
-        if self.inner not in CENTRAL or self.outer not in (*CENTRAL, "housing") or self.inner == self.outer:
-            raise CaseError(
-                f"a bearing between {self.inner!r} and {self.outer!r}", code="E-BEARING",
-                limit="two of carrier, ring, sun, or one of them and the housing",
-            )  # fmt: skip
-
-
-def with_bearing(problem: NonlinearSystem, data: PlanarSet, bearing: MemberBearing) -> NonlinearSystem:
-    """The set with one more bearing, on the two last columns: x and y of the inner less the outer member.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-        From `planar_problem`.
-    data : PlanarSet
-    bearing : MemberBearing
-
-    Returns
-    -------
-    NonlinearSystem
-        Its damping is that of ``problem``; see `bearing_damping_matrix` for that of the closed bearing.
-    """
-    columns = np.zeros((3 * (data.n_planets + 3), 2))
-    for name, sign in ((bearing.inner, 1.0), (bearing.outer, -1.0)):
-        if name in CENTRAL:
-            first = 3 * CENTRAL.index(name)
-            columns[[first, first + 1], [0, 1]] = sign
-    count = problem.system.W.shape[1]
-    W = np.hstack([problem.system.W, free_motions(data).T @ columns])
-    elements = problem.elements
-    if bearing.clearance is not None:
-        place = np.array([[count, count + 1]])
-        elements += (RadialBearings(place, bearing.stiffness, bearing.clearance),)
-    return replace(problem, system=replace(problem.system, W=W), elements=elements)
-
-
-def closed_springs(
-    problem: NonlinearSystem, data: PlanarSet, bearing: MemberBearing | None = None
-) -> np.ndarray:
-    """Springs (n_columns,) [N/m] near which the set works: bearings closed, back flanks open.
-
-    The elements' own reference counts back flanks as closed, far from where the set works.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    data : PlanarSet
-    bearing : MemberBearing, optional
-        On the last two columns; closed whatever its clearance.
-    """
-    reference = open_back_flanks(problem, data.n_planets)
-    if bearing is not None:
-        reference[-2:] = bearing.stiffness
-    return reference
-
-
-def open_back_flanks(problem: NonlinearSystem, n_planets: int) -> np.ndarray:
-    """Reference springs (n_columns,) [N/m] of the elements, without those of the columns of back flanks."""
-    reference, meshes = problem.reference, 2 * n_planets
-    for element in problem.elements[1:]:
-        if isinstance(element, GearMeshes) and element.columns[0, 0] == meshes:
-            reference[meshes : 2 * meshes] = 0.0
-    return reference
-
-
-def bearing_damping_matrix(
-    problem: NonlinearSystem, springs: np.ndarray, ratios: float | Sequence[float]
-) -> np.ndarray:
-    """Viscous damping ``C`` (n, n) of modal ratios, for the modes at standstill with given springs.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-        At standstill.
-    springs : (n_columns,) array
-        Such as `closed_springs` [N/m].
-    ratios : float or sequence of float
-        Of all modes; a sequence gives one a natural frequency (a pair of modes has one), ascending, the last
-        one for the rest. Motions at frequency zero have none and do not count.
-    """
-    bare = replace(problem.system, C=np.zeros_like(problem.system.C))
-    frequency = solve_modes(bare, springs).frequency
-    return modal_damping(bare, springs, mode_ratios(frequency, ratios))
-
-
-def mode_ratios(frequency: np.ndarray, ratios: float | Sequence[float]) -> np.ndarray:
-    """Damping ratio (m,) of every mode from one a natural frequency; see `bearing_damping_matrix`."""
-    given = np.atleast_1d(np.asarray(ratios, float))
-    moving = frequency > 0.0
-    steps = np.diff(frequency[moving], prepend=0.0) > _SAME * frequency[moving]
-    number = np.clip(np.cumsum(steps) - 1, 0, len(given) - 1)
-    out = np.zeros(len(frequency))
-    out[moving] = given[number]
-    return out
-
-
-def planar_modes(data: PlanarSet, *, mesh_stiffness=None, damping_ratio: float = 0.0) -> Modes:
-    """Modes of the set at standstill, with their kinds.
-
-    Parameters
-    ----------
-    data : PlanarSet
-    mesh_stiffness : (2N,) array, optional
-        [N/m]; that of the set when not given.
-    damping_ratio : float
-        Of all modes.
-
-    Returns
-    -------
-    Modes
-        ``kind`` from `gear_set_kinds`.
-    """
-    stiffness = data.mesh_stiffness if mesh_stiffness is None else mesh_stiffness
-    modes = solve_modes(gear_set_system(data), stiffness, damping_ratio=damping_ratio)
-    return replace(modes, kind=gear_set_kinds(data, modes.shape, frequency=modes.frequency))
 
 
 @dataclass(frozen=True, eq=False)
@@ -456,22 +73,18 @@ class PlanarModel:
     problem : NonlinearSystem
     back_flanks : bool
         The back flanks have columns of their own.
-    planet_clearance : bool
-        The planet bearings are elements.
-    bearing : MemberBearing, optional
-        On the last two columns.
+    bearings : Bearings
     """
 
     data: PlanarSet
     problem: NonlinearSystem
-    back_flanks: bool = False
-    planet_clearance: bool = False
-    bearing: MemberBearing | None = None
+    back_flanks: bool
+    bearings: Bearings
 
     @cached_property
     def springs(self) -> np.ndarray:
         """Springs (n_columns,) [N/m] near which the set works."""
-        return closed_springs(self.problem, self.data, self.bearing)
+        return working_springs(self.problem, self.bearings.members)
 
     @cached_property
     def reduction(self) -> Reduction:
@@ -480,49 +93,162 @@ class PlanarModel:
 
     @property
     def groups(self) -> dict[str, np.ndarray]:
-        """Places of the columns, see `column_groups`; the carrier bearing as ``carrier bearing``."""
-        bearings = ("planets",) if self.planet_clearance else ()
-        groups = column_groups(self.data, back_flanks=self.back_flanks, bearings=bearings)
-        if self.bearing is not None:
-            count = self.problem.system.W.shape[1]
-            groups["carrier bearing"] = np.array([[count - 2, count - 1]])
-        return groups
+        """Places of the columns, see `Bearings.columns`."""
+        return self.bearings.columns(self.data, back_flanks=self.back_flanks)
 
 
-@dataclass(frozen=True)
-class MotionLines:
-    """Lines of a solution, and the share of the time in which flanks touch.
+def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | None = None) -> PlanarSet:
+    """Make the lumped set of a case: bodies and supports of its entries, radii and angles of its gears.
 
     Parameters
     ----------
-    member : (3, 2, L) complex array
-        x and y of carrier, ring and sun in the carrier frame [m].
-    mesh_force, back_force : (2N, L) complex arrays
-        Along the line of action of the drive flanks, and of the back flanks [N].
-    planet_bearing : (N, 2, L) complex array
-        Force of the pin on the planet, radially outwards and tangentially [N].
-    carrier_bearing : (2, L) complex array
-        x and y of the force of the carrier bearing on the carrier [N]; zero without one.
-    drive_contact, back_contact : (2N,) arrays
-    motion : float
-        Farthest that the centre of carrier, ring or sun moves from its place [m].
-    approach : float
-        Largest deflection of a mesh [m].
+    case : Case
+    gears : PlanetarySet
+    static : StaticResult, optional
+        Its mean stiffnesses are taken where the case gives none.
+    """
+    planar, bodies = case.planar, {}
+    for name, one in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
+        torsional = torsional_support(case, name, getattr(planar.torsion, name))
+        support = needed(one.support_stiffness, f"{name}.support_stiffness")
+        bodies[name] = PlanarBody(one.mass, one.inertia, support, torsional)
+    given = planar.mesh_stiffness
+    mean = needed(static, "static").cycle.stiffness.mean(axis=1) if given is None else None
+    return planar_from_set(
+        gears,
+        **bodies,
+        planet=PlanarBody(case.planet.mass, case.planet.inertia),
+        **mesh_stiffnesses(given, mean),
+        planet_bearing=case.planet.bearing_stiffness,
+    )
+
+
+def planar_model(
+    case: PlanarCase,
+    gears: PlanetarySet,
+    static: StaticResult | None = None,
+    *,
+    mesh_frequency: bool = False,
+    carrier_speed: float = 0.0,
+) -> PlanarModel:
+    """Make the lumped set of a case with its elements, forces and damping.
+
+    Parameters
+    ----------
+    case : Case
+    gears : PlanetarySet
+    static : StaticResult, optional
+        Needed where the case gives no mesh stiffness.
+    mesh_frequency : bool
+        The base frequencies are those of carrier and mesh, and the mesh stiffness of a static result varies;
+        otherwise the only base frequency is that of the weight, and mesh stiffnesses are constant.
+    carrier_speed : float
+        Of the gyroscopic terms [rad/s].
+    """
+    if static is not None:
+        check_entries(static, StaticResult, static_entries(case), "static solution")
+    planar = case.planar
+    data, bearing = planar_data(case, gears, static), planar.carrier_bearing
+    members = (MemberBearing(bearing.stiffness, bearing.clearance, "carrier", bearing.on),) if bearing else ()
+    bearings = Bearings(case.planet.bearing_clearance or None, members)
+    problem = gear_set_problem(
+        data,
+        meshes=_meshes(case, gears, data, static, mesh_frequency),
+        back_flanks=planar.back_flanks,
+        torque=driving_torque(case, reacts=planar.reaction == "output"),
+        bearings=bearings,
+        gravity=_gravity(case, gears, mesh_frequency),
+        pin_errors=_pin_errors(case, gears.n_planets) if planar.mesh_stiffness else None,
+        carrier_speed=carrier_speed,
+        damping=planar_ratios(case),
+    )
+    return PlanarModel(data, problem, planar.back_flanks, bearings)
+
+
+def carrier_sense(case: PlanarCase, gears: PlanetarySet) -> int:
+    """Tell the sense of the carrier: 1 where it turns counter-clockwise, -1 clockwise, 0 where it stands."""
+    return int(np.sign(member_speeds(case, gears).carrier))
+
+
+def planar_ratios(case: PlanarCase) -> float | tuple[float, ...]:
+    """Read the damping ratios of a case: of all modes, or one a natural frequency as of `mode_ratios`."""
+    return case.planar.damping_ratios or case.dynamics.damping_ratio
+
+
+def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
+    """Mesh elements: constant, or along the static record over the mesh phase."""
+    planar, N = case.planar, gears.n_planets
+    backlash = planar.line_backlash
+    if backlash is None:
+        play = np.repeat([gears.backlash_sun_planet, gears.backlash_planet_ring], N)
+        backlash = np.where(play > 0.0, play, np.inf)
+    options = {"backlash": backlash, "smoothing": planar.smoothing}
+    if planar.mesh_stiffness is not None:
+        return mesh_elements(data, **options)
+    cycle = needed(static, "static").cycle
+    if not varying:
+        stiffness, deflection, force = (
+            getattr(cycle, name).mean(axis=1) for name in ("stiffness", "deflection", "force")
+        )
+        unloaded = constant(deflection - force / stiffness)
+        return GearMeshes(np.arange(2 * N), constant(stiffness), unloaded, **options)
+    record = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, np.zeros(2 * N))
+    # positions of the record run with the sun against the carrier
+    orders = (0, rotation_sense(case, gears))
+    return mesh_elements(data, stiffness=record, harmonics=case.mesh_harmonics, orders=orders, **options)
+
+
+def _gravity(case: PlanarCase, gears: PlanetarySet, mesh_frequency: bool) -> Gravity | None:
+    given, sense = case.planar.gravity, carrier_sense(case, gears)
+    if given is None:
+        return None
+    orders = None if sense == 0 else (sense, 0) if mesh_frequency else (sense,)
+    return Gravity(given.acceleration, given.direction, orders)
+
+
+def _pin_errors(case: PlanarCase, n_planets: int) -> np.ndarray:
+    pins = np.zeros((n_planets, 2))
+    for pin in case.set.pin_errors:
+        pins[pin.planet - 1] = pin.radial, pin.tangential
+    return pins
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionLines:
+    """Motions, forces and contact of a solution, under the names of branch.nc and response.nc.
+
+    Parameters
+    ----------
     force_tail : float
         Share of the fluctuating force in the upper half of the lines, of the kind of mesh, sun-planet or
         planet-ring with both flanks, that has more of it; see `femgear.system.fourier.line_tail`.
+    motion : float
+        Farthest that the centre of carrier, ring or sun moves from its place [m].
+    rms, displacement : (3, 2) array, (3, 2, L) complex array
+        x and y of carrier, ring and sun in the carrier frame, root mean square about the mean and lines [m].
+    mesh_force, back_force : (2N, L) complex arrays
+        Along the line of action of the drive flanks, and of the back flanks [N].
+    planet_bearing_force : (N, 2, L) complex array
+        Force of the pin on the planet, radially outwards and tangentially [N].
+    carrier_bearing_force : (2, L) complex array
+        x and y of the force of the carrier bearing on the carrier [N]; zero without one.
+    drive_contact, back_contact : (2N,) arrays
+        Shares of the time in which drive and back flanks touch.
+    approach : float
+        Largest deflection of a mesh [m].
     """
 
-    member: np.ndarray
+    force_tail: float
+    motion: float
+    rms: np.ndarray
+    displacement: np.ndarray
     mesh_force: np.ndarray
     back_force: np.ndarray
-    planet_bearing: np.ndarray
-    carrier_bearing: np.ndarray
+    planet_bearing_force: np.ndarray
+    carrier_bearing_force: np.ndarray
     drive_contact: np.ndarray
     back_contact: np.ndarray
-    motion: float
     approach: float
-    force_tail: float
 
 
 def weight_curve(
@@ -536,7 +262,7 @@ def weight_curve(
     largest: float = 0.1,
     max_points: int = 600,
 ) -> Branch:
-    """Periodic responses over the frequency of the weight in the carrier frame.
+    """Follow periodic responses over the frequency of the weight in the carrier frame.
 
     Parameters
     ----------
@@ -569,7 +295,7 @@ def weight_curve(
 def judged_branch(
     problem: NonlinearSystem, branch: Branch, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Branch:
-    """A branch with Floquet verdicts: coarse first, fine where that is open or near the unit circle.
+    """Judge a branch by Floquet multipliers: coarse first, fine where open or near the unit circle.
 
     Parameters
     ----------
@@ -600,19 +326,14 @@ def _open(verdict: FloquetVerdict) -> bool:
     return abs(abs(verdict.multipliers[0]) - 1.0) < 100.0 * verdict.error + _COARSE
 
 
-def member_rows(data: PlanarSet, member: str) -> np.ndarray:
-    """Rows (2, n) that give x and y of the carrier, ring or sun; zero where its axis is held."""
-    first = 3 * CENTRAL.index(member)
-    return free_motions(data)[first : first + 2]
-
-
 def motion_lines(model: PlanarModel, solution: PeriodicSolution) -> MotionLines:
-    """Lines of all that is looked at in a solution."""
+    """Compute the lines of all that is looked at in a solution."""
     data, groups, N = model.data, model.groups, model.data.n_planets
     pins = (free_motions(data).T @ pin_directions(data).reshape(-1, 2 * N)).T
-    rows = np.vstack([*(member_rows(data, name) for name in CENTRAL), pins])
+    members = [3 * row + axis for row in range(len(CENTRAL)) for axis in range(2)]
+    rows = np.vstack([free_motions(data)[members], pins])
     x = displacements(model.problem, solution, rows, reduction=model.reduction)
-    if model.planet_clearance:
+    if len(groups["planets"]):
         pin_force = -solution.force[groups["planets"]]
     else:
         pin_force = -data.pin_stiffness[..., None] * x[6:].reshape(N, 2, -1)
@@ -620,28 +341,32 @@ def motion_lines(model: PlanarModel, solution: PeriodicSolution) -> MotionLines:
     if model.back_flanks:
         back = solution.force[groups["back flanks"]]
     bearing = np.zeros((2, x.shape[1]), complex)
-    if model.bearing is not None:
-        bearing = -solution.force[groups["carrier bearing"][0]]
+    if len(groups["members"]):
+        bearing = -solution.force[groups["members"][0]]
     member, mesh = x[:6].reshape(3, 2, -1), solution.force[groups["meshes"]]
     wave = np.exp(1j * (_phases(solution.orders) @ solution.orders.T))
     path = np.real(member @ wave.T)
     deflection = np.real(wave @ solution.deflection[groups["meshes"]].T)
     kinds = (np.vstack([mesh[part], back[part]]) for part in (slice(0, N), slice(N, 2 * N)))
+    pressed, pulled = column_contact(model.problem, solution)
+    behind = pressed[groups["back flanks"]] if model.back_flanks else pulled[groups["meshes"]]
     return MotionLines(
-        member,
-        mesh,
-        back,
-        pin_force,
-        bearing,
-        *flank_contact(model.problem, solution, N),
-        motion=float(np.hypot(path[:, 0], path[:, 1]).max()),
-        approach=float(deflection.max()),
         force_tail=max(line_tail(forces, solution.orders, rounding=_STILL) for forces in kinds),
+        motion=float(np.hypot(path[:, 0], path[:, 1]).max()),
+        rms=fluctuation(member),
+        displacement=member,
+        mesh_force=mesh,
+        back_force=back,
+        planet_bearing_force=pin_force,
+        carrier_bearing_force=bearing,
+        drive_contact=pressed[groups["meshes"]],
+        back_contact=behind,
+        approach=float(deflection.max()),
     )
 
 
 def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (n, 2N) [N] of drive flanks and of back flanks on lines of their own, from the element laws.
+    """Compute the forces (n, 2N) [N] of drive flanks, and of back flanks on their own lines, by their laws.
 
     The deflections are those of the solution. Its force lines, cut at the last one, would ring beside a short
     contact; the law of a one-sided contact does not.
@@ -659,42 +384,8 @@ def flank_forces(model: PlanarModel, solution: PeriodicSolution, theta) -> tuple
     return drive, force[:, groups["back flanks"]] if model.back_flanks else np.zeros_like(drive)
 
 
-def cut_branch(branch: Branch, count: int, message: str) -> Branch:
-    """The first points of a branch, which then did not reach an end of its range."""
-    known = branch.curve
-    curve = replace(
-        known,
-        **{name: getattr(known, name)[:count] for name in _ALONG},
-        **{name: getattr(known, name)[getattr(known, name) < count] for name in ("folds", "branch_points")},
-        closed=False,
-        complete=False,
-        message=message,
-    )
-    return replace(
-        branch, parameter=branch.parameter[:count], solutions=branch.solutions[:count], curve=curve
-    )
-
-
-def flank_contact(
-    problem: NonlinearSystem, solution: PeriodicSolution, n_planets: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the time (2N,) in which drive flanks, and back flanks, of every mesh touch.
-
-    Parameters
-    ----------
-    problem : NonlinearSystem
-    solution : PeriodicSolution
-    n_planets : int
-    """
-    share = column_contact(problem, solution)
-    meshes = slice(0, 2 * n_planets)
-    if share.shape[1] >= 4 * n_planets and np.isfinite(share[0, 2 * n_planets : 4 * n_planets]).all():
-        return share[0, meshes], share[0, 2 * n_planets : 4 * n_planets]
-    return share[0, meshes], share[1, meshes]
-
-
 def column_contact(problem: NonlinearSystem, solution: PeriodicSolution) -> np.ndarray:
-    """Share of the time (2, n_columns) in which the flanks of every column press, and pull.
+    """Compute the share of the time (2, n_columns) in which the flanks of every column press, and pull.
 
     Columns without a mesh are nan. A mesh with play on one line of action pulls where its back flanks touch.
     A smoothed contact counts as closed beyond half its force scale, the force at the corner itself.
@@ -721,7 +412,7 @@ def _phases(orders: np.ndarray) -> np.ndarray:
 
 
 def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[tuple[int, str]]:
-    """Points of a branch that are drawn over the phase, in order, and what they are; the last one is the top.
+    """Choose points of a branch to draw over the phase, in order, with what they are; the last is the top.
 
     Parameters
     ----------
@@ -744,17 +435,12 @@ def shown_points(rms: np.ndarray, back: np.ndarray, stable: np.ndarray) -> list[
 
 
 def fluctuation(lines: np.ndarray) -> np.ndarray:
-    """Root mean square about the mean of lines (..., L), mean first."""
+    """Compute the root mean square (...) about the mean of lines (..., L), mean first."""
     return np.sqrt(0.5 * (np.abs(lines[..., 1:]) ** 2).sum(axis=-1))
 
 
-def stacked(found: Sequence[MotionLines]) -> dict[str, np.ndarray]:
-    """The lines of several solutions by name, the solutions along the first axis."""
-    return {name: np.array([getattr(one, name) for one in found]) for name in MotionLines.__annotations__}
-
-
 def merged_folds(frequency: np.ndarray, fold: np.ndarray) -> np.ndarray:
-    """Points of the limit points of a branch, neighbours at one frequency as one: the outermost of them.
+    """Find the limit points of a branch, neighbours at one frequency as one: the outermost of them.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ every variable of a file carries its units. The tables say what the case is and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -16,9 +16,19 @@ import numpy as np
 
 from femgear.case.sections import output_member
 from femgear.errors import Finding, remark
-from femgear.report.tables import Block
+from femgear.gears.kinematics import torques
+from femgear.report.tables import MANY, Block, chosen
 from femgear.storage.dataset import MEMBERS, RPM, complex_entries, dataset
-from femgear.trains.rigid import modes_entries, stiffness_text, torsion_text
+from femgear.trains.gear_set import modes_dataset
+from femgear.trains.planar.model import (
+    TAIL_LIMIT,
+    MotionLines,
+    flank_forces,
+    fluctuation,
+    merged_folds,
+    shown_points,
+)
+from femgear.trains.rigid import stiffness_text, torsion_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +40,7 @@ if TYPE_CHECKING:
     from femgear.storage.results import Results
     from femgear.system.rigid_bodies import PlanarSet
     from femgear.system.system import Modes
-    from femgear.trains.planar.model import MotionLines, PlanarModel
+    from femgear.trains.planar.model import PlanarModel
     from femgear.trains.planar.section import PlanarCase
 
 FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
@@ -38,8 +48,6 @@ FOURIER = "x(t) = Re sum_l (x_real + i x_imag)_l exp(i (order_l . theta(t)))"
 # instants of a turn of the weight at which forces are stored
 PHASES = 721
 
-# rows of a table of speeds, and speeds in a sentence
-_MANY = 8
 # distance of a multiplier from 1 at a limit point beyond which harmonics are missing
 _TRUNCATED = 0.2
 # share of the energy in the upper half of the lines beyond which it is said, as in the spectral stage
@@ -59,12 +67,28 @@ _OF_SOLUTIONS = {
     "spectral_radius": "spectral radius of the fixed point",
 }
 
+# of `MotionLines`: dimensions behind that of the solutions, unit and description
+_MOTIONS = {
+    "force_tail": (
+        "", "1", "share of the fluctuating force in the upper half of the lines, of the kind of mesh with "
+        "more of it",
+    ),
+    "motion": ("", "m", "farthest that a member's centre moves from its place"),
+    "rms": ("member axis", "m", "displacement about its mean, r.m.s."),
+    "displacement": ("member axis line", "m", "displacement in the carrier frame"),
+    "mesh_force": ("mesh line", "N", "mesh force along the line of the drive flanks"),
+    "back_force": ("mesh line", "N", "force of the back flanks on their own line"),
+    "planet_bearing_force": ("planet direction line", "N", "force of the pin on the planet"),
+    "carrier_bearing_force": ("axis line", "N", "force of the carrier bearing on the carrier"),
+    "drive_contact": (
+        "mesh", "1", "share of the time in which the drive flanks touch: 1 in contact, 0 not",
+    ),
+    "back_contact": ("mesh", "1", "share of the time in which the back flanks touch: 1 in contact, 0 not"),
+}  # fmt: skip
+
 # pictures drawn by stability, of the stage "response", of the branch, and of displacements without forces
 _BY_STABILITY = ("weight_response", "tooth_contact")
-_OF_RESPONSE = (
-    "response_orbit", "response_bearing_forces", "response_mesh_forces", "response_spectrum",
-    "contact_over_speed",
-)  # fmt: skip
+_OF_RESPONSE = ("response_", "contact_over_speed")
 _OF_BRANCH = ("weight_response", "carrier_orbit", "planet_bearing_forces", "wedged_teeth", "tooth_contact")
 _OF_MOTION = ("weight_response", "carrier_orbit", "response_orbit")
 
@@ -79,26 +103,11 @@ class PlanarModesResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of modes.nc of a planar case: axes and rotations of all bodies, no elastic ring."""
-        from femgear.system.assembler import free_motions
-
-        modes, gears = self.modes, self.planetary_set
-        n, axes = 2 * gears.n_planets, ("x", "y", "rotation")
-        variables, coords = modes_entries(self.data, modes, free_motions(self.data), axes)
-        variables |= {
-            "mesh_stiffness": (("mesh",), modes.mesh_stiffness[:n], "N/m", "mean mesh stiffness"),
-            "mesh_deflection": (
-                ("mesh", "mode"), modes.mesh_deflection[:n], "kg^-1/2", "mesh deflection of the mode",
-            ),
-        }  # fmt: skip
-        return dataset(
-            variables,
-            coords=coords | {"mesh": (("mesh",), list(gears.mesh_names), "1", "gear mesh")},
-            attrs={
-                "title": "modes of the planar set at standstill, bearings closed, back flanks open",
-                "unknowns": len(modes.shape),
-                "planet_angles": np.asarray(gears.planet_angles),
-            },
-        )
+        attrs = {
+            "title": "modes of the planar set at standstill, bearings closed, back flanks open",
+            "planet_angles": np.asarray(self.planetary_set.planet_angles),
+        }
+        return modes_dataset(self.data, self.planetary_set, self.modes, attrs=attrs)
 
 
 @dataclass(frozen=True)
@@ -114,13 +123,17 @@ class BranchResult:
 
     def dataset(self) -> xr.Dataset:
         """Contents of branch.nc."""
-        branch, point = self.branch, ("point",)
-        hertz = branch.parameter / (2.0 * np.pi)
-        known = len(branch.verdicts) > 0
-        folds, crossings = np.zeros((2, len(hertz)), bool)
+        branch, verdicts = self.branch, self.branch.verdicts
+        count = len(branch.parameter)
+        point, hertz = ("point",), branch.parameter / (2.0 * np.pi)
+        folds, crossings = np.zeros((2, count), bool)
         folds[branch.folds], crossings[branch.branch_points] = True, True
         carrier = self.sense * branch.parameter
-        stable = np.array([_state(one) for one in branch.verdicts] if known else [-1] * len(hertz))
+        # without verdicts everything is open
+        nothing, unsaid = np.full(count, np.nan), [""] * count
+        stable = np.array([-1 if one.stable is None else one.stable for one in verdicts] or [-1] * count, int)
+        notes = [one.message if one.stable is None else "" for one in verdicts] or unsaid
+        largest, loss = (branch.largest_multiplier, list(branch.loss)) if verdicts else (nothing, unsaid)
         variables = {
             "weight_frequency": (point, hertz, "Hz", "frequency of the weight in the carrier frame"),
             "carrier_speed": (point, carrier, "rad/s", "speed of the carrier, counter-clockwise positive"),
@@ -130,11 +143,19 @@ class BranchResult:
             "spectral_radius": (point, branch.spectral_radius, "1", "spectral radius of the fixed point"),
             "residual": (point, branch.residual, "1", "relative residual of the harmonic equations"),
             "converged": (point, branch.converged, "1", "whether the solution satisfies its tolerance"),
+            "stable": (point, stable, "1", "stability: 1 stable, 0 not stable, -1 not known"),
+            "stability_note": (point, notes, "1", "why stability is not known"),
+            "largest_multiplier": (point, largest, "1", "largest Floquet multiplier"),
+            "multiplier_distance": (
+                point, [_nearest(one) for one in verdicts] or nothing, "1",
+                "distance of the nearest Floquet multiplier from 1, "
+                "which is zero at a limit point of the motion",
+            ),
+            "loss": (point, loss, "1", "how stability is lost"),
         }  # fmt: skip
-        variables |= _stability(branch, stable) | _flank_forces(self, stable)
-        variables |= _motions(self.lines, "point", "harmonic")
+        variables |= _flank_forces(self, stable) | _motions(self.lines, "point", "harmonic")
         coords = _coordinates(self.planetary_set) | {
-            "point": (point, np.arange(len(hertz)), "1", "point along the branch"),
+            "point": (point, np.arange(count), "1", "point along the branch"),
             "harmonic": (("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
             "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, PHASES), "rad", "phase of the weight"),
         }
@@ -145,7 +166,7 @@ class BranchResult:
                 "title": "periodic responses to the weight",
                 "message": self.ending,
                 "complete": int(branch.complete),
-                "stability": "Floquet multipliers" if known else "not computed",
+                "stability": "Floquet multipliers" if verdicts else "not computed",
                 "fourier_convention": FOURIER,
             },
         )
@@ -201,40 +222,14 @@ class PlanarResponseResult:
         )
 
 
-def _stability(branch: Branch, stable: np.ndarray) -> dict[str, tuple]:
-    """Verdicts of all points; open ones where stability was not asked for."""
-    point, known, count = ("point",), len(branch.verdicts) > 0, len(stable)
-    nothing, unsaid = np.full(count, np.nan), [""] * count
-    return {
-        "stable": (point, stable, "1", "stability: 1 stable, 0 not stable, -1 not known"),
-        "stability_note": (
-            point, [_reason(one) for one in branch.verdicts] if known else unsaid, "1",
-            "why stability is not known",
-        ),
-        "largest_multiplier": (
-            point, branch.largest_multiplier if known else nothing, "1", "largest Floquet multiplier",
-        ),
-        "multiplier_distance": (
-            point, [_nearest(verdict) for verdict in branch.verdicts] if known else nothing, "1",
-            "distance of the nearest Floquet multiplier from 1, which is zero at a limit point of the motion",
-        ),
-        "loss": (point, list(branch.loss) if known else unsaid, "1", "how stability is lost"),
-    }  # fmt: skip
-
-
-def _state(verdict: FloquetVerdict) -> int:
-    return -1 if verdict.stable is None else int(verdict.stable)
-
-
-def _reason(verdict: FloquetVerdict) -> str:
-    return verdict.message if verdict.stable is None else ""
+def _nearest(verdict: FloquetVerdict) -> float:
+    """Distance of the nearest multiplier from 1."""
+    return float(np.abs(verdict.multipliers - 1.0).min()) if len(verdict.multipliers) else np.nan
 
 
 def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
     """Forces in time at the points that are drawn, from the laws of the contacts."""
-    from femgear.trains.planar.model import flank_forces, fluctuation, shown_points
-
-    rms = np.array([fluctuation(one.member[0, 0]) for one in result.lines])
+    rms = np.array([one.rms[0, 0] for one in result.lines])
     back = np.array([one.back_contact.max() for one in result.lines])
     points = shown_points(rms, back, stable)
     theta = np.linspace(0.0, 2.0 * np.pi, PHASES)[:, None]
@@ -249,44 +244,15 @@ def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
     }
 
 
-def _nearest(verdict: FloquetVerdict) -> float:
-    return (
-        float(np.abs(verdict.multipliers - 1.0).min(initial=np.inf)) if len(verdict.multipliers) else np.nan
-    )
-
-
-def _motions(lines, along: str, line: str) -> dict[str, tuple]:
-    """Displacements, forces and contact of all solutions."""
-    from femgear.trains.planar.model import fluctuation, stacked
-
-    found, out = stacked(lines), {}
-    member, mesh = (along, "member", "axis"), (along, "mesh")
-    out["force_tail"] = (
-        (along,), found["force_tail"], "1",
-        "share of the fluctuating force in the upper half of the lines, of the kind of mesh with more of it",
-    )  # fmt: skip
-    out["motion"] = ((along,), found["motion"], "m", "farthest that a member's centre moves from its place")
-    out["rms"] = (member, fluctuation(found["member"]), "m", "displacement about its mean, r.m.s.")
-    out |= complex_entries((
-        ("displacement", (*member, line), found["member"], "m", "displacement in the carrier frame"),
-        (
-            "mesh_force", (*mesh, line), found["mesh_force"], "N",
-            "mesh force along the line of the drive flanks",
-        ),
-        ("back_force", (*mesh, line), found["back_force"], "N", "force of the back flanks on their own line"),
-        (
-            "planet_bearing_force", (along, "planet", "direction", line), found["planet_bearing"], "N",
-            "force of the pin on the planet",
-        ),
-        (
-            "carrier_bearing_force", (along, "axis", line), found["carrier_bearing"], "N",
-            "force of the carrier bearing on the carrier",
-        ),
-    ))  # fmt: skip
-    for side in ("drive", "back"):
-        words = f"share of the time in which the {side} flanks touch: 1 in contact, 0 not"
-        out[f"{side}_contact"] = (mesh, found[f"{side}_contact"], "1", words)
-    return out
+def _motions(lines: Sequence[MotionLines], along: str, line: str) -> dict[str, tuple]:
+    """Displacements, forces and contact of all solutions, which stand along the first axis."""
+    entries = {}
+    for name, (dims, unit, words) in _MOTIONS.items():
+        values = np.array([getattr(one, name) for one in lines])
+        axes = (along, *(line if axis == "line" else axis for axis in dims.split()))
+        entry = (axes, values, unit, words)
+        entries |= complex_entries([(name, *entry)]) if "line" in dims else {name: entry}
+    return entries
 
 
 def _coordinates(gears) -> dict[str, tuple]:
@@ -301,7 +267,7 @@ def _coordinates(gears) -> dict[str, tuple]:
 
 
 def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
-    """Mesh stiffness, supports, weight and ranges of a planar case."""
+    """Tabulate bodies and supports of a planar case, with mesh stiffness, play and weight as notes."""
     planar = case.planar
     notes = [_stiffness(case), _play(case, planetary)]
     if planar.carrier_bearing is not None:
@@ -343,8 +309,6 @@ def _play(case: PlanarCase, planetary: PlanetarySet) -> str:
 
 def _smoothing(case: PlanarCase, planetary: PlanetarySet) -> str:
     """Length over which contact sets in, beside the mean compression where the stiffness is given."""
-    from femgear.gears.kinematics import torques
-
     given, smoothing = case.planar.mesh_stiffness, case.planar.smoothing
     text = f"contact sets in over {smoothing * 1e6:.6g} um"
     if given is None:
@@ -369,23 +333,21 @@ def _sense(case: PlanarCase) -> str:
 
 
 def describe_branch(data: xr.Dataset) -> Block:
-    """Table of branch.nc: ends, folds and the largest responses."""
-    from femgear.trains.planar.model import merged_folds
-
+    """Tabulate branch.nc: ends, folds and the largest responses."""
     hertz, rms = data["weight_frequency"].values, data["rms"].values
     known = data.attrs["stability"] != "not computed"
     stable = data["stable"].values
-    chosen = {0: "start", len(hertz) - 1: "end"}
-    chosen |= {int(point): "fold" for point in merged_folds(hertz, data["fold"].values)}
-    chosen[int(np.argmax(rms[:, 0, 0]))] = "largest carrier x"
-    chosen[int(np.argmax(rms[:, 1, 0]))] = "largest ring x"
+    named = {0: "start", len(hertz) - 1: "end"}
+    named |= {int(point): "fold" for point in merged_folds(hertz, data["fold"].values)}
+    named[int(np.argmax(rms[:, 0, 0]))] = "largest carrier x"
+    named[int(np.argmax(rms[:, 1, 0]))] = "largest ring x"
     rows = []
-    for point in sorted(chosen):
+    for point in sorted(named):
         back = float(data["back_contact"].values[point].max())
         rows.append(
             (
                 f"{hertz[point]:.4f}",
-                chosen[point],
+                named[point],
                 *(f"{1e6 * rms[point, member, 0]:.3f}" for member in range(3)),
                 f"{back:.3f}",
                 _STABLE[int(stable[point])] if known else "-",
@@ -422,8 +384,6 @@ def tail_warnings(data: xr.Dataset, key: str) -> tuple[Finding, ...]:
     key : str
         Entry of the case file to raise.
     """
-    from femgear.trains.planar.model import TAIL_LIMIT
-
     tail, force = data["tail"].values, data["force_tail"].values
     worst = np.maximum(tail, force)
     if (wrong := worst > TAIL_LIMIT).any():
@@ -447,7 +407,7 @@ def _where(data: xr.Dataset, bad: np.ndarray) -> str:
     if "weight_frequency" in data:
         hertz = data["weight_frequency"].values[bad]
         return f"{len(hertz)} of {len(bad)} points, {hertz.min():.4g} to {hertz.max():.4g} Hz"
-    listed = ", ".join(f"{value:.6g}" for value in data["speed"].values[bad][:_MANY])
+    listed = ", ".join(f"{value:.6g}" for value in data["speed"].values[bad][:MANY])
     return f"{np.count_nonzero(bad)} of {len(bad)} speeds, {listed} rpm"
 
 
@@ -458,10 +418,10 @@ def planar_verdicts(branch: xr.Dataset | None, response: xr.Dataset | None) -> I
             yield remark(f"the branch of the response to the weight: {branch.attrs['message']!s}")
         yield from tail_warnings(branch, "planar.branch.harmonics")
     if response is not None:
-        yield from tail_warnings(response, response_key(response))
+        yield from tail_warnings(response, _response_key(response))
 
 
-def response_key(data: xr.Dataset) -> str:
+def _response_key(data: xr.Dataset) -> str:
     """Entries of the case file that hold the lines of response.nc."""
     if not data.attrs["mesh_lines"]:
         return "planar.response.carrier_harmonics"
@@ -470,8 +430,6 @@ def response_key(data: xr.Dataset) -> str:
 
 def _truncation(data: xr.Dataset) -> Iterator[str]:
     """Limit points that are none of the motion itself: there one multiplier would be 1."""
-    from femgear.trains.planar.model import merged_folds
-
     hertz, distance = data["weight_frequency"].values, data["multiplier_distance"].values
     for point in merged_folds(hertz, data["fold"].values):
         if distance[point] > _TRUNCATED:
@@ -495,20 +453,18 @@ def _verdicts(data: xr.Dataset) -> Iterator[str]:
 
 
 def describe_response(data: xr.Dataset) -> Block:
-    """Table of response.nc."""
-    rows, count = [], data.sizes["speed"]
+    """Tabulate response.nc, a row a speed."""
+    rows = []
     force = np.hypot(data["mesh_force_real"].values, data["mesh_force_imag"].values)
-    fluctuation = np.sqrt(0.5 * (force[:, :, 1:] ** 2).sum(axis=2)).max(axis=1)
-    for i in range(count):
-        if count > _MANY and _MANY // 2 <= i < count - _MANY // 2:
-            continue
+    varying = fluctuation(force).max(axis=1)
+    for i in chosen(data.sizes["speed"]):
         one = data.isel(speed=i)
         rows.append(
             (
                 f"{float(one.speed):.4g}",
                 f"{float(one.mesh_frequency):.4f}",
                 f"{1e6 * one.rms.values[0, 0]:.4f}",
-                f"{1e-3 * fluctuation[i]:.4f}",
+                f"{1e-3 * varying[i]:.4f}",
                 f"{float(one.drive_contact.min()):.3f}",
                 f"{float(one.back_contact.max()):.3f}",
                 f"{float(one['tail']):.2g}",
@@ -530,7 +486,7 @@ def describe_response(data: xr.Dataset) -> Block:
             "some lines have one frequency: planar.response.carrier_harmonics or side_bands reach from the "
             "weight to the mesh frequency; r.m.s. values count such lines apart"
         )
-    notes += map(str, tail_warnings(data, response_key(data)))
+    notes += map(str, tail_warnings(data, _response_key(data)))
     return Block("Weight and mesh frequency", header, tuple(rows), tuple(notes))
 
 
@@ -540,11 +496,11 @@ def _kind_of_lines(data: xr.Dataset) -> str:
     return "lines of the weight alone: a constant mesh stiffness leaves none of the mesh frequency"
 
 
-def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
-    """Natural frequencies that the case calls published, beside the nearest mode of the kind."""
+def published_modes(case: PlanarCase, data: xr.Dataset) -> tuple[Block, ...]:
+    """Tabulate natural frequencies [Hz] that the case calls published beside the nearest of the kind."""
     entries = [(one, one.frequency) for one in case.planar.published if one.frequency is not None]
     if not entries:
-        return None
+        return ()
     kinds, found = np.array([str(kind) for kind in data["kind"].values]), data["frequency"].values
     rows = []
     for one, hertz in entries:
@@ -555,17 +511,11 @@ def published_modes(case: PlanarCase, data: xr.Dataset) -> Block | None:
             near, difference = f"{nearest:.6g}", f"{100 * (nearest / hertz - 1):+.2f}"
         rows.append((one.kind, f"{hertz:.6g}", near, difference, one.source))
     header = ("kind", "published [Hz]", "nearest here [Hz]", "difference [%]", "source")
-    return Block("Published natural frequencies", header, tuple(rows))
-
-
-def remarks(results: Results, stem: str) -> Iterator[str]:
-    """What a case and its results add to the caption of a picture."""
-    yield from comparisons(results.case, stem)
-    yield from doubts(results, stem)
+    return (Block("Published natural frequencies", header, tuple(rows)),)
 
 
 def comparisons(case: PlanarCase, stem: str) -> Iterator[str]:
-    """How to read a picture of this case, and published ones beside it."""
+    """Tell how to read a picture of this case, and published ones beside it."""
     planar = case.planar
     if stem in _BY_STABILITY and planar.branch is not None:
         yield (
@@ -581,9 +531,7 @@ def comparisons(case: PlanarCase, stem: str) -> Iterator[str]:
 
 
 def doubts(results: Results, stem: str) -> Iterator[str]:
-    """What the results say against a picture."""
-    from femgear.trains.planar.model import TAIL_LIMIT
-
+    """Tell what the results say against a picture."""
     stage = "branch" if stem in _OF_BRANCH else "response" if stem.startswith(_OF_RESPONSE) else None
     if stage is None or stage not in results.stages:
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 from pydantic import (
     AfterValidator,
@@ -26,14 +26,15 @@ from femgear.trains.rigid import (
     unheld_member,
 )
 
-SMOOTHING = 0.3e-6
-"""Length over which tooth contact sets in [m], of the examples of NREL/CP-5000-55355."""
+# length over which tooth contact sets in [m], of the examples of NREL/CP-5000-55355
+_SMOOTHING = 0.3e-6
 
 Frequency = Annotated[float, Quantity(FREQUENCY, 0.01, 1e5)]
 Clearance = Annotated[float, Quantity(LENGTH, 0.0, 0.01)]
 Torsion = Annotated[float, Quantity(TORSION, 0.0, 1e15)]
 Ratio = Annotated[float, Number(0.0, 1.0, open_high=True)]
 
+# figures of a planar case that may be compared with published ones
 FigureName = Literal[
     "mode_shapes",
     "weight_response",
@@ -47,8 +48,6 @@ FigureName = Literal[
     "response_spectrum",
     "contact_over_speed",
 ]
-FIGURES: tuple[str, ...] = get_args(FigureName)
-"""Figures of a planar case that may be compared with published ones."""
 
 
 def _sentence(value: object) -> str:
@@ -147,7 +146,7 @@ class PlanarSection(Section):
 
     mesh_stiffness: MeshStiffnessSection | None = None
     line_backlash: Clearance | None = None
-    smoothing: Annotated[float, Quantity(LENGTH, 0.0, 1e-3)] = SMOOTHING
+    smoothing: Annotated[float, Quantity(LENGTH, 0.0, 1e-3)] = _SMOOTHING
     back_flanks: StrictBool = False
     damping_ratios: Annotated[tuple[Ratio, ...], AfterValidator(_some), Field(max_length=1000)] | None = None
     gyroscopic: StrictBool = False
@@ -212,7 +211,7 @@ class PlanarCase(RigidCase):
 
 
 def check_planar(case: PlanarCase) -> Iterator[CaseError]:
-    """Refusals of what a planar section does not go with."""
+    """Refuse what a planar section does not go with."""
     planar = case.planar
     yield from rigid_refusals(case, "planar", without_torque=": the planar set would rattle in its play")
     if planar.back_flanks and planar.line_backlash == 0.0:

@@ -22,6 +22,13 @@ _SAMPLES = 5
 
 
 @dataclass(frozen=True)
+class DirectResponse(MeshErrorResponse):
+    """The same with outputs ``L q`` (F, H, n_outputs), complex."""
+
+    output: np.ndarray
+
+
+@dataclass(frozen=True)
 class ResonancePeak:
     """One peak of a displacement response.
 
@@ -65,7 +72,7 @@ def mesh_error_response(
     outputs=None,
     speed: float = 0.0,
     damping_ratio=None,
-) -> MeshErrorResponse:
+) -> DirectResponse:
     """Response to transmission errors ``e_j(t) = Re sum_h error_jh exp(i h omega_m t)`` of the meshes.
 
     A mesh transmits ``k_j (W_j^T q - e_j)``, so that its error drives the set by ``W_j k_j e_j``
@@ -110,7 +117,7 @@ def mesh_error_response(
     transfer = transfer.reshape(len(mesh_frequency), len(harmonics), -1, len(k))
     answer = np.einsum("fhoj,jh->fho", transfer, error)
     deflection = answer[..., : len(k)]
-    return MeshErrorResponse(
+    return DirectResponse(
         mesh_frequency, harmonics, deflection, k * (deflection - error.T), answer[..., len(k) :]
     )  # fmt: skip
 
