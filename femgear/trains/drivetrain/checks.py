@@ -17,9 +17,10 @@ import numpy as np
 
 from femgear.case.units import FREQUENCY, SPEED, TIME
 from femgear.errors import CaseError
+from femgear.solvers.linear.modal import solve_modes
 from femgear.storage.dataset import RPM
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import ChainBearing, ChainShaft, Drivetrain, TorqueHistory
+from femgear.trains.drivetrain.data import Drivetrain, ShaftSection, TorqueHistory
 from femgear.trains.drivetrain.model import (
     DrivetrainModel,
     coordinates_of,
@@ -27,6 +28,7 @@ from femgear.trains.drivetrain.model import (
     rigid_rotation,
     torsional_model,
 )
+from femgear.trains.drivetrain.records import PASS_BAND
 from femgear.trains.drivetrain.section import (
     FASTEST_RATE,
     DrivetrainCase,
@@ -35,7 +37,7 @@ from femgear.trains.drivetrain.section import (
     settle_time,
     torque_histories,
 )
-from femgear.trains.drivetrain.time import PASS_BAND, static_deviations
+from femgear.trains.drivetrain.time import static_deviations
 
 BENDING, TORSIONAL = "with bending", "torsional"
 # Slower instants, over the mean speed, would need records of endless length over a turn.
@@ -119,17 +121,14 @@ def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duratio
     Raises
     ------
     CaseError
-        A duration that is not above zero (E-RANGE), a torque on no body (E-DRIVETRAIN), stages that leave no
-        single spin (E-DRIVETRAIN).
+        A torque on no body, stages that leave no single spin (E-DRIVETRAIN).
     """
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise CaseError(f"a run of {duration} s", code="E-RANGE", key="duration", limit="above 0 s, finite")
-    stages = (*train.planetary, *train.parallel)
+    stages = train.stages
     if not torques or all(one.driver is not None for one in stages):
         return train
     force = _stage_forces(train, torques, duration)
-    found = [
-        replace(one, driver=one.ends[1]) if one.driver is None and value < 0.0 else one
+    found: list = [
+        one.changed(driver=one.ends[1]) if one.driver is None and value < 0.0 else one
         for one, value in zip(stages, force)
     ]
     planets = len(train.planetary)
@@ -166,21 +165,21 @@ def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration:
         load[model.index(f"{one.body}: rotation")] = mean_torque(one, duration)
         load -= carried * (model.rigid @ load) / model.inertia
         force[:, column] = k * (W.T @ static_deviations(model, W, k, load))
-    sums = np.zeros((len(train.planetary) + len(train.parallel), len(torques)))
+    sums = np.zeros((len(train.stages), len(torques)))
     np.add.at(sums, model.geometry.stage, force)
     total = sums.sum(axis=1)
     # the model's flanks are those of the drivers that are given
-    default = [one.flank for one in (*train.planetary, *train.parallel)]
+    default = [one.flank for one in train.stages]
     return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)
 
 
 def _elastic(train: Drivetrain) -> Drivetrain:
     """The chain without damping, shafts that do not twist made stiff: a torque may act on either end."""
-    meshes = [one.mesh.stiffness * one.first_radius**2 for one in train.parallel]
+    meshes = [one.mesh.stiffness * one.pitch_radii[0] ** 2 for one in train.parallel]
     meshes += [one.ring_mesh.stiffness * one.ring_radius**2 for one in train.planetary]
     torsion = _RIGID * max(meshes, default=1.0)
     shafts = tuple(
-        replace(one, torsion=torsion) if not one.elements and math.isinf(one.springs.torsion) else one
+        one.changed(torsion=torsion) if not one.elements and math.isinf(one.springs.torsion) else one
         for one in train.shafts
     )
     return replace(train, shafts=shafts, damping_ratio=0.0)
@@ -288,18 +287,9 @@ def mesh_mode(model: DrivetrainModel, limit: float) -> float:
     limit : float
         The highest line of the mesh stiffness [Hz]; modes above answer it as springs do, without resonance.
     """
-    from scipy import linalg
-
-    if not len(model.meshes):
-        return 0.0
-    rows, stiffness = model.system.W, model.mean_stiffness
-    total = model.system.K + (rows * stiffness) @ rows.T
-    values, shapes = linalg.eigh(total, model.system.M)
-    # the free spin is the first
-    values, shapes = np.maximum(values[1:], 0.0), shapes[:, 1:]
-    hertz = np.sqrt(values) / (2.0 * math.pi)
-    driven = stiffness @ (rows.T @ shapes) ** 2 > MESH_SHARE * values
-    return float(hertz[driven & (hertz <= limit)].max(initial=0.0))
+    modes, stiffness = solve_modes(model.still, model.mean_stiffness), model.mean_stiffness
+    driven = stiffness @ modes.mesh_deflection**2 > MESH_SHARE * (2.0 * math.pi * modes.frequency) ** 2
+    return float(modes.frequency[driven & (modes.frequency <= limit)].max(initial=0.0))
 
 
 def frequency_shift(hertz: float, rate: float) -> float:
@@ -375,15 +365,9 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
     Raises
     ------
     CaseError
-        Records that are too few, a resolution that they do not have (E-RANGE); no meshes, or a first body
-        that nearly stops or turns back in the part that the spectra take (E-SPECTRUM).
+        Records that are too few, a resolution that they do not have (E-RANGE); a first body that nearly stops
+        or turns back in the part that the spectra take (E-SPECTRUM).
     """
-    if not len(model.meshes):
-        raise CaseError(
-            "the chain has no gears, and therefore no mesh forces",
-            code="E-SPECTRUM",
-            limit="one mesh or more",
-        )
     for problem in _spectrum_problems(case, record_rate(case, model)):
         raise _located(problem, case)
     s = case.simulation
@@ -437,12 +421,7 @@ def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
     wrong = np.flatnonzero(least <= 0.0)
     if not len(wrong):
         return
-    keys = []
-    for i, one in enumerate(model.train.planetary):
-        for which in ("sun_mesh", "ring_mesh"):
-            keys += [f"planetary[{i}].{which}.low_share"] * len(one.planet_angles)
-    keys += [f"parallel[{i}].mesh.low_share" for i in range(len(model.train.parallel))]
-    key = keys[wrong[0]]
+    key = f"{model.train.meshes[wrong[0]].key}.low_share"
     raise CaseError(
         f"the series of the stiffness of {model.meshes[wrong[0]]} falls to {least[wrong[0]]:.3g} N/m: with "
         f"{case.simulation.harmonics} terms it overshoots the jump by about 9 %",
@@ -589,8 +568,7 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     from scipy import linalg
 
     model = drivetrain_model(_like_springs(train), harmonics=1, turning=turning)
-    system = model.system
-    stiffness = system.K + (system.W * model.mean_stiffness) @ system.W.T
+    stiffness = model.total_stiffness
     own = np.diag(stiffness)
     size = np.sqrt(np.where(own > 0.0, own, 1.0))
     # the spin is known, and held
@@ -615,22 +593,23 @@ def _names(train: Drivetrain, model: DrivetrainModel, motions) -> tuple[str, ...
 def _like_springs(train: Drivetrain) -> Drivetrain:
     """The chain with springs that are all alike, without weight and damping."""
     lengths = [one.length for one in train.shafts]
-    lengths += [one.first_radius for one in train.parallel] + [one.sun_radius for one in train.planetary]
+    lengths += [one.pitch_radii[0] for one in (*train.parallel, *train.planetary)]
     arm = math.exp(np.mean(np.log(lengths))) if lengths else 1.0
     return replace(
         train,
-        shafts=tuple(_shaft(one, arm) for one in train.shafts),
-        parallel=tuple(replace(one, mesh=replace(one.mesh, stiffness=1.0)) for one in train.parallel),
+        shafts=tuple(_like_shaft(one, arm) for one in train.shafts),
+        parallel=tuple(one.changed(mesh=one.mesh.changed(stiffness=1.0)) for one in train.parallel),
         planetary=tuple(
-            replace(
-                one,
-                sun_mesh=replace(one.sun_mesh, stiffness=1.0),
-                ring_mesh=replace(one.ring_mesh, stiffness=1.0),
+            one.changed(
+                sun_mesh=one.sun_mesh.changed(stiffness=1.0),
+                ring_mesh=one.ring_mesh.changed(stiffness=1.0),
                 planet_bearing=_unit(one.planet_bearing),
             )
             for one in train.planetary
         ),
-        bearings=tuple(_bearing(one, arm) for one in train.bearings),
+        bearings=tuple(
+            one.changed(radial=_unit(one.radial), tilt=_unit(one.tilt, arm**2)) for one in train.bearings
+        ),
         gravity=0.0,
         damping_ratio=0.0,
     )
@@ -641,25 +620,15 @@ def _unit(stiffness: float, unit: float = 1.0) -> float:
     return stiffness if stiffness == 0.0 or math.isinf(stiffness) else unit
 
 
-def _bearing(one: ChainBearing, arm: float) -> ChainBearing:
-    return replace(
-        one, radial=_unit(one.radial), tilt=_unit(one.tilt, arm**2), torsion=_unit(one.torsion, arm**2)
-    )
-
-
-def _shaft(one: ChainShaft, arm: float) -> ChainShaft:
+def _like_shaft(one: ShaftSection, arm: float) -> ShaftSection:
+    """A shaft of springs of one, or a slender one of 12 E I / l^3 = 1 N/m."""
     if not one.elements:
         springs = one.springs
-        return replace(
-            one, section=None, bending=_unit(springs.bending, arm**2), torsion=_unit(springs.torsion, arm**2),
-            shear=_unit(springs.shear),
-        )  # fmt: skip
-    # a slender shaft of 12 E I / l^3 = 1 N/m
+        bending, torsion = _unit(springs.bending, arm**2), _unit(springs.torsion, arm**2)
+        return one.changed(bending=bending, torsion=torsion, shear=_unit(springs.shear))
     diameter = 0.1 * one.length
     modulus = one.length**3 / (12.0 * math.pi * diameter**4 / 64.0)
-    assert one.section is not None  # elements need one
-    section = replace(one.section, outer_diameter=diameter, inner_diameter=0.0, young=modulus)
-    return replace(one, section=section)
+    return one.changed(outer_diameter=diameter, inner_diameter=0.0, youngs_modulus=modulus)
 
 
 def check_spread(case: DrivetrainCase, train: Drivetrain) -> None:
@@ -674,8 +643,7 @@ def check_spread(case: DrivetrainCase, train: Drivetrain) -> None:
     from scipy import linalg
 
     model = drivetrain_model(replace(train, damping_ratio=0.0), turning=case.simulation.turning)
-    n, mass = len(model.rigid), model.system.M
-    stiffness = model.system.K + (model.system.W * model.mean_stiffness) @ model.system.W.T
+    n, mass, stiffness = len(model.rigid), model.system.M, model.total_stiffness
     values = linalg.eigvalsh(stiffness, mass)
     # what the modes take for rigid: a share of a norm, which is up to sqrt(n) above the largest
     share = math.sqrt(n) * max(1e-12, 10.0 * n * np.finfo(float).eps)

@@ -29,14 +29,9 @@ from femgear.storage.files import replace_file
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.checks import case_model
 from femgear.trains.drivetrain.data import Drivetrain, numbered
-from femgear.trains.drivetrain.model import (
-    DrivetrainModel,
-    coordinates_of,
-    free_coordinates,
-    stiffness_levels,
-)
+from femgear.trains.drivetrain.model import DrivetrainModel, coordinates_of, free_coordinates
+from femgear.trains.drivetrain.records import PASS_BAND
 from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, pass_band, separating, symbols
-from femgear.trains.drivetrain.time import PASS_BAND
 from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
@@ -227,38 +222,6 @@ def name_lines(ax, lines: Sequence[tuple], width: float) -> None:
         )  # fmt: skip
 
 
-def finished(figure: Figure) -> Figure:
-    """The figure with its legend."""
-    legend_below(figure)
-    return figure
-
-
-def stiffness_series(phase, curves: Sequence[tuple], steps: Sequence[tuple], *, title: str = "") -> Figure:
-    """Mesh stiffness over the mesh period: the series and the rectangular wave that it stands for.
-
-    Parameters
-    ----------
-    phase : (n,) array
-        Fractions of the period.
-    curves, steps : sequences of (text, stiffness (n,) [N/m])
-        Series, and rectangular waves in the same order.
-    """
-    figure, axes = panels(
-        [text for text, _ in curves], columns=len(curves), width=3.1, height=2.4, x="mesh period [1]",
-        y=[f"stiffness [{_unit(values)[1]}]" for _, values in curves], title=title,
-    )  # fmt: skip
-    for number, (ax, (_, values), (_, wave)) in enumerate(zip(axes, curves, steps)):
-        scale, colour = _unit(values)[0], COLOURS[number % len(COLOURS)]
-        ax.plot(phase, scale * np.asarray(wave), color=GREY, linewidth=1.4, label="rectangular")
-        ax.plot(phase, scale * np.asarray(values), color=colour, label="series")
-        ax.set_xlim(phase[0], phase[-1])
-    return finished(figure)
-
-
-def _unit(values) -> tuple[float, str]:
-    return (1e-9, "GN/m") if np.max(values) > 5e8 else (1e-6, "MN/m")
-
-
 def over_time(
     time,
     signals: Sequence[tuple],
@@ -301,7 +264,8 @@ def over_time(
             ax.axhline(0.0, color=GREY, linewidth=0.8)
         else:
             show_changes(ax)
-    return finished(figure)
+    legend_below(figure)
+    return figure
 
 
 def spectra(
@@ -343,27 +307,34 @@ def spectra(
             ax.axvline(at, color=GREY, linewidth=0.7, linestyle=":")
     axes[0].set_xlim(frequency[0], frequency[-1])
     name_lines(axes[0], lines, float(np.ptp(frequency)))
-    return finished(figure)
+    legend_below(figure)
+    return figure
 
 
 def stiffness_figure(model: DrivetrainModel) -> Figure:
-    """Series of the mesh stiffness of every stage, and the rectangular wave."""
-    train, phase = model.train, np.linspace(0.0, 2.0, 1601)
-    names, row, waves = numbered(model.meshes), 0, []
-    # by position: the planetary stages come first, with all suns' meshes before the rings'
-    for stage in train.planetary:
-        planets = len(stage.planet_angles)
-        waves += [(row, stage.sun_mesh), (row + planets, stage.ring_mesh)]
-        row += 2 * planets
-    waves += [(row + i, stage.mesh) for i, stage in enumerate(train.parallel)]
-    curves, steps = [], []
-    for row, wave in waves[:MOST_PANELS]:
-        text = names[row]
-        curves.append((text, FourierSeries(model.stiffness[row]).at(2.0 * np.pi * phase[:, None])[:, 0]))
-        low, high, share = stiffness_levels(wave)
+    """Series of the mesh stiffness of every stage over two mesh periods, and the rectangular wave."""
+    phase, names = np.linspace(0.0, 2.0, 1601), numbered(model.meshes)
+    first = [(row, mesh.section) for row, mesh in enumerate(model.train.meshes) if not mesh.planet]
+    first = first[:MOST_PANELS]
+    scales = [(1e-9, "GN/m") if wave.levels[1] > 5e8 else (1e-6, "MN/m") for _, wave in first]
+    figure, axes = panels(
+        [names[row] for row, _ in first],
+        columns=len(first),
+        width=3.1,
+        height=2.4,
+        x="mesh period [1]",
+        y=[f"stiffness [{unit}]" for _, unit in scales],
+        title=f"series of {model.stiffness.shape[1] - 1} terms",
+    )
+    for number, (ax, (row, wave), (scale, _)) in enumerate(zip(axes, first, scales)):
+        low, high, share = wave.levels
         inside = (phase + wave.phase + 0.5 * share) % 1.0 < share
-        steps.append((text, np.where(inside, high, low)))
-    return stiffness_series(phase, curves, steps, title=f"series of {model.stiffness.shape[1] - 1} terms")
+        series = FourierSeries(model.stiffness[row]).at(2.0 * np.pi * phase[:, None])[:, 0]
+        ax.plot(phase, scale * np.where(inside, high, low), color=GREY, linewidth=1.4, label="rectangular")
+        ax.plot(phase, scale * series, color=COLOURS[number % len(COLOURS)], label="series")
+        ax.set_xlim(phase[0], phase[-1])
+    legend_below(figure)
+    return figure
 
 
 def campbell_figure(modes: xr.Dataset) -> Figure:
@@ -551,20 +522,16 @@ class Layout:
 def drivetrain_layout(train: Drivetrain) -> Layout:
     """Places along z by shaft lengths, across it by centre distances."""
     names = [body.name for body in train.bodies]
-    gears = [r for s in train.parallel for r in (s.first_radius, s.second_radius)]
+    gears = [radius for s in train.parallel for radius in s.pitch_radii]
     gears += [stage.centre_distance for stage in train.planetary]
     size = max(gears, default=0.3)
     places = {names[0]: np.zeros(3)}
-    links = [(s.first, s.second, np.array([0.0, 0.0, s.length])) for s in train.shafts]
+    links = [(*s.between, np.array([0.0, 0.0, s.length])) for s in train.shafts]
+    seconds = [s.between[1] for s in train.parallel]
     for s in train.parallel:
-        apart = s.first_radius + s.second_radius
-        beside = _WHEEL_GAP * size if any(s.first == other.second for other in train.parallel) else 0.0
-        arm = [
-            apart * math.cos(s.direction),
-            apart * math.sin(s.direction),
-            s.first_offset - s.second_offset + beside,
-        ]
-        links.append((s.first, s.second, np.array(arm)))
+        apart, beside = sum(s.pitch_radii), _WHEEL_GAP * size if s.between[0] in seconds else 0.0
+        across = apart * math.cos(s.direction), apart * math.sin(s.direction)
+        links.append((*s.between, np.array([*across, s.offsets[0] - s.offsets[1] + beside])))
     links += [(s.carrier, s.sun, np.zeros(3)) for s in train.planetary]
     for _ in names:
         for first, second, arm in links:
@@ -575,22 +542,13 @@ def drivetrain_layout(train: Drivetrain) -> Layout:
     centre = [places[name] for name in names]
     wheels = _wheels(train, places, size)
     for stage in train.planetary:
-        for p, angle in enumerate(stage.planet_angles):
+        prefix = "planet" if len(train.planetary) == 1 else f"planet of {stage.carrier}"
+        for p, angle in enumerate(stage.angles, start=1):
             arm = stage.centre_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
-            wheels.append(
-                Wheel(
-                    f"planet {p + 1}",
-                    places[stage.carrier] + arm,
-                    stage.planet_radius,
-                    0.2 * size,
-                    len(names),
-                )
-            )
-            names.append(
-                f"planet {p + 1}" if len(train.planetary) == 1 else f"planet of {stage.carrier} {p + 1}"
-            )
             centre.append(places[stage.carrier] + arm)
-    shafts = tuple((names.index(s.first), names.index(s.second)) for s in train.shafts)
+            wheels.append(Wheel(f"planet {p}", centre[-1], stage.pitch_radii[1], 0.2 * size, len(names)))
+            names.append(f"{prefix} {p}")
+    shafts = tuple((names.index(s.between[0]), names.index(s.between[1])) for s in train.shafts)
     return Layout(tuple(names), np.array(centre), tuple(wheels), shafts)
 
 
@@ -600,12 +558,12 @@ def _wheels(train: Drivetrain, places, size: float) -> list[Wheel]:
     for stage in train.planetary:
         plate = places[stage.carrier] - np.array([0.0, 0.0, 0.2 * size])
         found.append((stage.carrier, plate, stage.centre_distance, 0.06 * size))
-        found.append((stage.sun, places[stage.sun], stage.sun_radius, 0.2 * size))
+        found.append((stage.sun, places[stage.sun], stage.pitch_radii[0], 0.2 * size))
     for stage in train.parallel:
-        other = places[stage.second] * np.array([0.0, 0.0, 1.0])
-        first = places[stage.first] * np.array([1.0, 1.0, 0.0]) + other
-        found.append((stage.first, first, stage.first_radius, 0.2 * size))
-        found.append((stage.second, places[stage.second], stage.second_radius, 0.2 * size))
+        first, second = (places[name] for name in stage.between)
+        # in the plane of the second gear
+        centres = np.array([first[0], first[1], second[2]]), second
+        found += [(*one, 0.2 * size) for one in zip(stage.between, centres, stage.pitch_radii)]
     geared = {name for name, *_ in found}
     found += [(n, places[n], _PLAIN * size, 0.3 * size) for n in order if n not in geared]
     return [Wheel(name, centre, radius, width, order.index(name)) for name, centre, radius, width in found]
@@ -659,7 +617,8 @@ def shaft_lines(
     place, full = _all_coordinates(model, shape)
     found = []
     for shaft, inner, ends in zip(model.train.shafts, place.inner, layout.shafts):
-        first = np.array([place.body[shaft.first], *inner, place.body[shaft.second]])
+        one, two = (place.body[name] for name in shaft.between)
+        first = np.array([one, *inner, two])
         stations = full[first[:, None] + np.arange(5)]
         share, across = _beam_line(shaft, stations, points if shaft.elements else 3 * points)
         one, two = layout.centre[list(ends)]

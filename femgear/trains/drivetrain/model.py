@@ -30,14 +30,15 @@ from femgear.system.assembler import mesh_directions, pin_directions
 from femgear.system.elements import positive_part
 from femgear.system.fourier import FourierSeries, phase_of
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.system.shaft import AXES, disc_matrices, joint_deflections
+from femgear.system.shaft import AXES, beam_element, disc_matrices, joint_deflections
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.drivetrain.data import (
-    ChainBearing,
+    BearingSection,
     Drivetrain,
-    MeshWave,
-    ParallelStage,
-    PlanetaryStage,
+    MeshSection,
+    ParallelSection,
+    PlanetarySection,
+    ShaftSection,
     numbered,
 )
 
@@ -106,6 +107,11 @@ class DrivetrainModel:
         return np.real(self.stiffness[:, 0])
 
     @property
+    def total_stiffness(self) -> np.ndarray:
+        """(n, n) with mean mesh stiffnesses."""
+        return self.system.K + (self.system.W * self.mean_stiffness) @ self.system.W.T
+
+    @property
     def still(self) -> MechanicalSystem:
         """Without load, damping and gyroscopic terms, for modes."""
         nothing = {"C": np.zeros_like(self.system.C), "load": np.zeros(len(self.rigid))}
@@ -161,7 +167,10 @@ def drivetrain_model(
         T.T @ M @ T, np.zeros((len(names), len(names))), T.T @ K @ T, geometry.frozen, np.zeros(len(names)),
         names, T.T @ G @ T,
     )  # fmt: skip
-    stiffness, backlash, mesh_base, bases, base_ratio = _meshes(train, place, spin, geometry, harmonics)
+    stiffness = _stiffness(train, place, spin, harmonics)
+    backlash = np.array([np.inf if m.section.backlash is None else m.section.backlash for m in train.meshes])
+    bases, base_ratio, of_stage = _bases(train, place, spin)
+    mesh_base = np.array([of_stage[mesh.stage] for mesh in train.meshes], int)
     C = np.zeros_like(reduced.C)
     if train.damping_ratio:
         still = replace(reduced, gyroscopic=None)
@@ -173,8 +182,8 @@ def drivetrain_model(
     system = replace(reduced, C=C, load=load)
     ratio = {name: float(spin[first + 4]) for name, first in place.body.items()}
     return DrivetrainModel(
-        train, system, geometry, stiffness, backlash, bases, base_ratio, mesh_base, turning, rigid, ratio,
-        flank_contacts(train, place, spin, T, geometry, backlash),
+        train, system, geometry, stiffness, backlash, tuple(bases), np.array(base_ratio), mesh_base, turning,
+        rigid, ratio, flank_contacts(train, place, spin, T, geometry, backlash),
     )  # fmt: skip
 
 
@@ -243,7 +252,7 @@ def balanced_torque(model: DrivetrainModel, driver: str, torque: float, output: 
 
 def _check_turning(train: Drivetrain) -> None:
     for stage in train.planetary:
-        angles = np.array(stage.planet_angles)
+        angles = np.array(stage.angles)
         # unequal planets would make mass and stiffness of the carrier depend on its angle
         unequal = [abs(np.exp(1j * order * angles).sum()) for order in (1, 2)]
         if max(unequal) > 1e-6 * len(angles) or math.isfinite(stage.planet_bearing):
@@ -267,8 +276,8 @@ def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
             s = shaft.springs
             K += _springs(joint_rows(place, shaft), [s.shear, s.shear, s.bending, s.bending, s.torsion])
             continue
-        ends = (place.body[shaft.first], *inner, place.body[shaft.second])
-        mass, stiffness, gyroscopic = shaft.element_matrices
+        ends = (place.body[shaft.between[0]], *inner, place.body[shaft.between[1]])
+        mass, stiffness, gyroscopic = beam_element(shaft.section, shaft.length / shaft.elements)
         for one, two in itertools.pairwise(ends):
             at = np.r_[one : one + 5, two : two + 5]
             M[np.ix_(at, at)] += mass
@@ -276,15 +285,15 @@ def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
             G[np.ix_(at, at)] += gyroscopic * spin[ends[0] + 4]
     for bearing in train.bearings:
         rows = np.zeros((5, place.count))
-        first = bearing_place(train, place, bearing)
+        first = _bearing_place(train, place, bearing)
         rows[np.arange(5), first + np.arange(5)] = 1.0
         rows[0, first + 3], rows[1, first + 2] = bearing.offset, -bearing.offset
-        K += _springs(rows, [bearing.radial] * 2 + [bearing.tilt] * 2 + [bearing.torsion])
+        K += _springs(rows, [bearing.radial] * 2 + [bearing.tilt] * 2 + [0.0])
     for number, stage in enumerate(train.planetary):
         carrier = place.body[stage.carrier]
         B = lumped_map(stage, place, number)
-        n, a = len(stage.planet_angles), stage.centre_distance
-        reduced = stage.planet_inertia / (stage.planet_radius * math.cos(stage.pressure_angle)) ** 2
+        n, a = len(stage.angles), stage.centre_distance
+        reduced = stage.planet_inertia / (stage.pitch_radii[1] * math.cos(stage.pressure_angle)) ** 2
         M += (B[9:].T * np.tile([stage.planet_mass, stage.planet_mass, reduced], n)) @ B[9:]
         tilt = n * (stage.planet_transverse_inertia + 0.5 * stage.planet_mass * a**2)
         M[carrier + 2, carrier + 2] += tilt
@@ -308,31 +317,35 @@ def _springs(rows, stiffness) -> np.ndarray:
     return (rows.T * np.where(np.isinf(stiffness), 0.0, stiffness)) @ rows
 
 
-def _meshes(train, place, spin, geometry: MeshGeometry, harmonics: int):
-    """Stiffness harmonics, backlashes and base of every mesh; names and ratios of the bases."""
-    waves, backlash, mesh_base, bases, ratio = [], [], [], [], []
+def _bases(train: Drivetrain, place: Coordinates, spin: np.ndarray):
+    """Names of the base frequencies, their ratios to the first body's speed, and the base of every stage."""
+    names, ratio, of_stage = [], [], []
     for stage in train.planetary:
         turn = float(spin[place.body[stage.carrier] + 4])
-        bases += [f"{stage.carrier} turn", f"{stage.name} mesh"]
+        names += [f"{stage.carrier} turn", f"{stage.name} mesh"]
         ratio += [turn, stage.ring_teeth * abs(turn)]
-        # planet n is z_r psi_n ahead of planet 1 in its mesh with the ring, z_s psi_n behind with the sun
-        sense, angles = math.copysign(1.0, turn) / (2.0 * math.pi), np.array(stage.planet_angles)
-        for wave, ahead in (
-            (stage.sun_mesh, -stage.sun_teeth * sense * angles),
-            (stage.ring_mesh, stage.ring_teeth * sense * angles),
-        ):
-            for shift in ahead - ahead[0]:
-                waves.append(rectangular_series(replace(wave, phase=wave.phase + shift), harmonics))
-                backlash.append(wave.backlash)
-                mesh_base.append(len(bases) - 1)
+        of_stage.append(len(names) - 1)
     for stage in train.parallel:
-        bases.append(f"{stage.name} mesh")
-        ratio.append(stage.first_teeth * abs(float(spin[place.body[stage.first] + 4])))
-        waves.append(rectangular_series(stage.mesh, harmonics))
-        backlash.append(stage.mesh.backlash)
-        mesh_base.append(len(bases) - 1)
-    table = np.array(waves).reshape(len(geometry.names), harmonics + 1)
-    return table, np.array(backlash), np.array(mesh_base, int), tuple(numbered(bases)), np.array(ratio)
+        names.append(f"{stage.name} mesh")
+        ratio.append(stage.teeth[0] * abs(float(spin[place.body[stage.between[0]] + 4])))
+        of_stage.append(len(names) - 1)
+    return numbered(names), ratio, of_stage
+
+
+def _stiffness(train: Drivetrain, place: Coordinates, spin: np.ndarray, harmonics: int) -> np.ndarray:
+    """Harmonics (n_meshes, H + 1) of the mesh stiffnesses [N/m], those of the planets out of phase."""
+    waves = []
+    for mesh in train.meshes:
+        wave = mesh.section
+        if mesh.stage < len(train.planetary):
+            stage = train.planetary[mesh.stage]
+            # planet n is z_r psi_n ahead of planet 1 in its mesh with the ring, z_s psi_n behind with the sun
+            teeth = stage.ring_teeth if mesh.key.endswith("ring_mesh") else -stage.sun_teeth
+            sense = math.copysign(1.0, float(spin[place.body[stage.carrier] + 4])) / (2.0 * math.pi)
+            ahead, first = (teeth * sense * stage.angles[p] for p in (mesh.planet, 0))
+            wave = wave.changed(phase=wave.phase + (ahead - first))
+        waves.append(rectangular_series(wave, harmonics))
+    return np.array(waves).reshape(len(waves), harmonics + 1)
 
 
 @dataclass(frozen=True)
@@ -362,7 +375,7 @@ def coordinates_of(train: Drivetrain) -> Coordinates:
         for number, stage in enumerate(train.planetary):
             if stage.carrier == one.name:
                 prefix = "planet" if len(train.planetary) == 1 else f"planet of {one.name}"
-                n = len(stage.planet_angles)
+                n = len(stage.angles)
                 planets[number] = len(names) + np.arange(3 * n).reshape(n, 3)
                 names += [
                     f"{prefix} {p + 1}: {axis}"
@@ -372,30 +385,19 @@ def coordinates_of(train: Drivetrain) -> Coordinates:
     for number, shaft in enumerate(train.shafts):
         inner[number] = tuple(len(names) + 5 * i for i in range(max(shaft.elements - 1, 0)))
         for i in range(len(inner[number])):
-            names += [f"shaft {shaft.first}-{shaft.second} {i + 1}: {axis}" for axis in AXES]
+            names += [f"shaft {'-'.join(shaft.between)} {i + 1}: {axis}" for axis in AXES]
     return Coordinates(
         tuple(names), body, tuple(planets[n] for n in range(len(planets))),
         tuple(inner[n] for n in range(len(inner))),
     )  # fmt: skip
 
 
-def bearing_place(train: Drivetrain, place: Coordinates, bearing) -> int:
-    """First of the five places that a bearing holds.
-
-    Raises
-    ------
-    CaseError
-        There is no such station (E-DRIVETRAIN).
-    """
-    if not bearing.station:
-        return place.body[bearing.body]
-    for shaft, inner in zip(train.shafts, place.inner):
-        if (shaft.first, shaft.second) == (bearing.body, bearing.other) and bearing.station <= len(inner):
-            return inner[bearing.station - 1]
-    raise CaseError(
-        f"no station {bearing.station} inside a shaft from {bearing.body} to {bearing.other}",
-        code="E-DRIVETRAIN", limit="1 to the number of elements less one", key="station",
-    )  # fmt: skip
+def _bearing_place(train: Drivetrain, place: Coordinates, bearing: BearingSection) -> int:
+    """First of the five places that a bearing holds."""
+    if bearing.station is None:
+        return place.body[bearing.body or ""]
+    stations = {shaft.between: inner for shaft, inner in zip(train.shafts, place.inner)}
+    return stations[bearing.shaft or ()][bearing.station - 1]
 
 
 def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -409,7 +411,7 @@ def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray,
         if not one.tilts:
             held[place.body[one.name] + np.array([2, 3])] = True
     for bearing in train.bearings:
-        first = bearing_place(train, place, bearing)
+        first = _bearing_place(train, place, bearing)
         held[first : first + 2] |= math.isinf(bearing.radial)
         held[first + 2 : first + 4] |= math.isinf(bearing.tilt)
     for stage, own in zip(train.planetary, place.planets):
@@ -446,11 +448,11 @@ def _eliminated(rows, free, place):
     return T, tuple(place.names[i] for i in rest)
 
 
-def joint_rows(place: Coordinates, shaft) -> np.ndarray:
+def joint_rows(place: Coordinates, shaft: ShaftSection) -> np.ndarray:
     """Deflections (5, n) of the joint of a shaft."""
     rows = np.zeros((5, place.count))
     local = joint_deflections(shaft.length)
-    for name, part in ((shaft.first, local[:, :5]), (shaft.second, local[:, 5:])):
+    for name, part in zip(shaft.between, (local[:, :5], local[:, 5:])):
         rows[:, place.body[name] : place.body[name] + 5] += part
     return rows
 
@@ -475,15 +477,16 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
         rows.append(row / np.abs(row).max())
 
     for shaft, inner in zip(train.shafts, place.inner):
-        for at in (turn[shaft.second], *(first + 4 for first in inner)):
-            condition((turn[shaft.first], 1.0), (at, -1.0))
+        for at in (turn[shaft.between[1]], *(first + 4 for first in inner)):
+            condition((turn[shaft.between[0]], 1.0), (at, -1.0))
     for stage in train.parallel:
-        condition((turn[stage.first], stage.first_radius), (turn[stage.second], stage.second_radius))
+        condition(*((turn[name], radius) for name, radius in zip(stage.between, stage.pitch_radii)))
     for stage, planets in zip(train.planetary, place.planets):
         c, s = turn[stage.carrier], turn[stage.sun]
+        sun, planet = stage.pitch_radii
         for p in planets[:, 2]:
-            condition((s, stage.sun_radius), (p, stage.planet_radius), (c, -stage.centre_distance))
-            condition((c, stage.ring_radius - stage.planet_radius), (p, stage.planet_radius))
+            condition((s, sun), (p, planet), (c, -stage.centre_distance))
+            condition((c, stage.ring_radius - planet), (p, planet))
     rotations = sorted({*turn.values(), *(int(p) for own in place.planets for p in own[:, 2])})
     rotations += [first + 4 for inner in place.inner for first in inner]
     table = np.array(rows).reshape(-1, place.count)[:, rotations]
@@ -503,7 +506,7 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
     return spin
 
 
-def rectangular_series(wave: MeshWave, harmonics: int) -> np.ndarray:
+def rectangular_series(wave: MeshSection, harmonics: int) -> np.ndarray:
     """Complex harmonics 0 to H (H + 1,) of the rectangular mesh stiffness [N/m].
 
     With ``low`` pairs always in contact and one more for the share ``e = ratio - low`` of the period, centred
@@ -512,19 +515,10 @@ def rectangular_series(wave: MeshWave, harmonics: int) -> np.ndarray:
     """
     if harmonics < 0 or int(harmonics) != harmonics:
         raise CaseError(f"{harmonics} harmonics", code="E-HARMONICS", limit="a whole number, 0 or more")
-    low, high, share = stiffness_levels(wave)
+    low, high, share = wave.levels
     h = np.arange(1, harmonics + 1)
     waves = 2.0 * (high - low) / (math.pi * h) * np.sin(math.pi * h * share)
     return np.append(wave.stiffness, waves * np.exp(2j * np.pi * h * wave.phase)).astype(complex)
-
-
-def stiffness_levels(wave: MeshWave) -> tuple[float, float, float]:
-    """Lower and upper stiffness [N/m], and the share of the period with the upper one."""
-    pairs = math.floor(wave.contact_ratio)
-    share = wave.contact_ratio - pairs
-    ratio = pairs / (pairs + 1.0) if wave.low_share is None else wave.low_share
-    high = wave.stiffness / (ratio + (1.0 - ratio) * share)
-    return ratio * high, high, share
 
 
 @dataclass(frozen=True)
@@ -570,14 +564,7 @@ class MeshGeometry:
 
 def mesh_geometry(train: Drivetrain, place: Coordinates, spin: np.ndarray) -> MeshGeometry:
     """Directions of the drive flanks of all meshes among all coordinates; the planetary stages come first."""
-    names, stages = [], []
-    for number, stage in enumerate(train.planetary):
-        n = len(stage.planet_angles)
-        names += [f"{stage.sun}-planet {p + 1}" for p in range(n)]
-        names += [f"planet {p + 1}-ring of {stage.carrier}" for p in range(n)]
-        stages += [number] * (2 * n)
-    names += [stage.name for stage in train.parallel]
-    stages += range(len(train.planetary), len(train.planetary) + len(train.parallel))
+    names, stages = [mesh.name for mesh in train.meshes], [mesh.stage for mesh in train.meshes]
     total = flank_directions(train, place, spin)
     return _split(numbered(names), total, np.array(stages, int), planar_places(train, place))
 
@@ -625,7 +612,7 @@ def _split(names, total, stages, planar) -> MeshGeometry:
     return MeshGeometry(tuple(names), basic, fixed, even, odd, stages)
 
 
-def planar_of(train: Drivetrain, stage: PlanetaryStage) -> PlanarSet:
+def planar_of(train: Drivetrain, stage: PlanetarySection) -> PlanarSet:
     """The stage as a lumped set with a held ring; supports are those of the chain, hence none here."""
     cosine = math.cos(stage.pressure_angle)
     bodies = {
@@ -635,44 +622,44 @@ def planar_of(train: Drivetrain, stage: PlanetaryStage) -> PlanarSet:
     return PlanarSet(
         ring=PlanarBody(1.0, 1.0, math.inf, math.inf),
         planet=PlanarBody(stage.planet_mass, stage.planet_inertia),
-        sun_radius=stage.sun_radius * cosine, ring_radius=stage.ring_radius * cosine,
-        planet_radius=stage.planet_radius * cosine, centre_distance=stage.centre_distance,
-        planet_angles=stage.planet_angles, pressure_angle_sun_planet=stage.pressure_angle,
+        sun_radius=stage.pitch_radii[0] * cosine, ring_radius=stage.ring_radius * cosine,
+        planet_radius=stage.pitch_radii[1] * cosine, centre_distance=stage.centre_distance,
+        planet_angles=stage.angles, pressure_angle_sun_planet=stage.pressure_angle,
         pressure_angle_planet_ring=stage.pressure_angle, stiffness_sun_planet=stage.sun_mesh.stiffness,
         stiffness_planet_ring=stage.ring_mesh.stiffness, planet_bearing=stage.planet_bearing, **bodies,
     )  # fmt: skip
 
 
-def lumped_map(stage: PlanetaryStage, place: Coordinates, number: int) -> np.ndarray:
+def lumped_map(stage: PlanetarySection, place: Coordinates, number: int) -> np.ndarray:
     """Coordinates of the lumped set (3 (N + 3), n) per unit of those of the chain, carrier at angle zero."""
     own, cosine = place.planets[number], math.cos(stage.pressure_angle)
     B = np.zeros((9 + 3 * len(own), place.count))
     for row, name, radius in (
         (0, stage.carrier, stage.centre_distance),
-        (6, stage.sun, stage.sun_radius * cosine),
+        (6, stage.sun, stage.pitch_radii[0] * cosine),
     ):
         first = place.body[name]
         B[row, first] = B[row + 1, first + 1] = 1.0
         B[row + 2, first + 4] = radius
     for p, planet in enumerate(own):
-        B[11 + 3 * p, planet[2]] = stage.planet_radius * cosine
+        B[11 + 3 * p, planet[2]] = stage.pitch_radii[1] * cosine
         if math.isfinite(stage.planet_bearing):
             B[9 + 3 * p, planet[0]] = B[10 + 3 * p, planet[1]] = 1.0
     if math.isinf(stage.planet_bearing):
-        cosines, sines = np.cos(stage.planet_angles), np.sin(stage.planet_angles)
+        cosines, sines = np.cos(stage.angles), np.sin(stage.angles)
         x, y, u = B[:3]
         B[9::3] = np.outer(cosines, x) + np.outer(sines, y)
         B[10::3] = np.outer(cosines, y) - np.outer(sines, x) + u
     return B
 
 
-def planet_bearing_rows(train: Drivetrain, stage: PlanetaryStage, place, number: int) -> np.ndarray:
+def planet_bearing_rows(train: Drivetrain, stage: PlanetarySection, place, number: int) -> np.ndarray:
     """Deflections (2N, n) of planet bearings of finite stiffness."""
-    pins = pin_directions(planar_of(train, stage)).reshape(-1, 2 * len(stage.planet_angles))
+    pins = pin_directions(planar_of(train, stage)).reshape(-1, 2 * len(stage.angles))
     return pins.T @ lumped_map(stage, place, number)
 
 
-def parallel_direction(stage: ParallelStage, place: Coordinates, spin, *, flank: int) -> np.ndarray:
+def parallel_direction(stage: ParallelSection, place: Coordinates, spin, *, flank: int) -> np.ndarray:
     """Approach (n,) of the flanks of two gears at the pitch point, tilts and helix included.
 
     A point P of a body moves by ``t + tilt x (P - C)``; with n the normal into the second gear the
@@ -680,7 +667,7 @@ def parallel_direction(stage: ParallelStage, place: Coordinates, spin, *, flank:
     a second gear that drives, the tangential and the axial part of n are reversed; the radial part pushes the
     gears apart on both (ISO 21771, left and right lines of action).
     """
-    sense = 1.0 if spin[place.body[stage.first] + 4] > 0.0 else -1.0
+    sense = 1.0 if spin[place.body[stage.between[0]] + 4] > 0.0 else -1.0
     along = np.array([math.cos(stage.direction), math.sin(stage.direction)])
     across = flank * sense * np.array([-along[1], along[0]])
     plane = math.cos(stage.pressure_angle) * across + math.sin(stage.pressure_angle) * along
@@ -688,11 +675,8 @@ def parallel_direction(stage: ParallelStage, place: Coordinates, spin, *, flank:
     lean = flank * math.tan(stage.helix_angle) * math.cos(stage.pressure_angle)
     normal = np.append(plane, lean) / math.hypot(1.0, lean)
     w = np.zeros(place.count)
-    for name, radius, offset, sign in (
-        (stage.first, stage.first_radius, stage.first_offset, 1.0),
-        (stage.second, -stage.second_radius, stage.second_offset, -1.0),
-    ):
-        arm = np.append(radius * along, offset)
+    for name, radius, offset, sign in zip(stage.between, stage.pitch_radii, stage.offsets, (1.0, -1.0)):
+        arm = np.append(sign * radius * along, offset)
         moment = np.cross(arm, normal)
         first = place.body[name]
         w[first : first + 5] += sign * np.array([normal[0], normal[1], *moment])
@@ -860,11 +844,10 @@ def contact_model(model):
 
 def held_train(train: Drivetrain) -> Drivetrain:
     """The same data with every axis held: no translation, no tilt, shafts that only twist, no weight."""
-    bodies = tuple(replace(one, tilts=False) for one in train.bodies)
-    bearings = tuple(ChainBearing(one.name, math.inf) for one in train.bodies)
-    planetary = tuple(replace(one, planet_bearing=math.inf) for one in train.planetary)
-    twist = tuple(replace(b, radial=0.0, tilt=0.0, offset=0.0) for b in train.bearings if b.torsion)
-    return replace(train, bodies=bodies, bearings=bearings + twist, planetary=planetary, gravity=0.0)
+    bodies = tuple(one.changed(tilts=False) for one in train.bodies)
+    bearings = tuple(BearingSection.in_si(body=one.name, radial=math.inf) for one in train.bodies)
+    planetary = tuple(one.changed(planet_bearing=math.inf) for one in train.planetary)
+    return replace(train, bodies=bodies, bearings=bearings, planetary=planetary, gravity=0.0)
 
 
 def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:

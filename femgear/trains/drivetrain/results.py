@@ -19,8 +19,9 @@ from femgear.storage.dataset import RPM, dataset
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
 from femgear.trains.drivetrain.data import TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.records import PASS_BAND
 from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
-from femgear.trains.drivetrain.time import BALANCE, PASS_BAND, DrivetrainRun
+from femgear.trains.drivetrain.time import BALANCE, DrivetrainRun
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -449,7 +450,7 @@ def _shafts(model: DrivetrainModel) -> Block:
         s = one.springs
         kind = f"beam, {one.elements} elements" if one.elements else "joint"
         values = (_spring(value, 4) for value in (s.bending, s.torsion, s.shear))
-        rows.append((f"{one.first} - {one.second}", f"{one.length:.4g}", *values, kind))
+        rows.append((" - ".join(one.between), f"{one.length:.4g}", *values, kind))
     header = ("", "length [m]", "bending [N m/rad]", "torsion [N m/rad]", "shear [N/m]", "model")
     return Block("Shafts", header, tuple(rows))
 
@@ -461,25 +462,34 @@ def _spring(stiffness: float, digits: int) -> str:
 def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
     train, hertz = model.train, model.frequencies(case.operation.speed) / (2.0 * np.pi)
     rows = []
-    for i, (one, given) in enumerate(zip(train.planetary, case.planetary)):
-        teeth = f"{given.sun_teeth} / {given.ring_teeth}, {len(one.planet_angles)} planets"
-        radii = f"{1e3 * one.sun_radius:.4f}, {1e3 * one.planet_radius:.4f}, {1e3 * one.ring_radius:.4f}"
-        contact = f"{one.sun_mesh.contact_ratio:.4g}, {one.ring_mesh.contact_ratio:.4g}"
-        stiffness = f"{one.sun_mesh.stiffness:.4g}, {one.ring_mesh.stiffness:.4g}"
-        ratio = model.ratio[one.sun] / model.ratio[one.carrier]
-        driver, line = one.driver or one.ends[0], f"{hertz[2 * i + 1]:.4f}"
-        rows.append((one.name, driver, teeth, radii, f"{ratio:.5g}", contact, stiffness, line))
-    for i, (one, given) in enumerate(zip(train.parallel, case.parallel)):
-        radii = f"{1e3 * one.first_radius:.4f}, {1e3 * one.second_radius:.4f}"
-        ratio = model.ratio[one.second] / model.ratio[one.first]
-        line = hertz[2 * len(train.planetary) + i]
+    for i, one in enumerate(train.planetary):
+        sun, planet = one.pitch_radii
         rows.append(
             (
-                one.name, one.driver or one.ends[0], f"{given.teeth[0]} / {given.teeth[1]}", radii,
-                f"{ratio:.5g}",
-                f"{one.mesh.contact_ratio:.4g}", f"{one.mesh.stiffness:.4g}", f"{line:.4f}",
+                one.name,
+                one.driver or one.carrier,
+                f"{one.sun_teeth} / {one.ring_teeth}, {len(one.angles)} planets",
+                f"{1e3 * sun:.4f}, {1e3 * planet:.4f}, {1e3 * one.ring_radius:.4f}",
+                f"{model.ratio[one.sun] / model.ratio[one.carrier]:.5g}",
+                f"{one.sun_mesh.contact_ratio:.4g}, {one.ring_mesh.contact_ratio:.4g}",
+                f"{one.sun_mesh.stiffness:.4g}, {one.ring_mesh.stiffness:.4g}",
+                f"{hertz[2 * i + 1]:.4f}",
             )
-        )  # fmt: skip
+        )
+    for i, one in enumerate(train.parallel):
+        first, second = one.between
+        rows.append(
+            (
+                one.name,
+                one.driver or first,
+                f"{one.teeth[0]} / {one.teeth[1]}",
+                ", ".join(f"{1e3 * radius:.4f}" for radius in one.pitch_radii),
+                f"{model.ratio[second] / model.ratio[first]:.5g}",
+                f"{one.mesh.contact_ratio:.4g}",
+                f"{one.mesh.stiffness:.4g}",
+                f"{hertz[2 * len(train.planetary) + i]:.4f}",
+            )
+        )
     header = (
         "stage", "driver", "teeth", "pitch radii [mm]", "ratio", "contact ratio", "stiffness [N/m]",
         "mesh [Hz]",

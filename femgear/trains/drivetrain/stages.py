@@ -31,6 +31,7 @@ from femgear.trains.drivetrain.checks import (
     record_rate,
 )
 from femgear.trains.drivetrain.model import DrivetrainModel
+from femgear.trains.drivetrain.records import PASS_BAND
 from femgear.trains.drivetrain.results import (
     AveragedSpectrum,
     DrivetrainModesResult,
@@ -50,7 +51,7 @@ from femgear.trains.drivetrain.section import (
     settle_time,
     torque_histories,
 )
-from femgear.trains.drivetrain.time import PASS_BAND, DrivetrainRun, Records, march_drivetrain
+from femgear.trains.drivetrain.time import DrivetrainRun, Records, march_drivetrain
 from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
 
 if TYPE_CHECKING:

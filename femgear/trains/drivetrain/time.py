@@ -34,8 +34,9 @@ import numpy as np
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.time.steps import AVERAGE_ACCELERATION
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import TorqueHistory, check_free_spin
+from femgear.trains.drivetrain.data import TorqueHistory
 from femgear.trains.drivetrain.model import DrivetrainModel, FlankContacts, contact_model
+from femgear.trains.drivetrain.records import Record
 
 # Errors of the balances, relative, beyond which a run is refused.
 BALANCE = 1e-6
@@ -48,11 +49,6 @@ PIECE = 64
 _SIZES = 30
 # Share of the run in which the strongest motion wins.
 _START = 1.0 / 3.0
-
-# The pass band ends at this share of half the record rate, where the stop band begins.
-PASS_BAND = 0.8
-# Attenuation of the stop band [dB].
-STOP = 80.0
 
 # Points of the table of a mesh period, between which the stiffness is linear.
 _TABLE = 8192
@@ -82,8 +78,8 @@ class Records:
     every : int
         Steps a record.
     lowpass : bool
-        Records are low-passed (`Decimator`), so that nothing beyond half their rate appears as something
-        else; False takes the motion at these instants as it is.
+        Records are low-passed (`femgear.trains.drivetrain.records.Decimator`), so that nothing beyond half
+        their rate appears as something else; False takes the motion at these instants as it is.
     """
 
     every: int = 1
@@ -186,30 +182,31 @@ def march_drivetrain(
     Raises
     ------
     CaseError
-        Steps and durations that are none (E-RANGE), a start that does not fit (E-START), bearings that hold
-        the rotation (E-BEARING), a negative stiffness of meshes that separate (E-STIFFNESS).
+        Steps and durations that are none (E-RANGE); loads that part flanks behind which nothing holds the
+        gears, or a start that is no text of these (E-START).
     ConvergenceError
         The motion outgrows the numbers (E-DIVERGED); no flanks fit a step (E-CONTACT).
     """
-    _check(model, duration, step, records.every)
+    if not 0.0 < step <= duration < np.inf:
+        raise CaseError(
+            f"{duration} s in steps of {step} s", code="E-RANGE", limit="0 < step <= duration", key="step"
+        )
     count = max(1, round(duration / step))
     stepped = contact_model(model) if contact_loss else model
-    spin = Spin(stepped, torques, step, speed)
-    scheme = Scheme.of(stepped, step, speed, spin.directions)
+    spin = _Spin(stepped, torques, step, speed)
+    scheme = _Scheme.of(stepped, step, speed, spin.directions)
     if outputs is None:
         outputs = [name for name in model.system.dofs if name.endswith("rotation")]
     at = np.array([model.index(name) for name in outputs], int)
-    if contact_loss:
-        check_pushing(model, spin.table)
-    record = Record(model, count, records, at, contact_loss=contact_loss)
+    record = Record(model, count, at, every=records.every, lowpass=records.lowpass, contact_loss=contact_loss)
     with np.errstate(over="ignore", invalid="ignore"):
         motion = _Motion(model, scheme, spin, start, count, contact_loss)
-        balances = Balances(stepped, scheme, spin, motion.state)
+        balances = _Balances(stepped, scheme, spin, motion.state)
         for first in range(0, count, _BLOCK):
             states, block = motion.block(first, min(_BLOCK, count - first))
             balances.add(states, block)
             balances.check(states, block, first, free=motion.free, contact_loss=contact_loss)
-            record.take(first, len(states) - 1, states, block)
+            record.take(first, states, block)
             motion.state = balances.without_drift(states[-1])
     return DrivetrainRun(
         outputs=tuple(outputs), **record.columns(step), meshes=model.meshes, energy_balance=balances.works(),
@@ -218,35 +215,25 @@ def march_drivetrain(
     )  # fmt: skip
 
 
-def _check(model: DrivetrainModel, duration: float, step: float, every: int) -> None:
-    if not (np.isfinite(duration) and np.isfinite(step) and 0.0 < step <= duration):
-        raise CaseError(
-            f"{duration} s in steps of {step} s", code="E-RANGE", limit="0 < step <= duration", key="step"
-        )
-    if int(every) != every or every < 1:
-        raise CaseError(f"every {every} steps", code="E-RANGE", key="every", limit="1 or more")
-    check_free_spin(model)
-
-
 class _Motion:
     """The motion and the free motion beside it, block by block."""
 
-    def __init__(self, model: DrivetrainModel, scheme: Scheme, spin: Spin, start, count: int, contact_loss):
+    def __init__(self, model: DrivetrainModel, scheme: _Scheme, spin: _Spin, start, count: int, contact_loss):
         self.scheme, self.spin, self.meshes = scheme, spin, len(model.meshes)
         # steps between two sizes of the free motion
         self.piece = max(1, min(PIECE, count // _SIZES))
-        self.state = start_state(model, scheme, spin, start, model.contacts if contact_loss else None)
+        self.state = _start_state(model, scheme, spin, start, model.contacts if contact_loss else None)
         self.free = FreeMotion(model, scheme)
         self.free_row = self.free.start()
-        self.march = march_closed
+        self.march = _march_closed
         if contact_loss and model.meshes:
-            self.march = Separating(model.contacts.gap, self.meshes).march
+            self.march = _Separating(model.contacts.gap, self.meshes).march
 
     def block(self, first: int, number: int):
         """States (number + 1, 2 n + m) of the next steps, and their loads and meshes."""
         scheme, h = self.scheme, self.spin.step
         block = self.spin.block(first, number)
-        meshes = MeshBlock.of(scheme, block, self.meshes)
+        meshes = _MeshBlock.of(scheme, block, self.meshes)
         loads = block.loads[:-1] @ scheme.loads_before + block.loads[1:] @ scheme.loads_after
         rows = np.empty((number + 1, 2, len(scheme.advance)))
         rows[0] = scheme.row(self.state), self.free_row
@@ -258,16 +245,10 @@ class _Motion:
         return scheme.states(rows[:, 0]), block
 
 
-def start_state(
-    model: DrivetrainModel, scheme: Scheme, spin: Spin, start, contacts: FlankContacts | None
+def _start_state(
+    model: DrivetrainModel, scheme: _Scheme, spin: _Spin, start, contacts: FlankContacts | None
 ) -> np.ndarray:
-    """State ``(q, v, g)`` at the first instant; with `contacts` meshes separate.
-
-    Raises
-    ------
-    CaseError
-        A start that is none, or loads that part flanks behind which nothing holds the gears (E-START).
-    """
+    """State ``(q, v, g)`` at the first instant; with `contacts` meshes separate."""
     n, U = scheme.n, scheme.basic
     angle, speed = spin.angle, spin.speed
     block = spin.block(0, 1)
@@ -283,8 +264,6 @@ def start_state(
             raise CaseError(f"a start {start!r}", code="E-START", limit="static, zero or two arrays")
     else:
         q, v = (np.asarray(one, float) for one in start)
-        if q.shape != (n,) or v.shape != (n,):
-            raise CaseError(f"a start of shapes {q.shape}, {v.shape}", code="E-START", limit=f"two ({n},)")
     approach = (U @ S).T @ q
     force = k * (approach if contacts is None else np.maximum(approach - contacts.gap, 0.0))
     return np.concatenate([q, v, S @ force])
@@ -324,23 +303,12 @@ def static_deviations(model: DrivetrainModel, W, k, load, *, contacts: FlankCont
 
 
 @dataclass(frozen=True)
-class Block:
-    """Loads and meshes at the instants of a block of steps, its start included.
+class _Block:
+    """Loads and meshes at the instants (t,) of a block of steps, its start included.
 
-    Parameters
-    ----------
-    loads : (t, d) array
-        One for the weight, then the torques [N m].
-    selection : (t, m, n_meshes) array
-        ``S`` of `femgear.trains.drivetrain.model.MeshGeometry`.
-    stiffness : (t, n_meshes) array
-        [N/m]
-    angle, speed : (t,) arrays
-        Of the spin [rad], [rad/s].
-    torque : (t,) array
-        On the spin [N m].
-    effort : (t,) array
-        The same without regard to signs [N m].
+    ``loads`` (t, d): one for the weight, then the torques [N m]; ``selection`` (t, m, n_meshes): ``S`` of
+    `femgear.trains.drivetrain.model.MeshGeometry`; ``stiffness`` (t, n_meshes) [N/m]; of the spin ``angle``
+    [rad], ``speed`` [rad/s], ``torque`` and, without regard to signs, ``effort`` [N m].
     """
 
     loads: np.ndarray
@@ -352,7 +320,7 @@ class Block:
     effort: np.ndarray
 
 
-class Spin:
+class _Spin:
     """The free spin, exact for torques that are linear in a step, and the loads that are left."""
 
     def __init__(self, model: DrivetrainModel, torques: Sequence[TorqueHistory], step: float, speed: float):
@@ -370,7 +338,7 @@ class Spin:
             phase = 2.0 * np.pi * np.arange(_TABLE + 1)[:, None] / _TABLE
             self.table = np.array(FourierSeries(model.stiffness).at(phase))
 
-    def block(self, first: int, count: int) -> Block:
+    def block(self, first: int, count: int) -> _Block:
         """The next `count` steps, which begin with step `first`; the spin moves on to their end."""
         times = self.step * np.arange(first, first + count + 1)
         values = np.zeros((count + 1, len(self.torques)))
@@ -384,7 +352,7 @@ class Spin:
         self.angle, self.speed = angle[-1], speed[-1]
         loads = np.hstack([np.ones((count + 1, 1)), values])
         effort = np.abs(values) @ np.abs(self.share)
-        return Block(loads, *self._meshes(angle), angle, speed, torque, effort)
+        return _Block(loads, *self._meshes(angle), angle, speed, torque, effort)
 
     def _meshes(self, angle):
         model = self.model
@@ -398,7 +366,7 @@ class Spin:
 
 
 @dataclass(frozen=True)
-class Scheme:
+class _Scheme:
     """One step, mesh forces g on the simple motions at its end left open.
 
     Rows ``z = (q, v without g, g)`` go on by ``(q, v without g, x without g) = z advance + loads``; the state
@@ -414,7 +382,7 @@ class Scheme:
     n: int
 
     @classmethod
-    def of(cls, model: DrivetrainModel, h: float, speed: float, directions) -> Scheme:
+    def of(cls, model: DrivetrainModel, h: float, speed: float, directions) -> _Scheme:
         """Factorise average acceleration in steps h [s] at a speed of the first body [rad/s]."""
         from scipy import linalg
 
@@ -458,16 +426,12 @@ class Scheme:
 
 
 @dataclass(frozen=True)
-class MeshBlock:
-    """Small matrices of the ends of the steps of a block.
+class _MeshBlock:
+    """Small matrices of the ends of the t steps of a block, c contacts on m simple motions.
 
-    Parameters
-    ----------
-    selection : (t, m, c) array
-        Of the meshes, or of all contacts of those that separate.
-    stiffness : (t, c) array
-    closed : (t, m, m) array
-        From x without mesh forces (a row) to the forces on the simple motions when all drive flanks touch.
+    ``selection`` (t, m, c) and ``stiffness`` (t, c) of the meshes, or of all contacts of those that separate;
+    ``closed`` (t, m, m) from x without mesh forces (a row) to the forces on the simple motions when all drive
+    flanks touch.
     """
 
     selection: np.ndarray
@@ -475,7 +439,7 @@ class MeshBlock:
     closed: np.ndarray
 
     @classmethod
-    def of(cls, scheme: Scheme, block: Block, meshes: int) -> MeshBlock:
+    def of(cls, scheme: _Scheme, block: _Block, meshes: int) -> _MeshBlock:
         """Of a block whose first `meshes` contacts are drive flanks."""
         S, k = np.ascontiguousarray(block.selection[1:, :, :meshes]), block.stiffness[1:, :meshes]
         St = np.swapaxes(S, 1, 2)
@@ -487,7 +451,7 @@ class MeshBlock:
         return cls(block.selection[1:], block.stiffness[1:], closed)
 
 
-def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+def _march_closed(scheme: _Scheme, meshes: _MeshBlock, loads, rows, steps: range) -> None:
     """Fill ``rows[i + 1]`` (2, 2 n + m), the motion and the free motion, from ``rows[i]`` for i in `steps`.
 
     All meshes are linear; `loads` (t, 2 n + m) act on the motion alone.
@@ -505,7 +469,7 @@ def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -
 def solve_overlaps(
     flexibility, free, closed, touching, parted: np.ndarray | float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Overlaps and the contacts that touch (n,), with ``u + flexibility force(u) = free``.
+    """Solve ``u + flexibility force(u) = free`` for overlaps u and the contacts that touch (n,).
 
     Parameters
     ----------
@@ -527,7 +491,7 @@ def solve_overlaps(
     for number in range(_ROUNDS + _SINGLE):
         slopes = np.where(closed, touching, parted)
         u = np.linalg.solve(np.eye(len(free)) + flexibility * slopes, free)
-        found = changed(u, closed, rounding)
+        found = _changed(u, closed, rounding)
         wrong = np.flatnonzero(found != closed)
         if not len(wrong):
             return u, closed
@@ -541,33 +505,13 @@ def solve_overlaps(
     )  # fmt: skip
 
 
-def changed(u, closed, rounding: float) -> np.ndarray:
+def _changed(u, closed, rounding: float) -> np.ndarray:
     """The contacts that touch with overlaps u; within rounding as before."""
     return np.where(closed, u >= -rounding, u > rounding)
 
 
-def check_pushing(model, table) -> None:
-    """Refuse meshes that separate and whose stiffness, samples (t, n_meshes), is negative anywhere."""
-    least = table.min(axis=0, initial=np.inf)
-    if np.any(least < 0.0):
-        mesh = int(np.argmin(least))
-        raise CaseError(
-            f"the stiffness of mesh {model.meshes[mesh]} falls to {least[mesh]:.4g} N/m: parted teeth do not"
-            " pull", code="E-STIFFNESS", limit="0 N/m or more at any phase",
-            remedy="take another number of harmonics, or a larger low_share",
-        )  # fmt: skip
-
-
-class Separating:
-    """Steps of meshes that separate, beside the tangent that the free motion takes.
-
-    Parameters
-    ----------
-    gap : (n,) array
-        Of all contacts [m].
-    meshes : int
-        Number of the first contacts, which are the drive flanks.
-    """
+class _Separating:
+    """Steps of meshes that separate; of the contacts with these gaps (n,) [m] the first are drive flanks."""
 
     def __init__(self, gap, meshes: int):
         from scipy.linalg import get_lapack_funcs
@@ -588,13 +532,13 @@ class Separating:
         self.least = np.where(closed, 0.0, -np.inf)
         self.most = np.where(closed, np.inf, 0.0)
 
-    def march(self, scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
-        """As `march_closed`, with the contacts that touch."""
+    def march(self, scheme: _Scheme, meshes: _MeshBlock, loads, rows, steps: range) -> None:
+        """As `_march_closed`, with the contacts that touch."""
         i, stop = steps.start, steps.stop
         while i < stop:
             if self.drives:
                 tried = range(i, min(i + self.tries, stop))
-                march_closed(scheme, meshes, loads, rows, tried)
+                _march_closed(scheme, meshes, loads, rows, tried)
                 kept = self._kept(scheme, meshes, rows, tried)
                 i += kept
                 self.tries = min(2 * self.tries, _MANY)
@@ -629,7 +573,7 @@ class Separating:
             return np.full_like(x, np.nan)
         S = meshes.selection[i]
         free = np.dot(x[0], S) - self.gap
-        found = changed(u, self.closed, _OVERLAP_ROUNDING * np.abs(free).max())
+        found = _changed(u, self.closed, _OVERLAP_ROUNDING * np.abs(free).max())
         if np.array_equal(found, self.closed):
             return forces
         flexibility = np.dot(S.T, np.dot(scheme.flexibility, S))
@@ -655,7 +599,7 @@ class Separating:
 class FreeMotion:
     """Size of the free motion: the root of twice its energy, meshes included and the spin left out."""
 
-    def __init__(self, model: DrivetrainModel, scheme: Scheme, *, seed: int = 0):
+    def __init__(self, model: DrivetrainModel, scheme: _Scheme, *, seed: int = 0):
         self.system, self.rigid, self.scheme = model.system, model.rigid, scheme
         self.carried, self.inertia, self.seed = model.system.M @ model.rigid, model.inertia, seed
         self.times, self.sizes = [0.0], [0.0]
@@ -734,10 +678,10 @@ class EnergyBalance:
         return abs(rest) / size
 
 
-class Balances:
+class _Balances:
     """Energy and momentum of the deviations and of the spin."""
 
-    def __init__(self, model: DrivetrainModel, scheme: Scheme, spin: Spin, state):
+    def __init__(self, model: DrivetrainModel, scheme: _Scheme, spin: _Spin, state):
         self.model, self.scheme, self.spin = model, scheme, spin
         self.carried = model.system.M @ model.rigid
         self.loads = self.damping = self.meshes = self.drift = self.impulse = 0.0
@@ -756,7 +700,7 @@ class Balances:
     def _momentum(self, state, speed: float) -> float:
         return float(self.carried @ state[self.scheme.n : 2 * self.scheme.n]) + self.spin.inertia * speed
 
-    def add(self, states, block: Block) -> None:
+    def add(self, states, block: _Block) -> None:
         """Add the works and impulses of a block of steps."""
         n, h, spin = self.scheme.n, self.spin.step, self.spin
         moved = np.diff(states[:, :n], axis=0)
@@ -799,14 +743,8 @@ class Balances:
         size = max(self.largest, self.effort) or self.swing
         return self.missed / size if self.missed else 0.0
 
-    def check(self, states, block: Block, first: int, *, free: FreeMotion, contact_loss: bool) -> None:
-        """Refuse a motion that has outgrown the numbers, states (t, 2 n + m) from step `first` on.
-
-        Raises
-        ------
-        ConvergenceError
-            Momentum or energy are lost, or the motion is beyond all numbers (E-DIVERGED).
-        """
+    def check(self, states, block: _Block, first: int, *, free: FreeMotion, contact_loss: bool) -> None:
+        """Refuse motions that have outgrown the numbers (E-DIVERGED), states (t, 2 n + m) from `first` on."""
         finite = np.isfinite(states).all(axis=1)
         energy, momentum = self.works().error, self.momentum_error()
         if finite.all() and energy <= BALANCE and momentum <= BALANCE:
@@ -824,7 +762,7 @@ class Balances:
             remedy=remedy,
         )
 
-    def _mesh(self, state, block: Block, last: int) -> str:
+    def _mesh(self, state, block: _Block, last: int) -> str:
         """The mesh with the most strain energy."""
         if not self.model.meshes:
             return ""
@@ -840,148 +778,3 @@ def _rate(growth: float) -> str:
     if growth <= 0.0:
         return f"decays with {-growth:.4g} 1/s: the loads are too large"
     return f"grows with {growth:.4g} 1/s: a parametric resonance"
-
-
-class Decimator:
-    """Low pass and decimation of columns that come in blocks, without delay.
-
-    A linear-phase filter (Kaiser window; J. F. Kaiser and R. W. Schafer, IEEE Trans. Acoust. Speech Signal
-    Process. 28, 1980, 105-107) with 80 dB between 0.8 and 1.0 of half the record rate. Beyond both ends the
-    columns go on as their mirror image about a ramp. Its slope is that of the parabola of least squares
-    through two records (A. Savitzky and M. J. E. Golay, Anal. Chem. 36, 1964, 1627-1639), so that constants
-    and ramps pass unchanged. Near an end both bands suffer. Of a tone at 0.1, 0.3 and 0.5 times half the
-    record rate the end record misses 0.2, 5 and 20 % (r.m.s. over its phases), of one at 2, 6 and 12 times
-    it keeps 36, 11 and 7 %; the next three keep 5 % and less.
-
-    Parameters
-    ----------
-    every : int
-        Steps a record; 1 passes everything.
-    count : int
-        Steps in all; rows 0 to `count` come.
-    """
-
-    def __init__(self, every: int, count: int):
-        from scipy.signal import firwin, kaiserord
-
-        self.every, self.count, self.seen = every, count, 0
-        self.rows = count // every + 1
-        length, beta = kaiserord(STOP, (1.0 - PASS_BAND) / every)
-        # the continuation needs as many rows as it adds
-        half = min(length // 2, count) if every > 1 else 0
-        self.half = half
-        middle = 0.5 * (1.0 + PASS_BAND) / every
-        window = ("kaiser", beta)
-        self.weights = firwin(2 * half + 1, middle, window=window) if half else np.ones(1)  # type: ignore
-        self.slope = _end_slope(min(half, 2 * every)) if half else np.zeros(1)
-        self.buffer, self.first, self.done = np.zeros((0, 0)), 0, 0
-
-    def push(self, rows) -> np.ndarray:
-        """Records (k, c) that become complete with further rows (n, c)."""
-        rows = np.asarray(rows, float)
-        self.buffer = np.vstack([self.buffer, rows]) if self.seen else rows.copy()
-        self.seen += len(rows)
-        half, last = self.half, self.seen == self.count + 1
-        if self.done == 0 and self.first == 0:
-            if len(self.buffer) <= half and not last:
-                return np.empty((0, rows.shape[1]))
-            ahead = self._mirrored(self.buffer[: half + 1])
-            self.buffer, self.first = np.vstack([ahead[::-1], self.buffer]), -half
-        if last and half:
-            self.buffer = np.vstack([self.buffer, self._mirrored(self.buffer[-1 - half :][::-1])])
-        return self._filtered()
-
-    def _mirrored(self, rows) -> np.ndarray:
-        """Rows (half, c) beyond the end at which `rows` (half + 1, c) begin."""
-        slope = self.slope @ (rows[: len(self.slope)] - rows[0])
-        return rows[1:] - 2.0 * np.outer(np.arange(1, len(rows)), slope)
-
-    def _filtered(self) -> np.ndarray:
-        """Records whose whole window is in the buffer."""
-        from scipy.signal import upfirdn
-
-        reach = self.first + len(self.buffer) - 1 - self.half
-        stop = min(reach // self.every + 1, self.rows)
-        if stop <= self.done:
-            return np.empty((0, self.buffer.shape[1]))
-        begin, number = self.done * self.every - self.half - self.first, stop - self.done
-        wanted = self.buffer[begin : begin + (number - 1) * self.every + 2 * self.half + 1]
-        # only every so many values of the convolution are computed: the padding makes the first one of them
-        pad = -2 * self.half % self.every
-        padded = np.vstack([np.zeros((pad, wanted.shape[1])), wanted])
-        start = (2 * self.half + pad) // self.every
-        found = upfirdn(self.weights, padded, down=self.every, axis=0)[start : start + number]
-        self.done = stop
-        keep = max(stop * self.every - self.half - self.first, 0)
-        self.buffer, self.first = self.buffer[keep:].copy(), self.first + keep
-        return found
-
-
-def _end_slope(steps: int) -> np.ndarray:
-    """Weights (steps + 1,) of rows for the slope, at the first one, of their parabola; of a line for two."""
-    from scipy.signal import savgol_coeffs
-
-    weights = savgol_coeffs(steps + 1, min(2, steps), deriv=1, pos=0, use="dot")
-    # ramps exactly, whatever the least squares round
-    return weights / (weights @ np.arange(steps + 1.0))
-
-
-class Record:
-    """What a run keeps: coordinates, meshes, spin."""
-
-    def __init__(self, model: DrivetrainModel, count: int, records: Records, at, *, contact_loss: bool):
-        self.every, self.at = records.every, at
-        self.contacts = model.contacts if contact_loss else None
-        self.basic = (self.contacts or model).geometry.basic
-        rows, meshes = count // self.every + 1, len(model.meshes)
-        widths = [len(at), len(at), meshes, meshes, 1, 1]
-        self.cuts = np.cumsum(widths)[:-1]
-        self.table = np.empty((rows, sum(widths)))
-        self.decimator = Decimator(self.every, count) if records.lowpass and self.every > 1 else None
-        self.filled, self.steps = 0, 0
-        self.extremes = np.array([np.full(meshes, np.inf), np.full(meshes, -np.inf)])
-        self.pulled, self.lost = np.zeros((2, meshes))
-
-    def take(self, first: int, number: int, states, block: Block) -> None:
-        """Rows of a block of `number` steps; that of its start comes with the first block alone."""
-        begin = min(first, 1)
-        approach = np.einsum("tmj,tm->tj", block.selection, states[:, : len(self.basic)] @ self.basic)
-        force, touched = block.stiffness * approach, np.ones((1, 1), bool)
-        if self.contacts is not None:
-            force, touched = self.contacts.mesh_forces(approach, block.stiffness)
-            approach = approach[:, : force.shape[1]]
-        self._count(force[begin:], touched[begin:])
-        if self.decimator is None:
-            at = (-first % self.every) or self.every if first else 0
-            kept = slice(at, None, self.every)
-        else:
-            kept = slice(begin, None)
-        n = len(self.basic)
-        motion, velocity = states[kept, :n][:, self.at], states[kept, n : 2 * n][:, self.at]
-        spin = block.angle[kept, None], block.speed[kept, None]
-        new = np.hstack([motion, velocity, approach[kept], force[kept], *spin])
-        if self.decimator is not None:
-            new = self.decimator.push(new)
-        self.table[self.filled : self.filled + len(new)] = new
-        self.filled += len(new)
-
-    def _count(self, force, touched) -> None:
-        self.extremes[0] = np.minimum(self.extremes[0], force.min(axis=0, initial=np.inf))
-        self.extremes[1] = np.maximum(self.extremes[1], force.max(axis=0, initial=-np.inf))
-        self.pulled += np.count_nonzero(force < 0.0, axis=0)
-        self.lost += np.count_nonzero(~touched, axis=0)
-        self.steps += len(force)
-
-    def columns(self, step: float) -> dict[str, np.ndarray]:
-        """Arrays of a `DrivetrainRun`."""
-        *tables, angle, speed = np.split(self.table, self.cuts, axis=1)
-        names = ("motion", "velocity", "approach", "force")
-        return {
-            **{name: np.ascontiguousarray(one) for name, one in zip(names, tables)},
-            "time": step * self.every * np.arange(len(self.table)),
-            "spin": angle[:, 0].copy(),
-            "spin_speed": speed[:, 0].copy(),
-            "extremes": self.extremes,
-            "pulling": self.pulled / self.steps,
-            "lost": self.lost / self.steps,
-        }
