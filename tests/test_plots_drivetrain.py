@@ -19,7 +19,6 @@ from femgear.trains.drivetrain.figures import (
     over_time,
     spectra,
     spectrum_figures,
-    stiffness_series,
     transient_figures,
 )
 from femgear.trains.drivetrain.stages import remarks
@@ -36,10 +35,6 @@ def drawn(figure):
 
 
 def test_curves_and_units():
-    wave = 1e8 * (1.0 + 0.2 * np.sin(TIME))
-    stiffness = drawn(stiffness_series(TIME, [("mesh", wave)], [("mesh", 0.9 * wave)]))
-    assert np.allclose(stiffness[0][0][:, 1], 90.0 * (1.0 + 0.2 * np.sin(TIME)))
-    assert np.allclose(stiffness[0][1][:, 1], 1e-6 * wave)
     panels = [("one", [("a", TIME), ("b", 2.0 * TIME)]), ("two", [("a", TIME**2)])]
     motion = drawn(over_time(TIME, panels, unit="mrad", factor=1e3))
     assert len(motion) == 2 and np.allclose(motion[0][1][:, 1], 2e3 * TIME)

@@ -67,8 +67,6 @@ LEAST_RECORDS = 64
 
 # Force of a mesh, over the sum of what the single torques would give, that is rounding.
 _NO_FORCE = 1e-6
-# Torsional stiffness that stands for a rigid shaft, over that of the stiffest mesh.
-_RIGID = 1e3
 
 
 def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
@@ -157,7 +155,7 @@ def mean_torque(history: TorqueHistory, duration: float) -> float:
 
 def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration: float) -> np.ndarray:
     """Sum of the mean mesh forces of every stage [N]; zero where they are rounding."""
-    model = torsional_model(_elastic(train), harmonics=0, turning=False)
+    model = torsional_model(replace(train, damping_ratio=0.0), harmonics=0, turning=False)
     W, k, carried = model.system.W, model.mean_stiffness, model.system.M @ model.rigid
     force = np.zeros((len(k), len(torques)))
     for column, one in enumerate(torques):
@@ -171,18 +169,6 @@ def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration:
     # the model's flanks are those of the drivers that are given
     default = [one.flank for one in train.stages]
     return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)
-
-
-def _elastic(train: Drivetrain) -> Drivetrain:
-    """The chain without damping, shafts that do not twist made stiff: a torque may act on either end."""
-    meshes = [one.mesh.stiffness * one.pitch_radii[0] ** 2 for one in train.parallel]
-    meshes += [one.ring_mesh.stiffness * one.ring_radius**2 for one in train.planetary]
-    torsion = _RIGID * max(meshes, default=1.0)
-    shafts = tuple(
-        one.changed(torsion=torsion) if not one.elements and math.isinf(one.springs.torsion) else one
-        for one in train.shafts
-    )
-    return replace(train, shafts=shafts, damping_ratio=0.0)
 
 
 @dataclass(frozen=True)
