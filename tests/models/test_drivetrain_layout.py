@@ -5,8 +5,8 @@ import pytest
 from published.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
 
 from femgear.trains.drivetrain.data import BearingSection, BodySection, Drivetrain, ShaftSection
-from femgear.trains.drivetrain.figures import beam_shape, drivetrain_layout, layout_motion, shaft_lines
 from femgear.trains.drivetrain.model import drivetrain_model
+from femgear.trains.drivetrain.pictures import beam_shape, drivetrain_layout, layout_motion, shaft_lines
 
 TRAIN = wind_turbine_drivetrain()
 MODEL, LAYOUT = drivetrain_model(TRAIN), drivetrain_layout(TRAIN)
