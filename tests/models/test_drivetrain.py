@@ -26,9 +26,9 @@ from femgear.trains.drivetrain.data import (
     MeshSection,
     ShaftSection,
 )
+from femgear.trains.drivetrain.geometry import planar_of
 from femgear.trains.drivetrain.model import (
     drivetrain_model,
-    planar_of,
     rectangular_series,
     torsional_model,
 )

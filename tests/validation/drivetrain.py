@@ -27,10 +27,10 @@ from femgear.trains.drivetrain.data import (
     ParallelSection,
     constant_torques,
 )
+from femgear.trains.drivetrain.geometry import planar_of
 from femgear.trains.drivetrain.model import (
     balanced_torque,
     drivetrain_model,
-    planar_of,
     rectangular_series,
     torsional_model,
 )

@@ -21,13 +21,8 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.storage.dataset import RPM
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.data import Drivetrain, ShaftSection, TorqueHistory
-from femgear.trains.drivetrain.model import (
-    DrivetrainModel,
-    coordinates_of,
-    drivetrain_model,
-    rigid_rotation,
-    torsional_model,
-)
+from femgear.trains.drivetrain.geometry import speed_ratios
+from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model, torsional_model
 from femgear.trains.drivetrain.records import PASS_BAND
 from femgear.trains.drivetrain.section import (
     FASTEST_RATE,
@@ -131,19 +126,6 @@ def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duratio
     ]
     planets = len(train.planetary)
     return replace(train, planetary=tuple(found[:planets]), parallel=tuple(found[planets:]))
-
-
-def speed_ratios(train: Drivetrain) -> dict[str, float]:
-    """Speed of every body over that of the first one.
-
-    Raises
-    ------
-    CaseError
-        Stages that leave no single spin (E-DRIVETRAIN).
-    """
-    place = coordinates_of(train)
-    spin = rigid_rotation(train, place)
-    return {name: float(spin[first + 4]) for name, first in place.body.items()}
 
 
 def mean_torque(history: TorqueHistory, duration: float) -> float:

@@ -21,7 +21,7 @@ from femgear.report.scene import add_coloured, load_pyvista
 from femgear.report.style import VERMILION
 from femgear.storage.files import replace_file
 from femgear.trains.drivetrain.data import Drivetrain
-from femgear.trains.drivetrain.model import DrivetrainModel, coordinates_of, free_coordinates
+from femgear.trains.drivetrain.model import DrivetrainModel
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -125,8 +125,7 @@ def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.nda
 
     Planets fixed to their pins follow the carrier, at its angle zero.
     """
-    train = model.train
-    place, full = _all_coordinates(model, shape)
+    train, place, full = model.train, model.place, model.free @ shape
     move, turn = np.zeros((2, len(layout.names), 3))
     for row, body in enumerate(train.bodies):
         x, y, *turns = full[place.body[body.name] : place.body[body.name] + 5]
@@ -165,7 +164,7 @@ def shaft_lines(
     tuple of (rest, displacement)
         In the order of the shafts of the chain [m].
     """
-    place, full = _all_coordinates(model, shape)
+    place, full = model.place, model.free @ shape
     found = []
     for shaft, inner, ends in zip(model.train.shafts, place.inner, layout.shafts):
         one, two = (place.body[name] for name in shaft.between)
@@ -176,13 +175,6 @@ def shaft_lines(
         rest = one + share[:, None] * (two - one)
         found.append((rest, np.column_stack([across, np.zeros(len(share))])))
     return tuple(found)
-
-
-def _all_coordinates(model: DrivetrainModel, shape):
-    """Places of all coordinates, and their values (n,) under a motion of the free ones."""
-    place = coordinates_of(model.train)
-    T, _ = free_coordinates(model.train, place)
-    return place, T @ np.asarray(shape, float)
 
 
 def _beam_line(shaft, stations, points: int) -> tuple[np.ndarray, np.ndarray]:
