@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.trains.drivetrain.records import Decimator
+from femgear.trains.drivetrain.time import Decimator
 
 EVERY, COUNT = 20, 6000
 

@@ -23,7 +23,6 @@ from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.data import Drivetrain, ShaftSection, TorqueHistory
 from femgear.trains.drivetrain.geometry import speed_ratios
 from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model, torsional_model
-from femgear.trains.drivetrain.records import PASS_BAND
 from femgear.trains.drivetrain.section import (
     FASTEST_RATE,
     DrivetrainCase,
@@ -32,7 +31,7 @@ from femgear.trains.drivetrain.section import (
     settle_time,
     torque_histories,
 )
-from femgear.trains.drivetrain.time import static_deviations
+from femgear.trains.drivetrain.time import PASS_BAND, static_deviations
 
 BENDING, TORSIONAL = "with bending", "torsional"
 # Slower instants, over the mean speed, would need records of endless length over a turn.

@@ -21,8 +21,8 @@ from femgear.trains.drivetrain.checks import case_model
 from femgear.trains.drivetrain.data import numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.pictures import mode_pictures
-from femgear.trains.drivetrain.records import PASS_BAND
 from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, pass_band, separating, symbols
+from femgear.trains.drivetrain.time import PASS_BAND
 from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:

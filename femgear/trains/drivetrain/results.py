@@ -19,9 +19,8 @@ from femgear.storage.dataset import RPM, dataset
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
 from femgear.trains.drivetrain.data import TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
-from femgear.trains.drivetrain.records import PASS_BAND
 from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
-from femgear.trains.drivetrain.time import BALANCE, DrivetrainRun
+from femgear.trains.drivetrain.time import BALANCE, PASS_BAND, DrivetrainRun
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -322,42 +321,37 @@ def transient_warnings(data: xr.Dataset) -> Iterator[str]:
                 f"time,{beside} with up to "
                 f"{-1e-3 * least[v, lowest]:.4g} kN: real teeth would part (simulation.contact_loss)"
             )
-    yield from _parted_warnings(data)
+    for variant, lost in zip(data["variant"].values, data["lost"].values):
+        if names := [str(mesh) for mesh, share in zip(data["mesh"].values, lost) if share >= 1.0]:
+            yield (
+                f"[W-PARTED] {variant}: the teeth of {', '.join(names)} never touch and transmit nothing; "
+                "give torques or a start that close the flanks"
+            )
     yield from _growth_warnings(data)
     for name, words in (("energy_error", "energy"), ("momentum_error", "angular momentum")):
         if not (error := float(data[name].max())) <= BALANCE:
             yield f"[W-BALANCE] the balance of {words} misses {error:.1e} of its largest term"
 
 
-def _parted_warnings(data: xr.Dataset) -> Iterator[str]:
-    """Meshes whose flanks are apart at every step."""
-    if not separating(data):
-        return
-    meshes = data["mesh"].values
-    for variant, lost in zip(data["variant"].values, data["lost"].values):
-        if names := [str(mesh) for mesh, share in zip(meshes, lost) if share >= 1.0]:
-            yield (
-                f"[W-PARTED] {variant}: the teeth of {', '.join(names)} never touch and transmit nothing; "
-                "give torques or a start that close the flanks"
-            )
-
-
 def _growth_warnings(data: xr.Dataset) -> Iterator[str]:
-    if separating(data):
-        yield from _chaos_warnings(data)
-        return
-    duration, gains = float(data.attrs["steps"]) * float(data.attrs["step"]), largest_gains(data)
+    """Parametric resonances; with contact loss motions that depend on every detail, steps included."""
+    duration, parts = float(data.attrs["steps"]) * float(data.attrs["step"]), separating(data)
     pulls = data["least_force"].values.min(axis=1, initial=0.0) < -_NOTHING
-    for (variant, rate), pulled in zip(growth_rates(data), pulls):
-        gain = gains.get(variant, math.nan)
-        if rate * duration > math.log(GROWN):
-            times = shown_factor(rate * duration / math.log(10.0))
-            found = f"grows with {rate:.4g} 1/s, {times} times over the run"
-        elif gain > _GAINED:
-            way = "grows slowly" if rate > 0.0 else "decays"
-            found = f"{way} in the mean, but grows {shown_factor(math.log10(gain))} times on the way"
-        else:
+    for (variant, rate, gain), pulled in zip(_growth(data), pulls):
+        grows = rate * duration > math.log(GROWN)
+        if grows and parts:
+            yield (
+                f"[W-CHAOS] {variant}: neighbouring motions move apart with {rate:.4g} 1/s: times of contact "
+                "and peaks depend on every detail, the steps included; compare two values of simulation.rate"
+            )
+        if parts or not (grows or gain > _GAINED):
             continue
+        if grows:
+            times = _shown_factor(rate * duration / math.log(10.0))
+            found = f"grows with {rate:.4g} 1/s, {times} times over the run"
+        else:
+            way = "grows slowly" if rate > 0.0 else "decays"
+            found = f"{way} in the mean, but grows {_shown_factor(math.log10(gain))} times on the way"
         senseless = gain > _GAINED and pulled
         yield (
             f"[W-GROWTH] {variant}: the free motion {found}: a parametric resonance"
@@ -366,36 +360,18 @@ def _growth_warnings(data: xr.Dataset) -> Iterator[str]:
         )
 
 
-def _chaos_warnings(data: xr.Dataset) -> Iterator[str]:
-    """Motions with contact loss that depend on every detail, steps included."""
-    duration = float(data.attrs["steps"]) * float(data.attrs["step"])
-    for variant, rate in growth_rates(data):
-        if rate * duration > math.log(GROWN):
-            yield (
-                f"[W-CHAOS] {variant}: neighbouring motions move apart with {rate:.4g} 1/s: times of contact "
-                "and peaks depend on every detail, the steps included; compare two values of simulation.rate"
-            )
-
-
 def separating(data: xr.Dataset) -> bool:
     """Whether the meshes of transient.nc lose contact."""
-    return data.attrs.get("contact", "linear") == "separating"
+    return data.attrs["contact"] == "separating"
 
 
-def growth_rates(data: xr.Dataset) -> Iterator[tuple[str, float]]:
-    """Variants and the rates of their free motions [1/s]; results of earlier runs have none."""
-    if "growth" in data:
-        yield from zip(map(str, data["variant"].values), map(float, data["growth"].values))
+def _growth(data: xr.Dataset) -> Iterator[tuple[str, float, float]]:
+    """Variants, rates [1/s] and largest growths of their free motions."""
+    found = (data[name].values.tolist() for name in ("growth", "gain"))
+    yield from zip(map(str, data["variant"].values), *found)
 
 
-def largest_gains(data: xr.Dataset) -> dict[str, float]:
-    """Largest growth of the free motion within the run, by variant; results of earlier runs have none."""
-    if "gain" not in data:
-        return {}
-    return dict(zip(map(str, data["variant"].values), map(float, data["gain"].values)))
-
-
-def shown_factor(power: float) -> str:
+def _shown_factor(power: float) -> str:
     """Ten to a power that may be beyond all numbers."""
     return f"{10.0**power:.3g}" if power < 300.0 else f"1e{power:.0f}" if math.isfinite(power) else "1e308"
 
@@ -559,11 +535,15 @@ def describe_transient(data: xr.Dataset) -> Block:
     records = ("least recorded [kN]", "largest recorded [kN]") if thinned else ()
     header = ("model", "mesh", "mean [kN]", "least [kN]", "largest [kN]", *records, *shares)
     speed, body = data["speed"].values[0], str(data["body"].values[0])
+    recorded = [
+        f"recorded: what is left of them in files and pictures, every {data.attrs['every']}th step "
+        f"behind a low pass that ends at {pass_band(data):.4g} Hz"
+    ] * thinned
     notes = [
         f"{data.attrs['steps']} steps, at any of which least and largest force may be; {body} from "
         f"{speed[0, 0] / RPM:.4f} to {speed[-1, 0] / RPM:.4f} rpm",
-        *_recorded(data, thinned),
-        *([_damping(float(data.attrs["damping_ratio"]))] if "damping_ratio" in data.attrs else []),
+        *recorded,
+        _damping(float(data.attrs["damping_ratio"])),
         f"energy balance {float(data['energy_error'].max()):.1e}, angular momentum "
         f"{float(data['momentum_error'].max()):.1e}",
         *_growth_notes(data),
@@ -573,21 +553,13 @@ def describe_transient(data: xr.Dataset) -> Block:
     return Block("Transient", header, tuple(rows), tuple(notes))
 
 
-def _recorded(data: xr.Dataset, thinned: bool) -> Iterator[str]:
-    if thinned:
-        yield (
-            f"recorded: what is left of them in files and pictures, every {data.attrs['every']}th step "
-            f"behind a low pass that ends at {pass_band(data):.4g} Hz"
-        )
-
-
 def pass_band(data: xr.Dataset) -> float:
     """End of the pass band of the records of transient.nc [Hz]."""
     return 0.5 * PASS_BAND / (float(data.attrs["step"]) * int(data.attrs["every"]))
 
 
 def _growth_notes(data: xr.Dataset) -> Iterator[str]:
-    for variant, rate in growth_rates(data):
+    for variant, rate, gain in _growth(data):
         if not math.isfinite(rate):
             continue
         if separating(data):
@@ -596,13 +568,11 @@ def _growth_notes(data: xr.Dataset) -> Iterator[str]:
         else:
             way = "grows" if rate > 0.0 else "decays"
             text = f"{variant}: the free motion {way} with {abs(rate):.4g} 1/s in the mean"
-            gain = largest_gains(data).get(variant, math.nan)
-            yield f"{text}, at most {shown_factor(math.log10(gain))} times" if gain > GROWN else text
+            yield f"{text}, at most {_shown_factor(math.log10(gain))} times" if gain > GROWN else text
 
 
 def describe_spectrum(data: xr.Dataset) -> Block:
     """Table of spectrum.nc: amplitudes of the named lines, of one mesh of every kind."""
-
     meshes, amplitude = chosen_meshes(data), data["line_amplitude"].values
     names, variants = symbols(data), [str(name) for name in data["variant"].values]
     rows = []

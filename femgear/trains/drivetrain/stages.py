@@ -16,8 +16,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import welch, windows
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.tracking import campbell_data
 from femgear.threads import one_blas_thread
 from femgear.trains.drivetrain.checks import (
     BENDING,
@@ -31,7 +35,6 @@ from femgear.trains.drivetrain.checks import (
     record_rate,
 )
 from femgear.trains.drivetrain.model import DrivetrainModel
-from femgear.trains.drivetrain.records import PASS_BAND
 from femgear.trains.drivetrain.results import (
     AveragedSpectrum,
     DrivetrainModesResult,
@@ -51,7 +54,7 @@ from femgear.trains.drivetrain.section import (
     settle_time,
     torque_histories,
 )
-from femgear.trains.drivetrain.time import DrivetrainRun, Records, march_drivetrain
+from femgear.trains.drivetrain.time import PASS_BAND, DrivetrainRun, Records, march_drivetrain
 from femgear.trains.protocol import Figures, OwnFile, Progress, Stage, Train
 
 if TYPE_CHECKING:
@@ -73,9 +76,6 @@ GROWN, _WILD = 1e3, 100.0
 @one_blas_thread()
 def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
     """Natural frequencies and modes, and the Campbell diagram with the mesh lines."""
-    from femgear.solvers.linear.modal import solve_modes
-    from femgear.solvers.linear.tracking import campbell_data
-
     model, speed = check_drivetrain(case), case.operation.speed
     modes = solve_modes(model.still, model.mean_stiffness)
     still = replace(model.still, gyroscopic=model.system.gyroscopic)
@@ -272,27 +272,25 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
     resolution : float
         Wanted distance of lines [Hz]; the segments take ``1 / resolution`` seconds.
     """
-    from scipy.signal import get_window
-
     signal = np.asarray(signal, float)
     length = round(1.0 / (resolution * step)) if resolution > 0.0 and step > 0.0 else 0
     if not 8 <= length <= len(signal):
         raise CaseError(
-            f"segments of {length} of {len(signal)} samples", code="E-SPECTRUM",
-            limit="8 samples up to the whole signal", remedy="take a coarser resolution or a longer signal",
-        )  # fmt: skip
-    weight = np.asarray(get_window(WINDOW, length))
+            f"segments of {length} of {len(signal)} samples",
+            code="E-SPECTRUM",
+            limit="8 samples up to the whole signal",
+            remedy="take a coarser resolution or a longer signal",
+        )
     hop = max(1, round(0.5 * length))
-    starts = range(0, len(signal) - length + 1, hop)
-    power = 0.0
-    for start in starts:
-        part = signal[start : start + length]
-        line = np.fft.rfft((part - part.mean(axis=0)).T * weight, axis=-1)
-        power = power + np.abs(line) ** 2
-    amplitude = 2.0 * np.sqrt(power / len(starts)) / weight.sum()
-    bandwidth = np.sum(weight**2) / weight.sum() ** 2 / step
+    weight = windows.get_window(WINDOW, length)
+    options = {"window": weight, "noverlap": length - hop, "detrend": "constant", "scaling": "spectrum"}
+    frequency, power = welch(signal, 1.0 / step, nperseg=length, axis=0, return_onesided=False, **options)
+    kept = length // 2 + 1
+    amplitude = 2.0 * np.sqrt(np.moveaxis(power[:kept], 0, -1))
+    bandwidth = float(np.sum(weight**2) / weight.sum() ** 2 / step)
+    segments = (len(signal) - length) // hop + 1
     return AveragedSpectrum(
-        np.fft.rfftfreq(length, step), amplitude, 1.0 / (length * step), float(bandwidth), WINDOW, len(starts)
+        np.abs(frequency[:kept]), amplitude, 1.0 / (length * step), bandwidth, WINDOW, segments
     )
 
 
@@ -306,19 +304,13 @@ def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> Averag
     ----------
     signal : (n, ...) array
     angle : (n,) array
-        Ascending [rad].
+        Ascending, 4 samples or more [rad].
     resolution : float
         Distance of orders.
     per_turn : int
         Samples a turn, more than twice the highest order; orders above a half of it alias.
     """
-    from scipy.interpolate import CubicSpline
-
     angle = np.asarray(angle, float)
-    if len(angle) < 4 or np.any(np.diff(angle) <= 0.0):
-        raise CaseError(
-            "the angle of order tracking must ascend", code="E-SPECTRUM", limit="4 samples or more"
-        )
     count = int((angle[-1] - angle[0]) / (2.0 * np.pi) * per_turn)
     even = angle[0] + 2.0 * np.pi / per_turn * np.arange(count)
     tracked = CubicSpline(angle, np.asarray(signal, float))(even)
@@ -333,10 +325,6 @@ def _transient_verdict(result: TransientResult) -> dict:
         "momentum": max(run.momentum for run in runs),
         "pulling": {variant: float(np.max(run.pulling, initial=0.0)) for variant, run in result.runs.items()},
     }
-
-
-def _check(case: DrivetrainCase) -> None:
-    check_drivetrain(case)
 
 
 def _figures() -> Mapping[str, Figures]:
@@ -368,7 +356,7 @@ DRIVETRAIN = Train(
                 "modes": len(result.modes.frequency), "degrees_of_freedom": len(result.modes.shape),
             },
             describe=lambda results: describe_drivetrain_modes(results.modes),
-            check=_check,
+            check=check_drivetrain,
         ),
         Stage(
             name="transient",
@@ -376,7 +364,7 @@ DRIVETRAIN = Train(
             solve=lambda case, _, context: solve_transient_run(case, progress=context.progress),
             verdict=_transient_verdict,
             describe=lambda results: describe_transient(results.transient),
-            check=_check,
+            check=check_drivetrain,
         ),
         Stage(
             name="spectrum",
