@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import linalg
 
 from femgear.case.units import FREQUENCY, SPEED, TIME
 from femgear.errors import CaseError
@@ -73,20 +75,22 @@ def case_model(case: DrivetrainCase, variant: str = BENDING) -> DrivetrainModel:
     """
     build = drivetrain_model if variant == BENDING else torsional_model
     options = {"harmonics": case.simulation.harmonics, "turning": case.simulation.turning}
-    try:
+    with _located(case):
         train = drivetrain_of(case)
         torques = torque_histories(case, speed_ratios(train))
         return build(with_drivers(train, torques, duration=case.simulation.duration), **options)
+
+
+@contextmanager
+def _located(case: DrivetrainCase) -> Iterator[None]:
+    """Let the refusals of a model name the entries of the case file and their lines."""
+    try:
+        yield
     except CaseError as error:
-        raise _located(error, case) from None
-
-
-def _located(error: CaseError, case: DrivetrainCase) -> CaseError:
-    """The error of a model in terms of the case file."""
-    if error.code == "E-TURNING":
-        error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
-    error.file = case.location(error.key or "")
-    return error
+        if error.code == "E-TURNING":
+            error.key, error.remedy = "simulation.turning", "write turning = false, which freezes the carrier"
+        error.file = case.location(error.key or "")
+        raise
 
 
 def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duration: float) -> Drivetrain:
@@ -277,18 +281,8 @@ def shift_rate(hertz: float, share: float) -> float:
 def default_record_rate(rate: float, highest: float) -> float:
     """Records a second where none are given: few, but with the third harmonic of the highest mesh.
 
-    Parameters
-    ----------
-    rate : float
-        Steps a second [Hz].
-    highest : float
-        Highest mesh frequency of the run [Hz].
-
-    Returns
-    -------
-    float
-        The rate over the largest whole number for which the pass band of the records holds that harmonic and
-        there are 1000 a second; at most the rate.
+    The steps a second `rate` [Hz] over the largest whole number for which the pass band of the records holds
+    that harmonic of the frequency `highest` [Hz] and there are 1000 a second; at most the rate.
     """
     # a hair more, so that rounding of the speed does not push the harmonic out
     needed = max(LEAST_RECORD_RATE, 2.0 * KEPT_HARMONIC * highest * (1.0 + 1e-6) / PASS_BAND)
@@ -305,24 +299,24 @@ def check_drivetrain(case: DrivetrainCase) -> DrivetrainModel:
         natural frequencies too far apart for double precision (E-STIFFNESS); steps that cannot follow the
         meshes (E-RATE); records that are too many (E-RANGE).
     """
-    try:
-        count, names = loose_motions(drivetrain_of(case), turning=case.simulation.turning)
-    except CaseError as error:
-        raise _located(error, case) from None
-    if count:
-        raise CaseError(
-            f"nothing holds {count} motion{'s' if count > 1 else ''}, such as {', '.join(names[:3])}",
-            code="E-MECHANISM", key="bearing", file=case.location("bearing"),
-            limit="bearings and shafts that leave the common rotation alone free",
-            remedy="add a [[bearing]] or its stiffness, or tilts = false",
-        )  # fmt: skip
-    check_spread(case, drivetrain_of(case))
-    model = case_model(case)
-    _check_stiffness(case, model)
-    _check_rate(case, model)
-    if case.simulation.record is None:
-        for problem in record_problems(case, record_rate(case, model)):
-            raise _located(problem, case)
+    with _located(case):
+        train = drivetrain_of(case)
+        count, names = loose_motions(train, turning=case.simulation.turning)
+        if count:
+            raise CaseError(
+                f"nothing holds {count} motion{'s' if count > 1 else ''}, such as {', '.join(names[:3])}",
+                code="E-MECHANISM",
+                key="bearing",
+                limit="bearings and shafts that leave the common rotation alone free",
+                remedy="add a [[bearing]] or its stiffness, or tilts = false",
+            )
+        _check_spread(train, turning=case.simulation.turning)
+        model = case_model(case)
+        _check_stiffness(case, model)
+        _check_rate(case, model)
+        if case.simulation.record is None:
+            for problem in record_problems(case, record_rate(case, model)):
+                raise problem
     return model
 
 
@@ -335,36 +329,36 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
         Records that are too few, a resolution that they do not have (E-RANGE); a first body that nearly stops
         or turns back in the part that the spectra take (E-SPECTRUM).
     """
-    for problem in _spectrum_problems(case, record_rate(case, model)):
-        raise _located(problem, case)
-    s = case.simulation
-    late = speed_range(
-        model, torque_histories(case, model.ratio), duration=s.duration, speed=case.operation.speed,
-        start=settle_time(case),
-    )  # fmt: skip
-    try:
+    s, torques = case.simulation, torque_histories(case, model.ratio)
+    with _located(case):
+        _check_records(case, record_rate(case, model))
+        late = speed_range(
+            model, torques, duration=s.duration, speed=case.operation.speed, start=settle_time(case)
+        )
         check_turning(late.lowest, late.mean)
-    except CaseError as error:
-        raise _located(error, case) from None
 
 
-def _spectrum_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
-    """Why the records of a run have no spectra; `record` a second [Hz]."""
+def _check_records(case: DrivetrainCase, record: float) -> None:
+    """Refuse records, so many a second [Hz], that have no spectra."""
     s = case.simulation
     late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
     if late * record < LEAST_RECORDS:
-        yield CaseError(
-            f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
-            key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
+        raise CaseError(
+            f"{late * record:.3g} records are too few for the spectra",
+            code="E-RANGE",
+            key=f"simulation.{key}",
+            value=TIME.show(getattr(s, key)),
             limit=f"{LEAST_RECORDS} records or more after simulation.settle",
             remedy="take a longer duration, a shorter settle or more records, or write --only transient",
-        )  # fmt: skip
-    elif s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
-        yield CaseError(
-            "the record has no such resolution", code="E-RANGE", key="simulation.resolution",
+        )
+    if s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
+        raise CaseError(
+            "the record has no such resolution",
+            code="E-RANGE",
+            key="simulation.resolution",
             value=FREQUENCY.show(s.resolution),
             limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(record / 16.0)}",
-        )  # fmt: skip
+        )
 
 
 def check_turning(lowest: float, mean: float) -> None:
@@ -392,7 +386,7 @@ def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
     raise CaseError(
         f"the series of the stiffness of {model.meshes[wrong[0]]} falls to {least[wrong[0]]:.3g} N/m: with "
         f"{case.simulation.harmonics} terms it overshoots the jump by about 9 %",
-        code="E-STIFFNESS", key=key, file=case.location(key), limit="above 0 N/m at any time",
+        code="E-STIFFNESS", key=key, limit="above 0 N/m at any time",
         remedy="give a larger low_share",
     )  # fmt: skip
 
@@ -413,7 +407,7 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
     raise CaseError(
         f"{rate / hertz:.3g} steps a period ({FREQUENCY.show(rate)}) cannot follow the {name}, "
         f"{FREQUENCY.show(hertz)} at {SPEED.show(speeds.fastest)} of {first}",
-        code="E-RATE", key=key, value=value, file=case.location(key),
+        code="E-RATE", key=key, value=value,
         limit=f"{LEAST_STEPS} steps a period at any time: {FREQUENCY.show(LEAST_STEPS * hertz)} or more",
         remedy=remedy,
     )  # fmt: skip
@@ -429,13 +423,13 @@ def drivetrain_warnings(case: DrivetrainCase, model: DrivetrainModel | None = No
     """
     model = model or check_drivetrain(case)
     speeds = case_speeds(case, model)
-    warned = (
-        _runaway(case, speeds),
-        _rates(case, model, speeds),
-        _spectra(case, model),
-        _undamped(case),
+    return (
+        *case.notices,
+        *_runaway(case, speeds),
+        *_rates(case, model, speeds),
+        *_spectra(case, model),
+        *_undamped(case),
     )
-    return (*case.notices, *(text for some in warned for text in some))
 
 
 def _undamped(case: DrivetrainCase) -> Iterator[str]:
@@ -519,21 +513,14 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     ----------
     train : Drivetrain
     turning : bool
-        As of `drivetrain_model`.
+        As of `drivetrain_model`, whose refusals apply.
 
     Returns
     -------
     count : int
     names : tuple of str
         Coordinates of those motions, the largest first, rotations last.
-
-    Raises
-    ------
-    CaseError
-        As `drivetrain_model`.
     """
-    from scipy import linalg
-
     model = drivetrain_model(_like_springs(train), harmonics=1, turning=turning)
     stiffness = model.total_stiffness
     own = np.diag(stiffness)
@@ -544,17 +531,12 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     count = int(np.count_nonzero(linalg.eigvalsh(scaled) < _NOT_RESISTED))
     if not count:
         return 0, ()
-    return count, _names(train, model, linalg.eigh(scaled, subset_by_index=(0, count - 1))[1])
-
-
-def _names(train: Drivetrain, model: DrivetrainModel, motions) -> tuple[str, ...]:
-    """Coordinates of bodies before those of planets and shaft stations, rotations last."""
-    size, bodies = np.abs(motions).max(axis=1), {body.name for body in train.bodies}
-    order = [i for i in np.argsort(-size, kind="stable") if size[i] > _MOVED * size.max()]
-    names = [model.system.dofs[i] for i in order]
-    return tuple(
-        sorted(names, key=lambda n: (n.endswith("rotation"), n.split(":")[0] not in bodies))[:_NAMED]
-    )
+    moved = np.abs(linalg.eigh(scaled, subset_by_index=(0, count - 1))[1]).max(axis=1)
+    order = [i for i in np.argsort(-moved, kind="stable") if moved[i] > _MOVED * moved.max()]
+    bodies, names = {body.name for body in train.bodies}, [model.system.dofs[i] for i in order]
+    # coordinates of bodies before those of planets and shaft stations, rotations last
+    names.sort(key=lambda name: (name.endswith("rotation"), name.split(":")[0] not in bodies))
+    return count, tuple(names[:_NAMED])
 
 
 def _like_springs(train: Drivetrain) -> Drivetrain:
@@ -598,18 +580,12 @@ def _like_shaft(one: ShaftSection, arm: float) -> ShaftSection:
     return one.changed(outer_diameter=diameter, inner_diameter=0.0, youngs_modulus=modulus)
 
 
-def check_spread(case: DrivetrainCase, train: Drivetrain) -> None:
-    """Refuse slow motions that rounding hides beside the free spin.
+def _check_spread(train: Drivetrain, *, turning: bool) -> None:
+    """Refuse slow motions that rounding hides beside the free spin (E-STIFFNESS).
 
-    Raises
-    ------
-    CaseError
-        E-STIFFNESS, with the softest support where that is the cause, else with the fastest and the slowest
-        coordinate.
+    The softest support is named where that is the cause, else the fastest and the slowest coordinate.
     """
-    from scipy import linalg
-
-    model = drivetrain_model(replace(train, damping_ratio=0.0), turning=case.simulation.turning)
+    model = drivetrain_model(replace(train, damping_ratio=0.0), turning=turning)
     n, mass, stiffness = len(model.rigid), model.system.M, model.total_stiffness
     values = linalg.eigvalsh(stiffness, mass)
     # what the modes take for rigid: a share of a norm, which is up to sqrt(n) above the largest
@@ -617,34 +593,33 @@ def check_spread(case: DrivetrainCase, train: Drivetrain) -> None:
     if n == 1 or values[1] > share * values[-1]:
         return
     own = np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2.0 * math.pi)
-    fast = int(np.argmax(own))
+    fast = model.system.dofs[int(np.argmax(own))]
     factor = f"a factor of {1.0 / math.sqrt(share):.1g}"
-    shown = {"code": "E-STIFFNESS", "limit": f"frequencies within {factor}"}
-    words = "natural frequencies are too far apart for double precision: "
-    words += f"{model.system.dofs[fast]} by itself has {own[fast]:.3g} Hz, and "
-    soft, (place, name), value = _softest(train)
+    soft, key, body, value = _softest(train)
     # a support is the cause where it lies further from the middle than the fastest coordinate does
-    if soft * 2.0 * math.pi * own[fast] < (2.0 * math.pi * np.median(own)) ** 2:
-        raise CaseError(
-            f"{words}{name} on its bearings alone has {soft / (2.0 * math.pi):.3g} Hz, slower by more than "
-            f"{factor}",
-            key=place, value=value, file=case.location(place), **shown,
-            remedy=f"stiffen the bearings of {name}: theirs are the softest",
-        )  # fmt: skip
-    second = _slowest(model, stiffness)
-    names = [body.name for body in case.body]
-    members = [name.split(":")[0] for name in (model.system.dofs[fast], second)]
-    key = f"body[{names.index(members[0])}]" if members[0] in names else "shaft"
+    if soft * own.max() < np.median(own) ** 2:
+        slow = f"{body} on its bearings alone has {soft:.3g} Hz, slower"
+        remedy = f"stiffen the bearings of {body}: theirs are the softest"
+    else:
+        second = _slowest(model, stiffness)
+        names, member = [body.name for body in train.bodies], fast.split(":")[0]
+        key, value = f"body[{names.index(member)}]" if member in names else "shaft", None
+        slow = f"{second} moves slower"
+        remedy = f"give {member} more mass or inertia or rigid springs, or stiffen what holds "
+        remedy += second.split(":")[0]
     raise CaseError(
-        f"{words}{second} moves slower by more than {factor}", key=key, file=case.location(key), **shown,
-        remedy=f"give {members[0]} more mass or inertia or rigid springs, or stiffen what holds {members[1]}",
-    )  # fmt: skip
+        "natural frequencies are too far apart for double precision: "
+        f"{fast} by itself has {own.max():.3g} Hz, and {slow} by more than {factor}",
+        code="E-STIFFNESS",
+        key=key,
+        value=value,
+        limit=f"frequencies within {factor}",
+        remedy=remedy,
+    )
 
 
 def _slowest(model: DrivetrainModel, stiffness) -> str:
     """Coordinate with most of the kinetic energy of the slowest motion besides the free spin."""
-    from scipy import linalg
-
     mass = model.system.M
     slow = linalg.eigh(stiffness, mass, subset_by_index=(0, 1))[1]
     slow = slow - np.outer(model.rigid, model.rigid @ mass @ slow) / model.inertia
@@ -652,16 +627,16 @@ def _slowest(model: DrivetrainModel, stiffness) -> str:
     return model.system.dofs[int(np.argmax(energy))]
 
 
-def _softest(train: Drivetrain) -> tuple[float, tuple[str, str], str]:
-    """Slowest body on its own bearings: frequency [rad/s], key and body, stiffness; infinite without any."""
-    found = [(math.inf, ("", ""), "")]
+def _softest(train: Drivetrain) -> tuple[float, str, str, str]:
+    """Slowest body on its own bearings: frequency [Hz], key, body and stiffness; infinite without any."""
+    found = [(math.inf, "", "", "")]
     for body in train.bodies:
-        places = [i for i, one in enumerate(train.bearings) if one.body == body.name and not one.station]
+        places = [i for i, one in enumerate(train.bearings) if one.body == body.name]
         inertias = ("radial", body.mass, "N/m"), ("tilt", body.transverse_inertia, "N m/rad")
         for kind, inertia, unit in inertias if body.tilts else inertias[:1]:
             springs = [getattr(train.bearings[i], kind) for i in places]
             if sum(springs) > 0.0:
-                first = places[int(np.argmax(springs))]
-                speed = math.sqrt(sum(springs) / inertia)
-                found.append((speed, (f"bearing[{first}].{kind}", body.name), f"{max(springs):g} {unit}"))
+                key = f"bearing[{places[int(np.argmax(springs))]}].{kind}"
+                hertz = math.sqrt(sum(springs) / inertia) / (2.0 * math.pi)
+                found.append((hertz, key, body.name, f"{max(springs):g} {unit}"))
     return min(found)
