@@ -17,7 +17,7 @@ import numpy as np
 from femgear.report.tables import Block
 from femgear.storage.dataset import RPM, dataset
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, drivetrain_warnings, record_rate
-from femgear.trains.drivetrain.data import TorqueHistory, numbered
+from femgear.trains.drivetrain.data import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.section import DrivetrainCase, torque_histories
 from femgear.trains.drivetrain.time import BALANCE, PASS_BAND, DrivetrainRun
@@ -398,7 +398,8 @@ def describe_drivetrain(case: DrivetrainCase) -> tuple[Block, ...]:
 def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
     rows = []
     for body in model.train.bodies:
-        held = [one for one in model.train.bearings if one.body == body.name]
+        # a bearing inside a shaft counts with its first body
+        held = [one for one in model.train.bearings if body.name in (one.body, *(one.shaft or ())[:1])]
         rows.append(
             (
                 body.name,
@@ -438,32 +439,24 @@ def _spring(stiffness: float, digits: int) -> str:
 def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
     train, hertz = model.train, model.frequencies(case.operation.speed) / (2.0 * np.pi)
     rows = []
-    for i, one in enumerate(train.planetary):
-        sun, planet = one.pitch_radii
-        rows.append(
-            (
-                one.name,
-                one.driver or one.carrier,
-                f"{one.sun_teeth} / {one.ring_teeth}, {len(one.angles)} planets",
-                f"{1e3 * sun:.4f}, {1e3 * planet:.4f}, {1e3 * one.ring_radius:.4f}",
-                f"{model.ratio[one.sun] / model.ratio[one.carrier]:.5g}",
-                f"{one.sun_mesh.contact_ratio:.4g}, {one.ring_mesh.contact_ratio:.4g}",
-                f"{one.sun_mesh.stiffness:.4g}, {one.ring_mesh.stiffness:.4g}",
-                f"{hertz[2 * i + 1]:.4f}",
-            )
-        )
-    for i, one in enumerate(train.parallel):
-        first, second = one.between
+    for number, one in enumerate(train.stages):
+        meshes = [i for i, mesh in enumerate(train.meshes) if mesh.stage == number and not mesh.planet]
+        waves, radii, (first, second) = [train.meshes[i].section for i in meshes], one.pitch_radii, one.ends
+        if isinstance(one, PlanetarySection):
+            teeth = f"{one.sun_teeth} / {one.ring_teeth}, {len(one.angles)} planets"
+            radii = (*radii, one.ring_radius)
+        else:
+            teeth = f"{one.teeth[0]} / {one.teeth[1]}"
         rows.append(
             (
                 one.name,
                 one.driver or first,
-                f"{one.teeth[0]} / {one.teeth[1]}",
-                ", ".join(f"{1e3 * radius:.4f}" for radius in one.pitch_radii),
+                teeth,
+                ", ".join(f"{1e3 * radius:.4f}" for radius in radii),
                 f"{model.ratio[second] / model.ratio[first]:.5g}",
-                f"{one.mesh.contact_ratio:.4g}",
-                f"{one.mesh.stiffness:.4g}",
-                f"{hertz[2 * len(train.planetary) + i]:.4f}",
+                ", ".join(f"{wave.contact_ratio:.4g}" for wave in waves),
+                ", ".join(f"{wave.stiffness:.4g}" for wave in waves),
+                f"{hertz[model.mesh_base[meshes[0]]]:.4f}",
             )
         )
     header = (
