@@ -22,8 +22,8 @@ from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.storage.dataset import RPM
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.data import Drivetrain, ShaftSection, TorqueHistory
-from femgear.trains.drivetrain.geometry import speed_ratios
+from femgear.trains.drivetrain.data import Drivetrain, TorqueHistory
+from femgear.trains.drivetrain.geometry import speed_ratios, springs_of
 from femgear.trains.drivetrain.model import DrivetrainModel, drivetrain_model, torsional_model
 from femgear.trains.drivetrain.section import (
     FASTEST_RATE,
@@ -217,10 +217,10 @@ def speed_range(
     return SpeedRange(*map(float, (speeds[0], speeds[-1], every.min(), every.max(), mean)))
 
 
-def case_speeds(case: DrivetrainCase, model: DrivetrainModel) -> SpeedRange:
-    """Speeds of the first body over the run, without its deviation."""
-    torques = torque_histories(case, model.ratio)
-    return speed_range(model, torques, duration=case.simulation.duration, speed=case.operation.speed)
+def case_speeds(case: DrivetrainCase, model: DrivetrainModel, *, start: float = 0.0) -> SpeedRange:
+    """Speeds of the first body from `start` [s] to the end of the run, without its deviation."""
+    torques, duration = torque_histories(case, model.ratio), case.simulation.duration
+    return speed_range(model, torques, duration=duration, speed=case.operation.speed, start=start)
 
 
 def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:
@@ -329,12 +329,9 @@ def check_spectrum(case: DrivetrainCase, model: DrivetrainModel) -> None:
         Records that are too few, a resolution that they do not have (E-RANGE); a first body that nearly stops
         or turns back in the part that the spectra take (E-SPECTRUM).
     """
-    s, torques = case.simulation, torque_histories(case, model.ratio)
     with _located(case):
         _check_records(case, record_rate(case, model))
-        late = speed_range(
-            model, torques, duration=s.duration, speed=case.operation.speed, start=settle_time(case)
-        )
+        late = case_speeds(case, model, start=settle_time(case))
         check_turning(late.lowest, late.mean)
 
 
@@ -521,8 +518,15 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     names : tuple of str
         Coordinates of those motions, the largest first, rotations last.
     """
-    model = drivetrain_model(_like_springs(train), harmonics=1, turning=turning)
-    stiffness = model.total_stiffness
+    model = drivetrain_model(replace(train, damping_ratio=0.0), harmonics=0, turning=turning)
+    lengths = [one.length for one in train.shafts]
+    lengths += [one.pitch_radii[0] for one in (*train.parallel, *train.planetary)]
+    arm = math.exp(np.mean(np.log(lengths))) if lengths else 1.0
+    stiffness = model.system.W @ model.system.W.T
+    for one in springs_of(train, model.place):
+        there = (one.stiffness > 0.0) & np.isfinite(one.stiffness)
+        rows = (one.rows * np.where(one.turns, arm, 1.0)[:, None])[there] @ model.free[one.places]
+        stiffness += rows.T @ rows
     own = np.diag(stiffness)
     size = np.sqrt(np.where(own > 0.0, own, 1.0))
     # the spin is known, and held
@@ -537,47 +541,6 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     # coordinates of bodies before those of planets and shaft stations, rotations last
     names.sort(key=lambda name: (name.endswith("rotation"), name.split(":")[0] not in bodies))
     return count, tuple(names[:_NAMED])
-
-
-def _like_springs(train: Drivetrain) -> Drivetrain:
-    """The chain with springs that are all alike, without weight and damping."""
-    lengths = [one.length for one in train.shafts]
-    lengths += [one.pitch_radii[0] for one in (*train.parallel, *train.planetary)]
-    arm = math.exp(np.mean(np.log(lengths))) if lengths else 1.0
-    return replace(
-        train,
-        shafts=tuple(_like_shaft(one, arm) for one in train.shafts),
-        parallel=tuple(one.changed(mesh=one.mesh.changed(stiffness=1.0)) for one in train.parallel),
-        planetary=tuple(
-            one.changed(
-                sun_mesh=one.sun_mesh.changed(stiffness=1.0),
-                ring_mesh=one.ring_mesh.changed(stiffness=1.0),
-                planet_bearing=_unit(one.planet_bearing),
-            )
-            for one in train.planetary
-        ),
-        bearings=tuple(
-            one.changed(radial=_unit(one.radial), tilt=_unit(one.tilt, arm**2)) for one in train.bearings
-        ),
-        gravity=0.0,
-        damping_ratio=0.0,
-    )
-
-
-def _unit(stiffness: float, unit: float = 1.0) -> float:
-    """The unit in place of a spring that is there and not rigid."""
-    return stiffness if stiffness == 0.0 or math.isinf(stiffness) else unit
-
-
-def _like_shaft(one: ShaftSection, arm: float) -> ShaftSection:
-    """A shaft of springs of one, or a slender one of 12 E I / l^3 = 1 N/m."""
-    if not one.elements:
-        springs = one.springs
-        bending, torsion = _unit(springs.bending, arm**2), _unit(springs.torsion, arm**2)
-        return one.changed(bending=bending, torsion=torsion, shear=_unit(springs.shear))
-    diameter = 0.1 * one.length
-    modulus = one.length**3 / (12.0 * math.pi * diameter**4 / 64.0)
-    return one.changed(outer_diameter=diameter, inner_diameter=0.0, youngs_modulus=modulus)
 
 
 def _check_spread(train: Drivetrain, *, turning: bool) -> None:

@@ -11,19 +11,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy import linalg
 
 from femgear.errors import CaseError
 from femgear.system.assembler import mesh_directions, pin_directions
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.system.shaft import AXES, joint_deflections
+from femgear.system.shaft import AXES, joint_deflections, joint_springs
 from femgear.trains.drivetrain.data import (
-    BearingSection,
     Drivetrain,
     ParallelSection,
     PlanetarySection,
-    ShaftSection,
     numbered,
 )
 
@@ -77,12 +77,47 @@ def coordinates_of(train: Drivetrain) -> Coordinates:
     )  # fmt: skip
 
 
-def bearing_place(train: Drivetrain, place: Coordinates, bearing: BearingSection) -> int:
-    """First of the five places that a bearing holds."""
-    if bearing.station is None:
-        return place.body[bearing.body or ""]
+@dataclass(frozen=True)
+class Springs:
+    """Springs of a part: places (m,) that they join, deflections (k, m), stiffness (k,) [N/m, N m/rad].
+
+    ``turns`` (k,): whether a spring acts against a rotation.
+    """
+
+    places: np.ndarray
+    rows: np.ndarray
+    stiffness: np.ndarray
+    turns: np.ndarray
+
+
+def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
+    """Springs of shafts (a group an element), bearings, planet bearings; infinite ones are conditions."""
+    found, turns = [], np.array([False, False, True, True, True])
     stations = {shaft.between: inner for shaft, inner in zip(train.shafts, place.inner)}
-    return stations[bearing.shaft or ()][bearing.station - 1]
+    for shaft, inner in zip(train.shafts, place.inner):
+        ends = (place.body[shaft.between[0]], *inner, place.body[shaft.between[1]])
+        length = shaft.length / max(shaft.elements, 1)
+        s = joint_springs(shaft.section, length) if shaft.elements else shaft.springs
+        stiffness = np.array([s.shear, s.shear, s.bending, s.bending, s.torsion])
+        for one, two in pairwise(ends):
+            places = np.r_[one : one + 5, two : two + 5]
+            found.append(Springs(places, joint_deflections(length), stiffness, turns))
+    for bearing in train.bearings:
+        rows = np.eye(4)
+        rows[0, 3], rows[1, 2] = bearing.offset, -bearing.offset
+        stiffness = np.array([bearing.radial, bearing.radial, bearing.tilt, bearing.tilt])
+        if bearing.station is None:
+            first = place.body[bearing.body or ""]
+        else:
+            first = stations[bearing.shaft or ()][bearing.station - 1]
+        found.append(Springs(first + np.arange(4), rows, stiffness, turns[:4]))
+    for number, stage in enumerate(train.planetary):
+        if math.isfinite(stage.planet_bearing):
+            pins = pin_directions(planar_of(train, stage)).reshape(-1, 2 * len(stage.angles))
+            rows = pins.T @ lumped_map(stage, place, number)
+            stiffness = np.full(len(rows), stage.planet_bearing)
+            found.append(Springs(np.arange(place.count), rows, stiffness, np.zeros(len(rows), bool)))
+    return found
 
 
 def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -95,26 +130,21 @@ def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray,
     for one in train.bodies:
         if not one.tilts:
             held[place.body[one.name] + np.array([2, 3])] = True
-    for bearing in train.bearings:
-        first = bearing_place(train, place, bearing)
-        held[first : first + 2] |= math.isinf(bearing.radial)
-        held[first + 2 : first + 4] |= math.isinf(bearing.tilt)
     for stage, own in zip(train.planetary, place.planets):
         held[own[:, :2]] |= math.isinf(stage.planet_bearing)
-    free = np.flatnonzero(~held)
-    rows = [np.zeros((0, place.count))]
-    for shaft in train.shafts:
-        if not shaft.elements:
-            s = shaft.springs
-            stiff = np.isinf([s.shear, s.shear, s.bending, s.bending, s.torsion])
-            rows.append(joint_rows(place, shaft)[stiff])
-    return _eliminated(np.vstack(rows), free, place)
+    groups = [np.zeros((0, place.count))]
+    for group in springs_of(train, place):
+        stiff = group.rows[np.isinf(group.stiffness)]
+        groups.append(np.zeros((len(stiff), place.count)))
+        groups[-1][:, group.places] = stiff
+    rows = np.vstack(groups)
+    single = np.count_nonzero(rows, axis=1) == 1
+    held |= np.any(rows[single] != 0.0, axis=0)
+    return _eliminated(rows[~single], np.flatnonzero(~held), place)
 
 
 def _eliminated(rows, free, place):
     """Solve the conditions ``rows q = 0`` for as many of the free coordinates, the last ones first."""
-    from scipy import linalg
-
     backwards = free[::-1]
     size = np.abs(rows).max(initial=0.0)
     table = rows[:, backwards]
@@ -131,15 +161,6 @@ def _eliminated(rows, free, place):
     T[rest, np.arange(len(rest))] = 1.0
     T[bound] = tied
     return T, tuple(place.names[i] for i in rest)
-
-
-def joint_rows(place: Coordinates, shaft: ShaftSection) -> np.ndarray:
-    """Deflections (5, n) of the joint of a shaft."""
-    rows = np.zeros((5, place.count))
-    local = joint_deflections(shaft.length)
-    for name, part in zip(shaft.between, (local[:, :5], local[:, 5:])):
-        rows[:, place.body[name] : place.body[name] + 5] += part
-    return rows
 
 
 def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
@@ -278,10 +299,10 @@ def _flank_directions(train: Drivetrain, place: Coordinates, spin, *, back: bool
     return np.hstack(columns)
 
 
-def _planar_places(train: Drivetrain, place: Coordinates) -> list[list[int]]:
-    """Per planetary stage the places of x and y of the carrier and the sun."""
+def _planar_places(train: Drivetrain, place: Coordinates) -> list[np.ndarray]:
+    """Per planetary stage the places (4,) of x and y of the carrier and the sun."""
     firsts = [(place.body[stage.carrier], place.body[stage.sun]) for stage in train.planetary]
-    return [[one, one + 1, two, two + 1] for one, two in firsts]
+    return [np.array([one, one + 1, two, two + 1]) for one, two in firsts]
 
 
 def _turned_directions(direction) -> tuple[np.ndarray, np.ndarray]:
@@ -329,12 +350,6 @@ def lumped_map(stage: PlanetarySection, place: Coordinates, number: int) -> np.n
         B[9::3] = np.outer(cosines, x) + np.outer(sines, y)
         B[10::3] = np.outer(cosines, y) - np.outer(sines, x) + u
     return B
-
-
-def planet_bearing_rows(train: Drivetrain, stage: PlanetarySection, place, number: int) -> np.ndarray:
-    """Deflections (2N, n) of planet bearings of finite stiffness."""
-    pins = pin_directions(planar_of(train, stage)).reshape(-1, 2 * len(stage.angles))
-    return pins.T @ lumped_map(stage, place, number)
 
 
 def _parallel_direction(stage: ParallelSection, place: Coordinates, spin, *, flank: int) -> np.ndarray:
@@ -405,19 +420,10 @@ class FlankContacts:
 def flank_contacts(
     train: Drivetrain, place: Coordinates, spin, T, geometry: MeshGeometry, backlash
 ) -> FlankContacts:
-    """Contacts of all meshes; an infinite backlash has no back flank.
+    """Contacts of all meshes with their backlash (n_meshes,) [m]; an infinite one has no back flank.
 
-    Parameters
-    ----------
-    train : Drivetrain
-    place : Coordinates
-    spin : (n_all,) array
-    T : (n_all, n) array
-        All coordinates by the free ones.
-    geometry : MeshGeometry
-        Of the drive flanks, among the free coordinates.
-    backlash : (n_meshes,) array
-        [m]
+    The geometry of the drive flanks is among the free coordinates, of which T (n_all, n) makes all; spin
+    (n_all,).
     """
     count, behind = len(geometry.names), np.flatnonzero(np.isfinite(backlash))
     total, planar = _flank_directions(train, place, spin, back=True), _planar_places(train, place)

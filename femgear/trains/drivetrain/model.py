@@ -31,15 +31,13 @@ from femgear.trains.drivetrain.geometry import (
     Coordinates,
     FlankContacts,
     MeshGeometry,
-    bearing_place,
     coordinates_of,
     flank_contacts,
     free_coordinates,
-    joint_rows,
     lumped_map,
     mesh_geometry,
-    planet_bearing_rows,
     rigid_rotation,
+    springs_of,
 )
 
 # Terms of the mesh stiffness: as many as the paper takes.
@@ -229,22 +227,11 @@ def drivetrain_problem(
 
 @dataclass(frozen=True)
 class _TurningMeshes:
-    """Meshes of one stage, or one of their flanks, as elements on simple motions.
+    """Meshes of one stage, or one of their flanks, as an element on simple motions.
 
-    Parameters
-    ----------
-    columns : (g, d) int array
-        Columns that every mesh takes part in.
-    fixed, even, odd : (g, d) arrays
-        ``S = fixed + cos phi even + sin phi odd``.
-    stiffness : FourierSeries
-        [N/m]
-    turn : tuple of int
-        Orders of the carrier's angle ``phi`` in the base frequencies.
-    gap : (g,) array
-        Of flanks that separate: ``k max(x - gap, 0)`` [m].
-    separates : bool
-        False: ``k x``.
+    ``columns`` (g, d): those that every mesh takes part in, by ``S = fixed + cos phi even + sin phi odd``
+    (g, d); ``turn``: orders of the carrier's angle ``phi`` in the base frequencies; ``stiffness`` [N/m].
+    Flanks that separate have the force ``k max(x - gap, 0)`` with the gap (g,) [m], others ``k x``.
     """
 
     columns: np.ndarray
@@ -320,23 +307,16 @@ def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
         M[first : first + 5, first : first + 5] += mass
         G[first : first + 5, first : first + 5] += gyroscopic * spin[first + 4]
     for shaft, inner in zip(train.shafts, place.inner):
-        if not shaft.elements:
-            s = shaft.springs
-            K += _springs(joint_rows(place, shaft), [s.shear, s.shear, s.bending, s.bending, s.torsion])
-            continue
-        ends = (place.body[shaft.between[0]], *inner, place.body[shaft.between[1]])
-        mass, stiffness, gyroscopic = beam_element(shaft.section, shaft.length / shaft.elements)
-        for one, two in itertools.pairwise(ends):
-            at = np.r_[one : one + 5, two : two + 5]
-            M[np.ix_(at, at)] += mass
-            K[np.ix_(at, at)] += stiffness
-            G[np.ix_(at, at)] += gyroscopic * spin[ends[0] + 4]
-    for bearing in train.bearings:
-        rows = np.zeros((5, place.count))
-        first = bearing_place(train, place, bearing)
-        rows[np.arange(5), first + np.arange(5)] = 1.0
-        rows[0, first + 3], rows[1, first + 2] = bearing.offset, -bearing.offset
-        K += _springs(rows, [bearing.radial] * 2 + [bearing.tilt] * 2 + [0.0])
+        if shaft.elements:
+            mass, _, gyroscopic = beam_element(shaft.section, shaft.length / shaft.elements)
+            ends = (place.body[shaft.between[0]], *inner, place.body[shaft.between[1]])
+            for one, two in itertools.pairwise(ends):
+                at = np.r_[one : one + 5, two : two + 5]
+                M[np.ix_(at, at)] += mass
+                G[np.ix_(at, at)] += gyroscopic * spin[ends[0] + 4]
+    for group in springs_of(train, place):
+        finite = np.where(np.isinf(group.stiffness), 0.0, group.stiffness)
+        K[np.ix_(group.places, group.places)] += (group.rows.T * finite) @ group.rows
     for number, stage in enumerate(train.planetary):
         carrier = place.body[stage.carrier]
         B = lumped_map(stage, place, number)
@@ -349,16 +329,7 @@ def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
         momentum = n * stage.planet_mass * a**2 * spin[carrier + 4]
         momentum += n * stage.planet_inertia * spin[place.planets[number][0, 2]]
         G[carrier : carrier + 5, carrier : carrier + 5] += disc_matrices(0.0, momentum, 0.0)[1]
-        if math.isfinite(stage.planet_bearing):
-            rows = planet_bearing_rows(train, stage, place, number)
-            K += _springs(rows, [stage.planet_bearing] * len(rows))
     return M, K, G
-
-
-def _springs(rows, stiffness) -> np.ndarray:
-    """Infinite ones are conditions on the coordinates and not here."""
-    stiffness = np.array(stiffness, float)
-    return (rows.T * np.where(np.isinf(stiffness), 0.0, stiffness)) @ rows
 
 
 def _bases(train: Drivetrain, place: Coordinates, spin: np.ndarray):
@@ -417,10 +388,7 @@ def contact_model(model):
 
 
 def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:
-    """Model with every axis held: no translation, no tilt, shafts that only twist, no weight.
-
-    Options as for `drivetrain_model`.
-    """
+    """As `drivetrain_model`, every axis held: no translation, no tilt, shafts that only twist, no weight."""
     held = replace(
         train,
         bodies=tuple(one.changed(tilts=False) for one in train.bodies),

@@ -282,7 +282,7 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
             remedy="take a coarser resolution or a longer signal",
         )
     hop = max(1, round(0.5 * length))
-    weight = windows.get_window(WINDOW, length)
+    weight = np.asarray(windows.get_window(WINDOW, length))
     options = {"window": weight, "noverlap": length - hop, "detrend": "constant", "scaling": "spectrum"}
     frequency, power = welch(signal, 1.0 / step, nperseg=length, axis=0, return_onesided=False, **options)
     kept = length // 2 + 1
