@@ -39,12 +39,6 @@ def _name(value: object) -> str:
     return value
 
 
-def _reference(value: object) -> str:
-    if not isinstance(value, str):
-        raise refuse(f"the name of a body is needed, not {described(value)}", code="E-TYPE", value=value)
-    return value
-
-
 def _two(value: object) -> object:
     if not isinstance(value, list) or len(value) != 2:
         what = f"{len(value)} entries" if isinstance(value, list) else described(value)
@@ -70,8 +64,7 @@ def _driver(value: str | None, info: ValidationInfo) -> str | None:
 
 
 Name = Annotated[str, BeforeValidator(_name)]
-Reference = Annotated[str, BeforeValidator(_reference)]
-Driver = Annotated[Reference | None, AfterValidator(_driver)]
+Driver = Annotated[str | None, AfterValidator(_driver)]
 Mass = Annotated[float, Quantity(MASS, 1e-6, 1e8)]
 Inertia = Annotated[float, Quantity(INERTIA, 1e-12, 1e11)]
 TransverseInertia = Annotated[float, Quantity(INERTIA, 0.0, 1e11)]
@@ -118,7 +111,7 @@ class BodySection(Part):
 class ShaftSection(Part):
     """A shaft between two bodies: springs of its joint, or a round section."""
 
-    between: Annotated[tuple[Reference, ...], BOTH]
+    between: Annotated[tuple[str, ...], BOTH]
     length: Length
     bending: Joint | None = None
     torsion: Joint | None = None
@@ -178,7 +171,7 @@ class MeshSection(Part):
 class ParallelSection(Part):
     """Two external gears; sizes by pitch radii, base radii, or the transverse module."""
 
-    between: Annotated[tuple[Reference, ...], BOTH]
+    between: Annotated[tuple[str, ...], BOTH]
     teeth: Annotated[tuple[Teeth, ...], BOTH]
     radii: Annotated[tuple[Radius, ...], BOTH] | None = None
     base_radii: Annotated[tuple[Radius, ...], BOTH] | None = None
@@ -220,8 +213,8 @@ class ParallelSection(Part):
 class PlanetarySection(Part):
     """Carrier, sun and planets in a ring that the housing holds."""
 
-    carrier: Reference
-    sun: Reference
+    carrier: str
+    sun: str
     ring_teeth: Teeth
     sun_teeth: Teeth
     planet_teeth: Teeth | None = None
@@ -293,8 +286,8 @@ class PlanetarySection(Part):
 class BearingSection(Part):
     """Bearing in the housing, of a body or of a station inside a shaft of several elements."""
 
-    body: Reference | None = None
-    shaft: Annotated[tuple[Reference, ...], BOTH] | None = None
+    body: str | None = None
+    shaft: Annotated[tuple[str, ...], BOTH] | None = None
     station: Annotated[int, Count(1, 99)] | None = None
     """Number of the station inside the shaft, from 1 beside the first body."""
     radial: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, 1e15)] = 0.0

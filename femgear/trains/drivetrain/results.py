@@ -62,32 +62,36 @@ class DrivetrainModesResult:
         """Contents of modes.nc."""
         modes, model, found = self.modes, self.model, self.campbell
         members, energy, rotation = _energies(model, modes.shape)
-        bases, mode, base, crossing = np.unique(model.mesh_base), ("mode",), ("base",), ("crossing",)
-        orders, critical = model.base_ratio[bases], found.critical
+        bases = np.unique(model.mesh_base)
+        orders = model.base_ratio[bases]
+        critical = found.critical
+        line = orders * self.speed / (2 * np.pi)
         variables = {
-            "frequency": (mode, modes.frequency, "Hz", "undamped natural frequency"),
-            "damping_ratio": (mode, modes.damping_ratio, "1", "fraction of critical damping"),
-            "kind": (mode, _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
-            "rotation_share": (mode, rotation, "1", "share of rotations in the kinetic energy"),
-            "energy": (("member", "mode"), energy, "1", "share of the member in the kinetic energy"),
-            "shape": (("dof", "mode"), modes.shape, "kg^-1/2", "mass-normalised mode shape"),
-            "mesh_stiffness": (("mesh",), model.mean_stiffness, "N/m", "mean mesh stiffness"),
-            "mesh_deflection": (
-                ("mesh", "mode"), modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode",
-            ),
-            "ratio": (("body",), list(model.ratio.values()), "1", "speed over that of the first body"),
-            "base_order": (base, orders, "1", "mesh frequency over the first body's turn"),
-            "mesh_frequency": (
-                base, orders * self.speed / (2 * np.pi), "Hz", "mesh frequency at the speed of the operation",
-            ),
+            "frequency": ("mode", modes.frequency, "Hz", "undamped natural frequency"),
+            "damping_ratio": ("mode", modes.damping_ratio, "1", "fraction of critical damping"),
+            "kind": ("mode", _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
+            "rotation_share": ("mode", rotation, "1", "share of rotations in the kinetic energy"),
+            "energy": ("member mode", energy, "1", "share of the member in the kinetic energy"),
+            "shape": ("dof mode", modes.shape, "kg^-1/2", "mass-normalised mode shape"),
+            "mesh_stiffness": ("mesh", model.mean_stiffness, "N/m", "mean mesh stiffness"),
+            "mesh_deflection": ("mesh mode", modes.mesh_deflection, "kg^-1/2", "mesh deflection of the mode"),
+            "ratio": ("body", list(model.ratio.values()), "1", "speed over that of the first body"),
+            "base_order": ("base", orders, "1", "mesh frequency over the first body's turn"),
+            "mesh_frequency": ("base", line, "Hz", "mesh frequency at the speed of the operation"),
             "campbell_frequency": (
-                ("campbell_speed", "branch"), found.frequency, "Hz", "natural frequency over the speed",
+                "campbell_speed branch",
+                found.frequency,
+                "Hz",
+                "natural frequency over the speed",
             ),
             "critical_speed": (
-                crossing, [c.speed / RPM for c in critical], "rpm", "speed of a mesh line on a branch",
+                "crossing",
+                [c.speed / RPM for c in critical],
+                "rpm",
+                "speed of a mesh line on a branch",
             ),
-            "critical_frequency": (crossing, [c.frequency for c in critical], "Hz", "frequency there"),
-        }  # fmt: skip
+            "critical_frequency": ("crossing", [c.frequency for c in critical], "Hz", "frequency there"),
+        }
         coords = {
             "mode": (("mode",), np.arange(len(modes.frequency)), "1", "mode"),
             "dof": _names("dof", model.system.dofs, "degree of freedom"),
@@ -234,33 +238,25 @@ class SpectrumResult:
         length = min(len(one.frequency) for one in tracked.values())
         order = tracked[variants[0]].frequency[:length]
         lines, distance = self.lines, self.order_distance
+        amplitude = [self.spectra[v].amplitude for v in variants]
+        by_order = [tracked[v].amplitude[:, :length] for v in variants]
+        averaged = (
+            "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values"
+        )
+        single = "amplitude of the mesh force over orders of the first body, one segment, peak values"
+        line, orders = [self.amplitudes[v] for v in variants], np.array([one.order for one in lines])
+        hertz, multiples = orders * self.speed / (2 * np.pi), [one.orders for one in lines]
+        of_line = "amplitude of the line, peak value; NaN beyond the pass band"
         variables = {
-            "amplitude": (
-                ("variant", "mesh", "frequency"), [self.spectra[v].amplitude for v in variants], "N",
-                "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values",
-            ),
-            "order_amplitude": (
-                ("variant", "mesh", "order"), [tracked[v].amplitude[:, :length] for v in variants], "N",
-                "amplitude of the mesh force over orders of the first body, one segment, peak values",
-            ),
-            "line_order": (("line",), [line.order for line in lines], "1", "order of the first body"),
-            "line_frequency": (
-                ("line",), [line.order * self.speed / (2 * np.pi) for line in lines], "Hz",
-                "frequency at the mean speed",
-            ),
-            "line_amplitude": (
-                ("variant", "line", "mesh"), [self.amplitudes[v] for v in variants], "N",
-                "amplitude of the line, peak value; NaN beyond the pass band",
-            ),
-            "line_orders": (
-                ("line", "base"), [line.orders for line in lines], "1", "multiples of the base frequencies",
-            ),
-            "mesh_base": (("mesh",), model.mesh_base, "1", "number of the base of the mesh stiffness"),
-            "resolved": (
-                ("line",), self.resolved, "1",
-                "whether the record parts the line from its neighbours",
-            ),
-        }  # fmt: skip
+            "amplitude": ("variant mesh frequency", amplitude, "N", averaged),
+            "order_amplitude": ("variant mesh order", by_order, "N", single),
+            "line_order": ("line", orders, "1", "order of the first body"),
+            "line_frequency": ("line", hertz, "Hz", "frequency at the mean speed"),
+            "line_amplitude": ("variant line mesh", line, "N", of_line),
+            "line_orders": ("line base", multiples, "1", "multiples of the base frequencies"),
+            "mesh_base": ("mesh", model.mesh_base, "1", "number of the base of the mesh stiffness"),
+            "resolved": ("line", self.resolved, "1", "whether the record parts the line from its neighbours"),
+        }
         coords = {
             "variant": _names("variant", variants, "model"),
             "mesh": _names("mesh", model.meshes, "gear mesh"),

@@ -30,7 +30,6 @@ from femgear.trains.drivetrain.data import (
     Drivetrain,
     ParallelSection,
     PlanetarySection,
-    Reference,
     ShaftSection,
     TorqueHistory,
 )
@@ -80,7 +79,7 @@ class GravitySection(Section):
 class TorqueSection(Section):
     """Torque on a body: constant, a series, or a share of what balances the others."""
 
-    body: Reference
+    body: str
     torque: _Torque | None = None
     file: Title | None = None
     times: Annotated[tuple[_Time, ...], Field(min_length=1, max_length=_MOST_POINTS)] | None = None
@@ -561,7 +560,6 @@ def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
         )
     steps = [(angle - angles[0]) * both / (2.0 * math.pi) for angle in angles]
     if any(abs(step - round(step)) > 1e-3 for step in steps):
-        divisor = f"a divisor of ring_teeth + sun_teeth = {both}"
         yield CaseError(
             f"{len(angles)} equally spaced planets do not assemble"
             if equal
@@ -569,7 +567,9 @@ def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
             code="E-ASSEMBLY",
             key=key,
             value=stage.planets if equal else None,
-            limit=divisor if equal else f"whole multiples of 360 deg / {both} from one another",
+            limit=f"a divisor of ring_teeth + sun_teeth = {both}"
+            if equal
+            else f"whole multiples of 360 deg / {both} from one another",
         )
 
 
