@@ -32,7 +32,6 @@ from femgear.trains.drivetrain.model import (
     rectangular_series,
     torsional_model,
 )
-from femgear.trains.drivetrain.stages import averaged_spectrum
 from femgear.trains.drivetrain.time import Records, march_drivetrain
 
 TRAIN = wind_turbine_drivetrain()
@@ -307,7 +306,6 @@ def test_tilted_and_helical_mesh_by_virtual_work():
         (lambda: drivetrain_model(gear_set(planet_bearing=1e8)), "E-TURNING"),
         (lambda: drivetrain_model(replace(TRAIN, shafts=(*TRAIN.shafts, SHORT_CUT))), "E-DRIVETRAIN"),
         (lambda: march_drivetrain(drivetrain_model(TRAIN), (), duration=1.0, step=2.0, speed=0.6), "E-RANGE"),
-        (lambda: averaged_spectrum(np.zeros(100), 1e-3, resolution=1.0), "E-SPECTRUM"),
     ],
 )
 def test_refusals(make, code):

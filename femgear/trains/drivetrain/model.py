@@ -370,8 +370,6 @@ def rectangular_series(wave: MeshSection, harmonics: int) -> np.ndarray:
     at phase zero, ``k = k_low + (k_high - k_low) (e + sum_h 2 / (pi h) sin(pi h e) cos(h omega t))``
     (Parker and Lin, J. Mech. Des. 126, 2004, 68-76, take the same wave).
     """
-    if harmonics < 0 or int(harmonics) != harmonics:
-        raise CaseError(f"{harmonics} harmonics", code="E-HARMONICS", limit="a whole number, 0 or more")
     low, high, share = wave.levels
     h = np.arange(1, harmonics + 1)
     waves = 2.0 * (high - low) / (math.pi * h) * np.sin(math.pi * h * share)

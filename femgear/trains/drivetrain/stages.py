@@ -19,7 +19,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import welch, windows
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import campbell_data
 from femgear.threads import one_blas_thread
@@ -65,12 +65,12 @@ _SPEEDS, _FASTEST, _HIGHEST, _MOST_BRANCHES = 21, 10.0 / 3.0, 2.5, 40
 # Orders are read off up to this share of the record rate: beyond it the interpolation takes more than 1.4 %.
 _ORDERS = 0.25
 # Mesh harmonics and side bands of the carrier's turn that have names.
-HARMONICS, SIDE_BANDS = 3, 3
+_HARMONICS, _SIDE_BANDS = 3, 3
 # Of the spectra, and half the width of its main lobe in lines (F. J. Harris, Proc. IEEE 66, 1978, 51-83).
-WINDOW, _LOBE = "hann", 2.0
+_WINDOW, _LOBE = "hann", 2.0
 # Growth of the free motion from which linear meshes are asked whether the motion means anything, and the
 # vibration of a body over its own speed that means nothing.
-GROWN, _WILD = 1e3, 100.0
+_GROWN, _WILD = 1e3, 100.0
 
 
 @one_blas_thread()
@@ -134,7 +134,7 @@ def _run(case: DrivetrainCase, variant: str, model, torques) -> DrivetrainRun:
 
 def _check_sense(run: DrivetrainRun, variant: str, ratio) -> None:
     """Refuse motions that have grown beyond sense, however exact their balances are."""
-    if not run.gain > GROWN:
+    if not run.gain > _GROWN:
         return
     fastest = np.abs(run.spin_speed).max() * np.abs(ratio)
     vibration = np.abs(run.velocity).max(axis=0)
@@ -210,9 +210,9 @@ def mesh_lines(model: DrivetrainModel) -> tuple[MeshLine, ...]:
         text = model.bases[base]
         if base < 2 * planets:
             add(model.bases[base - 1], {base - 1: 1})
-        for h in range(1, HARMONICS + 1):
+        for h in range(1, _HARMONICS + 1):
             add(text if h == 1 else f"{h} x {text}", {base: h})
-        for k in (*range(-SIDE_BANDS, 0), *range(1, SIDE_BANDS + 1)) if base < 2 * planets else ():
+        for k in (*range(-_SIDE_BANDS, 0), *range(1, _SIDE_BANDS + 1)) if base < 2 * planets else ():
             words = f"{'+' if k > 0 else '-'} {abs(k)} turn{'s' if abs(k) > 1 else ''}"
             add(f"{text} {words}", {base: 1, base - 1: k})
     for one, two in itertools.combinations(meshes, 2):
@@ -270,19 +270,12 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
     step : float
         [s], or turns for orders.
     resolution : float
-        Wanted distance of lines [Hz]; the segments take ``1 / resolution`` seconds.
+        Wanted distance of lines [Hz]; the segments take ``1 / resolution`` seconds of the signal.
     """
     signal = np.asarray(signal, float)
-    length = round(1.0 / (resolution * step)) if resolution > 0.0 and step > 0.0 else 0
-    if not 8 <= length <= len(signal):
-        raise CaseError(
-            f"segments of {length} of {len(signal)} samples",
-            code="E-SPECTRUM",
-            limit="8 samples up to the whole signal",
-            remedy="take a coarser resolution or a longer signal",
-        )
+    length = round(1.0 / (resolution * step))
     hop = max(1, round(0.5 * length))
-    weight = np.asarray(windows.get_window(WINDOW, length))
+    weight = np.asarray(windows.get_window(_WINDOW, length))
     options = {"window": weight, "noverlap": length - hop, "detrend": "constant", "scaling": "spectrum"}
     frequency, power = welch(signal, 1.0 / step, nperseg=length, axis=0, return_onesided=False, **options)
     kept = length // 2 + 1
@@ -290,7 +283,7 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
     bandwidth = float(np.sum(weight**2) / weight.sum() ** 2 / step)
     segments = (len(signal) - length) // hop + 1
     return AveragedSpectrum(
-        np.abs(frequency[:kept]), amplitude, 1.0 / (length * step), bandwidth, WINDOW, segments
+        np.abs(frequency[:kept]), amplitude, 1.0 / (length * step), bandwidth, _WINDOW, segments
     )
 
 
